@@ -1,4 +1,4 @@
-//! How far two reflections of facets are from the integrals over the surfaces' areas (docs/model.md
+//! Error of two reflections of facets against the integrals over the surfaces' areas (docs/model.md
 //! §11 "second", "area reference"; docs/measured.md "Lighting accuracy").
 
 #[path = "harness/bounded.rs"]
@@ -15,8 +15,8 @@ use harness::Gpu;
 use nimbus::model::basis::{Basis, evaluate};
 use nimbus::model::material::Brdf;
 use nimbus::model::scene::Scene;
-use nimbus::reference::area::mean::each;
 use nimbus::reference::area::{Accuracy, AreaScene, Estimate};
+use nimbus::reference::parallel::parallel_map;
 use rooms::{Frame, HEAD, Plate, frame, plates_text, random_plates, sun_and_lamp};
 use scene_text::load_with;
 
@@ -39,7 +39,7 @@ fn double(v: [f32; 3]) -> DVec3 {
     DVec3::from(v.map(f64::from))
 }
 
-/// Every facet's surface, and its number in it.
+/// Every facet's surface, and its index in the surface.
 fn places(scene: &Scene) -> Vec<(usize, u32)> {
     let of = |(s, surface): (usize, &nimbus::model::surface::Surface)| {
         (0..surface.n_facets() as u32).map(move |i| (s, i))
@@ -51,12 +51,12 @@ fn brdfs(scene: &Scene) -> Vec<Brdf> {
     (0..scene.n_regions()).map(|i| scene.region_material(i).at(0.0)).collect()
 }
 
-/// L2 toward the eye and I_i at every `stride`-th facet's centre, from the areas.
+/// L2 toward the eye and I_i at every `stride`-th facet's centre by the area reference.
 fn truths(scene: &Scene, eye: DVec3, stride: usize, relative: f64) -> Vec<(usize, Estimate)> {
     let brdfs = brdfs(scene);
     let scenery = AreaScene::new(&scene.surfaces, &brdfs, &scene.lights, &[], 0.0, &[]);
     let places = places(scene);
-    each(places.len().div_ceil(stride), |k| {
+    parallel_map(places.len().div_ceil(stride), |k| {
         let (s, i) = places[k * stride];
         let receiver = scenery.on_surface(s, scene.surfaces[s].facet_center(i));
         let toward = (eye - receiver.position).normalize();
@@ -99,14 +99,14 @@ impl Squares {
     }
 }
 
-/// What the product promises of the default settings: 1 % (root mean square over all facets and
-/// channels, by that of the values).
+/// Promised accuracy of the default settings: 1 %, root mean square over all facets and channels
+/// relative to that of the values.
 const PROMISED: f64 = 0.01;
 
 #[test]
 fn random_rooms_are_within_one_percent() {
     let gpu = Gpu::new();
-    // The truth's own error is a tenth of what is promised.
+    // The reference's own error is a tenth of the promise.
     let of_truth = 1e-3;
     for lighting in ["gather = 'exact'", "gather = 'tree'"] {
         let mut sum = Squares::default();
@@ -115,7 +115,7 @@ fn random_rooms_are_within_one_percent() {
             let truths = truths(&scene, EYE, 1, of_truth);
             let f = frame(&gpu, scene);
             let own = Squares::of(&f, &truths);
-            // Light that the device left out would be told.
+            // Facets whose light the device left out would be counted.
             let n_endless = f.lit.iter().filter(|l| l.unresolved.is_infinite()).count();
             println!(
                 "{lighting}, room {seed}: L2 and I_i {:?}, {} lost",
@@ -131,7 +131,7 @@ fn random_rooms_are_within_one_percent() {
     }
 }
 
-/// The scene that the time of docs/measured.md is measured with.
+/// The scene of the timings in docs/measured.md.
 #[test]
 fn the_scene_of_rectangles_is_within_one_percent() {
     let gpu = Gpu::new();
@@ -167,9 +167,9 @@ fn what_the_lights_bring_is_right_to_rounding() {
             for light in &f.scene.lights {
                 let arrival = light.arrival(at.position);
                 let e = light.energy()
-                    * light.share(at.normal, &arrival, scenery.in_light(at.position, light));
-                // What cos θ and the lobe can turn by: coordinates up to 4 rounded to f32, by the
-                // lamp's distance.
+                    * light.share(at.normal, &arrival, scenery.visibility(at.position, light));
+                // Turn of cos θ and the lobe by rounding: coordinates up to 4 rounded to f32, over
+                // the lamp's distance.
                 let turn = 8.0 * f64::from(f32::EPSILON) * (1.0 + 4.0 / arrival.distance.min(4.0));
                 let w = 0.5 * (at.normal - (arrival.toward + toward).normalize()).length_squared();
                 let lobe = |w: f64| {
@@ -181,7 +181,7 @@ fn what_the_lights_bring_is_right_to_rounding() {
                 .abs();
                 direct += e;
                 first += e * (brdfs[s].kd / std::f64::consts::PI + brdfs[s].ks * lobe(w));
-                // Energy that comes under a grazing angle errs by the whole cosine's turn.
+                // Energy at a grazing angle errs by the whole turn of the cosine.
                 reach += light.energy() * arrival.falloff * turn + e * brdfs[s].ks * slope;
             }
             // Sums of two lights of products of some ten factors: 32 roundings.
@@ -200,8 +200,8 @@ fn what_the_lights_bring_is_right_to_rounding() {
     }
 }
 
-/// Every facet within `tolerance` of the truth, or no farther than it says itself; gives the number
-/// of negative and of unresolved facets, and the greatest bound by the greatest truth.
+/// Checks every facet against `tolerance` or its own error bound. Returns the number of negative
+/// and of unresolved facets, and the greatest bound over the greatest value.
 fn assert_honest(what: &str, f: &Frame, truths: &[(usize, Estimate)], tolerance: f64) -> [f64; 3] {
     let greatest = truths.iter().map(|(_, t)| t.radiance.max_element()).fold(0.0, f64::max);
     let mut worst = 0f64;
@@ -250,7 +250,7 @@ fn extremes_are_near_or_say_so() {
     let down = |c: DVec3, half: f64, kd: f64, n| {
         plate(c, half * DVec3::X, half * DVec3::Z, kd, 0.0, 1.0, n)
     };
-    // A polished floor that mirrors a lit wall, and a polished wall that throws the sun onto a
+    // A polished floor that mirrors a lit wall, and a polished wall that reflects the sun onto a
     // ceiling.
     let wall = plate(DVec3::new(0.0, 1.0, -1.0), DVec3::X, DVec3::Y, 0.4, 0.1, 1e4, 8);
     let mirrors = [
@@ -275,7 +275,7 @@ fn extremes_are_near_or_say_so() {
         truth.extend(truths(&scene, eye, 1, 1e-3).split_off(64 * 64));
         assert_honest(&format!("size ratio 10^4, {gather}"), &frame(&gpu, scene), &truth, 0.05);
     }
-    // A room at 10^6: O takes the coordinates away.
+    // A room at 10^6; the lighting origin O removes the large coordinates.
     let far = DVec3::new(1e6, -1e6, 1e6);
     let mut plates = random_plates(&mut Random(104), 6, 1.0, 0.1);
     plates.iter_mut().for_each(|p| p.center += far);
@@ -284,7 +284,7 @@ fn extremes_are_near_or_say_so() {
     assert_honest("coordinates of 10^6", &frame(&gpu, scene), &truth, 0.05);
 }
 
-/// Relative error of L2 by facets a side.
+/// Relative error of L2 by number of facets a side.
 fn by_subdivision(gpu: &Gpu, build: impl Fn(u32) -> Scene, eye: DVec3) -> Vec<(u32, f64)> {
     let of = |n: u32| {
         let scene = build(n);
@@ -296,7 +296,7 @@ fn by_subdivision(gpu: &Gpu, build: impl Fn(u32) -> Scene, eye: DVec3) -> Vec<(u
     [2, 4, 8, 16, 32].map(of).to_vec()
 }
 
-/// A corner of a room: floor and two walls that see each other whole.
+/// A corner of a room: floor and two walls that see each other entirely.
 fn corner(n: u32) -> Scene {
     let floor = plate(DVec3::ZERO, DVec3::Z, DVec3::X, 0.5, 0.05, 8.0, n);
     let wall = plate(DVec3::new(0.0, 1.3, -1.2), DVec3::X, DVec3::Y, 0.4, 0.0, 1.0, n);
@@ -331,7 +331,7 @@ fn plot() {
     std::fs::write(path, svg(&curves)).expect("the plot");
 }
 
-/// Log-log: error over facets a side.
+/// Log-log slope of the error over facets a side.
 fn svg(curves: &[(&str, Vec<(u32, f64)>)]) -> String {
     let (width, height, left, bottom) = (640.0, 420.0, 80.0, 360.0);
     let x = |n: u32| left + 130.0 * (f64::from(n).log2() - 1.0);

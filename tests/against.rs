@@ -1,14 +1,12 @@
 //! References of the model itself on scenes whose pictures are known: one blob and one floor by
-//! hand, a furnace, and the grid's way of computing light, which comes near the closed form as its
-//! cells shrink.
+//! hand, and a furnace. Light by the density grid converges to the closed form as cells shrink.
 
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::fs;
 
 use nimbus::io::scene_file::load;
 use nimbus::model::scene::Scene;
-use nimbus::reference::picture::kind::{Reference, ReferenceKind};
-use nimbus::reference::picture::pixels::Pixels;
+use nimbus::reference::picture::{Pixels, Reference, ReferenceKind};
 
 fn scene(text: &str, points: &str) -> Scene {
     let dir = tempfile::tempdir().unwrap();
@@ -19,18 +17,18 @@ fn scene(text: &str, points: &str) -> Scene {
 
 fn reference(scene: &Scene, against: &str) -> Reference {
     let pixels = Pixels::all(scene.film.width, scene.film.height);
-    against.parse::<ReferenceKind>().unwrap().reference(scene, 0.0, &pixels, &|_, _| ()).unwrap()
+    against.parse::<ReferenceKind>().unwrap().render(scene, 0.0, &pixels, &|_, _| ()).unwrap()
 }
 
-/// One pixel, looking along -z at what stands at the origin.
+/// One pixel that looks along -z at the origin.
 const FILM: &str = "film = { width = 1, height = 1 }\ncamera = { position = [0, 0, 10], target = \
     [0, 0, 0], fov_y_deg = 1 }\n";
 const ONE: &str = "x,y,z,sigma,kappa\n0,0,0,0.5,1.2\n";
 
 #[test]
 fn a_blob_by_hand() {
-    // Its density has no direction at its centre, so its facet faces up from 1.5 sigma above it.
-    // Light from straight above comes through what lies higher: half a line less that up to 1.5
+    // The density has no direction at the blob's centre, so its facet faces up from 1.5 sigma above
+    // it. Light from straight above passes the part above: half a line less the part up to 1.5
     // sigma, tau = sqrt(2 pi) kappa sigma (1 - Phi(1.5)), of which 1 - g counts. E = 2, K_d = 0.8:
     // L = 0.8/pi 2 e^(-(1 - g) tau).
     let light = "[lighting]\nmode = \"first\"\nforward = 0.25\n[[light]]\nkind \
@@ -42,7 +40,7 @@ fn a_blob_by_hand() {
     let whole = (2.0 * PI).sqrt() * 1.2 * 0.5;
     // 1 - Phi(1.5) = 0.06680720126885807.
     let radiance = 0.8 * FRAC_1_PI * 2.0 * (-0.75 * whole * 0.066_807_201_268_858_07f64).exp();
-    // The eye's ray passes its centre: all of tau.
+    // The eye's ray passes the centre: the whole tau.
     let alpha = 1.0 - (-whole).exp();
     for against in ["model", "reflections=1", "reflections=3"] {
         let found = reference(&scene(&text, ONE), against);
@@ -57,9 +55,9 @@ fn a_blob_by_hand() {
 
 #[test]
 fn a_floor_by_hand_at_the_pixel_and_not_at_its_facets() {
-    // A wall of one facet facing the eye, a lamp a quarter of its width beside the middle and one
-    // before it: at the pixel d = (1, 0, 1), |d|^2 = 2, cos = 1/sqrt 2, so L = K_d/pi I/2/sqrt 2.
-    // Between facets it is that of the middle of the facet.
+    // A wall of one facet that faces the eye, a lamp a quarter of its width beside the middle and
+    // one before it. At the pixel d = (1, 0, 1), |d|^2 = 2, cos = 1/sqrt 2, so L = K_d/pi I/2/sqrt
+    // 2. Between facets it is the light of the facet's middle.
     let text = |eye: f64| {
         format!(
             "film = {{ width = 1, height = 1 }}\ncamera = {{ position = [{eye}, 0, 10], target = \
@@ -81,9 +79,8 @@ fn a_floor_by_hand_at_the_pixel_and_not_at_its_facets() {
 
 #[test]
 fn in_a_furnace_every_reflection_is_the_albedo_of_the_one_before() {
-    // Six inner walls of K_d = 0.6 and a share of the sky that comes from everywhere, E = 1: L1 =
-    // 0.6/pi, and every point sees nothing but that, so each reflection more is 0.6 of the one
-    // before it.
+    // Six inner walls of K_d = 0.6 under a sky whose constant share comes from everywhere, E = 1.
+    // L1 = 0.6/pi at every point, so each further reflection is 0.6 of the previous one.
     let mut text = "film = { width = 2, height = 1 }\ncamera = { position = [0.2, 0.1, 0.5], \
         target = [0, -0.3, -1], fov_y_deg = 40 }\n\
         [lighting]\nmode = \"two-reflection\"\n[[light]]\nkind = \"sky\"\nirradiance = [1, 1, \
@@ -113,8 +110,7 @@ fn in_a_furnace_every_reflection_is_the_albedo_of_the_one_before() {
     ] {
         let found = reference(&scene, against);
         for pixel in &found.rgba {
-            // Every path finds the same light: chance has no part in it, and rounding is all there
-            // is.
+            // Every path finds the same light, so that only rounding is left.
             assert!(
                 (pixel[0] / (first * sum) - 1.0).abs() < 1e-3 && pixel[3] == 1.0,
                 "{against}: {found:?}"
@@ -129,12 +125,13 @@ fn in_a_furnace_every_reflection_is_the_albedo_of_the_one_before() {
 
 #[test]
 fn light_through_a_finer_grid_comes_nearer_to_the_closed_form() {
-    let points = "x,y,z,sigma,kappa\n0,0,0,0.6,1.5\n0.9,0.5,0.2,0.5,2\n-0.8,0.3,-0.4,0.55,1\n0.2,-0.8,0.3,0.4,3\n";
+    let points = "x,y,z,sigma,kappa\n0,0,0,0.6,1.5\n0.9,0.5,0.2,0.5,2\n\
+                  -0.8,0.3,-0.4,0.55,1\n0.2,-0.8,0.3,0.4,3\n";
     let rmse = |grid: u32| {
         let light = format!(
-            "[lighting]\nmode = \"first\"\nforward = 0.0\nstep = 0.5\ngrid = \
-             {grid}\n[[light]]\nkind = \"directional\"\ndirection = [-0.5, -1, -0.3]\nirradiance \
-             = [3, 3, 3]\n"
+            "[lighting]\nmode = \"first\"\nforward = 0.0\nstep = 0.5\ngrid = {grid}\n\
+             [[light]]\nkind = \"directional\"\ndirection = [-0.5, -1, -0.3]\n\
+             irradiance = [3, 3, 3]\n"
         );
         let film = FILM
             .replace("width = 1, height = 1", "width = 24, height = 18")
@@ -150,9 +147,8 @@ fn light_through_a_finer_grid_comes_nearer_to_the_closed_form() {
             .map(|(a, b)| (a - b) * (a - b));
         (squares.sum::<f64>() / (4 * 24 * 18) as f64).sqrt()
     };
-    // The deposit is an average over cells and the march interpolates between them: the error falls
-    // with the square of a cell's width, down to what the deposit's cut at 3 sigma leaves out (0.27
-    // % of a blob's mass).
+    // The deposit averages over cells and the march interpolates between them. The error falls with
+    // the square of a cell's width, down to the deposit's cut at 3 sigma (0.27 % of a blob's mass).
     let found = [8, 16, 32].map(rmse);
     assert!(found[0] > 2.5 * found[1] && found[1] > 2.0 * found[2] && found[2] > 0.0, "{found:?}");
     assert!(found[2] < 5e-3, "{found:?}");

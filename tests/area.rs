@@ -1,6 +1,5 @@
-//! The area reference by its two ways in random rooms: quadrature over polygons (docs/model.md §11
-//! "area reference") against random paths, which share nothing with it but the lights' and
-//! materials' laws.
+//! The area reference in random rooms by two methods: quadrature over polygons (docs/model.md §11
+//! "area reference") against random paths. They share only the laws of lights and materials.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -23,7 +22,7 @@ use scene_text::load_with;
 
 const EYE: DVec3 = DVec3::new(2.0, 3.0, 6.0);
 
-/// What a room has beside twelve rectangles, sun and lamp.
+/// Contents of a room besides twelve rectangles, sun and lamp.
 #[derive(Debug, Clone, Copy)]
 enum Kind {
     Plain,
@@ -34,7 +33,7 @@ enum Kind {
     /// A second lamp, nearer to a rectangle than its own radius.
     NearLamp,
     Spots,
-    /// Every second rectangle stands on the one before.
+    /// Every second rectangle stands on the previous one.
     Standing,
 }
 
@@ -97,17 +96,18 @@ struct Differences {
     sum: f64,
 }
 
-/// Of the mean: a greater standard error is itself not known, too few paths met the light.
-const BELIEVED: f64 = 0.1;
+/// Greatest standard error, as a share of the mean, of a comparison that counts. A greater one says
+/// that too few paths met the light.
+const MAX_PATH_ERROR: f64 = 0.1;
 
 impl Differences {
     /// `found` ± `error` by paths, `truth` ± `own` by quadrature.
     fn add(&mut self, [found, error]: [f64; 2], [truth, own]: [f64; 2], what: &str) {
-        if found == 0.0 || error > BELIEVED * found {
+        if found == 0.0 || error > MAX_PATH_ERROR * found {
             return;
         }
         let z = (found - truth) / error.hypot(own);
-        // Of 1000 normal numbers one in 2000 such tests has one beyond 5.
+        // Of 1000 normal numbers, one in 2000 such tests has one beyond 5.
         assert!(z.abs() < 5.0, "{what}: {found} ± {error} by paths, {truth} ± {own} by quadrature");
         *self = Differences { n: self.n + 1.0, squares: self.squares + z * z, sum: self.sum + z };
     }
@@ -123,8 +123,8 @@ impl Differences {
     }
 }
 
-/// L2 toward the eye and I_i at every `stride`-th facet's centre of room `seed`, by both ways:
-/// differences of L2 before the eye and behind, and of I_i.
+/// Compares L2 toward the eye and I_i at every `stride`-th facet's centre of room `seed` by both
+/// methods. Returns the differences of L2 in front of the eye and behind, and of I_i.
 fn compare(seed: u32, stride: usize, n_paths: u32, found: &mut [Differences; 3]) {
     let kind = KINDS[seed as usize % KINDS.len()];
     let scene = room(u64::from(seed), kind);

@@ -1,11 +1,11 @@
-//! The BRDF basis (model.md §6) against its own definition, closed forms, and the table that the
-//! page prints.
+//! The BRDF basis (model.md §6) against its definition, closed forms, and the table that the page
+//! prints.
 
 use nimbus::model::basis::{Basis, MAX_BASES, N_NODES, Sampling, evaluate, node, node_t};
 use nimbus::model::material::Brdf;
 
-/// ∫ f g 4 cos γ sin γ dγ = ∫ 16 t³ (1 − t⁴) f g dt by plain trapezoids: not the module's own
-/// quadrature.
+/// ∫ f g 4 cos γ sin γ dγ = ∫ 16 t³ (1 − t⁴) f g dt by plain trapezoids, independent of the
+/// module's quadrature.
 fn product(f: &[f64], g: &[f64]) -> f64 {
     (0..N_NODES).map(|i| term(f, g, i)).sum()
 }
@@ -16,16 +16,16 @@ fn term(f: &[f64], g: &[f64], i: usize) -> f64 {
     16.0 * t.powi(3) * (1.0 - t.powi(4)) * f[i] * g[i] / (N_NODES - 1) as f64
 }
 
-/// How far [`product`] can lie from Gregory's rule: weights 299/240, 211/240 and 739/720 at the
-/// nodes next to the ends in place of 1, and the roundings of 1025 terms.
+/// Greatest distance of [`product`] from Gregory's rule: weights 299/240, 211/240 and 739/720
+/// instead of 1 at the nodes next to the ends, and the roundings of 1025 terms.
 fn rules_differ(f: &[f64], g: &[f64]) -> f64 {
     let ends = [(1, 0.25), (2, 0.13), (3, 0.03)]
         .map(|(k, d)| d * (term(f, g, k).abs() + term(f, g, N_NODES - 1 - k).abs()));
     ends.iter().sum::<f64>() + N_NODES as f64 * f64::EPSILON
 }
 
-/// range of n_s, N_b, greatest relative error with C's sampling and with the default, as model.md
-/// §6 prints them.
+/// Range of n_s, N_b, greatest relative error with C's sampling and with the default, as printed in
+/// model.md §6.
 const PRINTED: [([f64; 2], u32, f64, f64); 5] = [
     ([1.0, 64.0], 8, 6.1e-3, 2.6e-3),
     ([1.0, 256.0], 8, 5.0e-2, 1.2e-2),
@@ -45,7 +45,7 @@ fn the_table_of_the_page_comes_out() {
                 format!("{printed:.1e}"),
                 "{range:?}, {n_bases}, {sampling:?}: {found}"
             );
-            // One vector more would be another number: the diffuse basis counts.
+            // A basis counted differently would have another error: the diffuse basis counts.
             let more = Basis::new(range, n_bases + 1, sampling).greatest_error();
             assert_ne!(format!("{more:.1e}"), format!("{printed:.1e}"));
         }
@@ -57,8 +57,7 @@ fn nodes_and_interpolation_at_worked_points() {
     assert_eq!((node(0), node(512), node(N_NODES - 1)), (0.0, 1.0 / 16.0, 1.0));
     let squares: Vec<f64> = (0..N_NODES).map(|i| (i * i) as f64).collect();
     for (i, square) in squares.iter().enumerate() {
-        // ∜ of t⁴ comes back within 2⁻⁵² of t: 1025 · 2 · 1024 · 2⁻⁵² of the greatest square's
-        // neighbourhood.
+        // ∜ of t⁴ is within 2⁻⁵² of t: 1025 · 2 · 1024 · 2⁻⁵² of the squares near the greatest.
         assert!((evaluate(&squares, node(i)) - square).abs() < 1e-9);
     }
     // Half way between nodes 2 and 3 in t, not in w: (4 + 9)/2.
@@ -67,8 +66,8 @@ fn nodes_and_interpolation_at_worked_points() {
     assert!(evaluate(&squares, f64::NAN).is_nan());
 }
 
-/// Greatest |d²/dt²| of (1 − t⁴)^{n_s} over [0, 1]: 12 and 32 at t = 1 for n_s = 1 and 2, found on
-/// 4·10⁵ points for the others; in the limit 3.8343 √n_s, of exp(−n_s t⁴).
+/// Greatest |d²/dt²| of (1 − t⁴)^{n_s} over [0, 1]. It is 12 and 32 at t = 1 for n_s = 1 and 2, and
+/// was found on 4·10⁵ points for the others. In the limit it is 3.8343 √n_s, of exp(−n_s t⁴).
 const CURVATURE: [(f64, f64); 6] =
     [(1.0, 12.0), (2.0, 32.0), (8.0, 13.56), (100.0, 38.97), (1e4, 383.5), (1e6, 3834.4)];
 
@@ -80,7 +79,7 @@ fn interpolation_keeps_its_bound() {
         let at = |k: u32| (f64::from(k) / (8.0 * 1024.0)).powi(4);
         let wrong = |k: u32| (evaluate(&table, at(k)) - Brdf::lobe(ns, at(k))).abs() / peak;
         let greatest = (0..=8 * 1024).map(wrong).fold(0.0, f64::max);
-        // h²/8 of the curvature, reached in the middle of a cell, which the eighths meet.
+        // h²/8 of the curvature, reached in the middle of a cell, which the eighths contain.
         let bound = curvature / (8.0 * 1024.0 * 1024.0);
         assert!(
             greatest <= bound * 1.001 && greatest > 0.95 * bound,
@@ -89,7 +88,7 @@ fn interpolation_keeps_its_bound() {
     }
 }
 
-/// Ranges and counts at and beyond what a scene can ask for.
+/// Ranges and counts at and beyond the limits of a scene.
 fn all_kinds() -> Vec<Basis> {
     let ranges = [
         [1.0, 256.0],
@@ -145,9 +144,9 @@ fn the_lobe_of_the_basis_is_the_projection() {
 
 #[test]
 fn enough_bases_leave_roundings_only_whatever_the_exponent() {
-    // The lobes that the basis is made from lie in the span of all singular vectors; between them
-    // the range [0, 1] is so narrow that no lobe lies further from it than the rank's threshold and
-    // its roundings.
+    // The lobes that the basis is made from lie in the span of all singular vectors. Between them
+    // the range [0, 1] is so narrow that no lobe is farther from the span than the rank's threshold
+    // and roundings.
     let basis = Basis::new([0.0, 1.0], MAX_BASES, Sampling::Log);
     assert!(
         basis.n_bases() < MAX_BASES && basis.greatest_error() < 1e-9,
@@ -159,8 +158,8 @@ fn enough_bases_leave_roundings_only_whatever_the_exponent() {
         let error = Basis::new(range, MAX_BASES, Sampling::Log).error(ns);
         assert!(error < 1e-4, "n_s = {ns} of {range:?}: {error}");
     }
-    // Singular values say what is lost: the squares of those left out are the squared errors of the
-    // 64 unit lobes.
+    // The singular values left out give the loss: their squares are the squared errors of the 64
+    // unit lobes.
     let basis = Basis::new([1.0, 256.0], 8, Sampling::Log);
     let lost: f64 = basis.singular_values()[7..].iter().map(|s| s * s).sum();
     let of_lobes = |i: u32| basis.error(256f64.powf(f64::from(i) / 63.0)).powi(2);

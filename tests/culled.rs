@@ -27,9 +27,10 @@ use nimbus::io::scene_file;
 use nimbus::model::film::FilmFormat;
 use nimbus::model::scene::Scene;
 use nimbus::model::sort_bits::SortBits;
+use nimbus::reference::composite::OpaquePixel;
 use nimbus::reference::sort::order;
-use nimbus::reference::sprites::{OpaquePixel, View};
-use nimbus::reference::threshold::cut;
+use nimbus::reference::threshold::omitted;
+use nimbus::reference::view::View;
 use picture::Picture;
 
 const FORMAT: FilmFormat = FilmFormat::Rgba32f;
@@ -223,7 +224,7 @@ fn wrong_frames_are_noticed() {
 fn changes(picture: &Picture) -> Vec<f64> {
     let behind = vec![OpaquePixel::EMPTY; (picture.view.width * picture.view.height) as usize];
     let most = picture.radiance().into_iter().fold(DVec3::ZERO, DVec3::max).to_array();
-    let cut = cut(&picture.view, &behind, &picture.blobs(), None);
+    let cut = omitted(&picture.view, &behind, &picture.blobs(), None);
     cut.iter().flat_map(|c| [most[0], most[1], most[2], 1.0].map(|s| c.share() * s)).collect()
 }
 

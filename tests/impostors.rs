@@ -14,7 +14,7 @@ use nimbus::frame::render::Renderer;
 use nimbus::frame::{parallel, serial};
 use nimbus::io::scene_file;
 use nimbus::model::scene::{Scene, Threading};
-use nimbus::reference::picture::whole::{Drawing, picture};
+use nimbus::reference::picture::{BlobModel, drawn_as_set};
 
 const N_FRAMES: u32 = 32;
 const N_PIXELS: usize = 320 * 240;
@@ -174,7 +174,7 @@ fn the_f64_picture_agrees() {
     let scene = scene(&[]);
     let time_s = scene.time.at(200 + k as u32);
     let truth =
-        picture(&scene, time_s, Drawing::Thin, &|_, _| {}).expect("a picture").rgba.concat();
+        drawn_as_set(&scene, time_s, BlobModel::Thin, &|_, _| {}).expect("a picture").rgba.concat();
     let most = |a: &[f32]| {
         a.iter().zip(&truth).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max)
     };

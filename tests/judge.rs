@@ -13,9 +13,7 @@ use nimbus::frame::stage::{DeviceChoice, Stage};
 use nimbus::io::scene_file;
 use nimbus::model::cutoff::Cutoff;
 use nimbus::model::scene::{LightingMode, Scene, Threading};
-use nimbus::reference::picture::kind::ReferenceKind;
-use nimbus::reference::picture::pixels::Pixels;
-use nimbus::reference::picture::whole::{Drawing, Work, picture};
+use nimbus::reference::picture::{BlobModel, Pixels, ReferenceKind, RenderStage, drawn_as_set};
 use nimbus::viewer::judge::{Judge, Progress, Standing, View};
 
 /// hello.toml, plain, from aside.
@@ -31,10 +29,16 @@ fn view(set: &[&str]) -> View {
 
 /// As `Renderer::image` would give it, of an exact device.
 fn exact_picture(view: &View) -> Vec<f32> {
-    let drawing = if view.against == ReferenceKind::Thin { Drawing::Thin } else { Drawing::Volume };
-    let rgba = picture(&ReferenceKind::of_scene(&view.exact()), view.time_s, drawing, &|_, _| ())
-        .unwrap()
-        .rgba;
+    let drawing =
+        if view.against == ReferenceKind::Thin { BlobModel::Thin } else { BlobModel::Volume };
+    let rgba = drawn_as_set(
+        &ReferenceKind::without_approximations(&view.exact()),
+        view.time_s,
+        drawing,
+        &|_, _| (),
+    )
+    .unwrap()
+    .rgba;
     rgba.iter().flatten().map(|v| *v as f32).collect()
 }
 
@@ -124,19 +128,19 @@ fn a_short_time_is_kept_to_by_few_pixels() {
 fn a_few_pixels_are_those_of_the_whole_picture() {
     for set in [&["lighting.mode=first", "cloud.0.texture=\"2\""][..], &["lighting.mode=none"]] {
         let view = View { size: [61, 47], against: ReferenceKind::Thin, ..view(set) };
-        let scene = ReferenceKind::of_scene(&view.exact());
-        let whole = picture(&scene, 0.0, Drawing::Thin, &|_, _| ()).unwrap().rgba;
+        let scene = ReferenceKind::without_approximations(&view.exact());
+        let whole = drawn_as_set(&scene, 0.0, BlobModel::Thin, &|_, _| ()).unwrap().rgba;
         for n in [1, 30, 200, usize::MAX] {
             let pixels = Pixels::sample(61, 47, n);
             let rows = AtomicUsize::new(0);
-            let listener = |work: Work, n: usize| {
-                if work == Work::Drawing {
+            let listener = |work: RenderStage, n: usize| {
+                if work == RenderStage::Drawing {
                     assert!(
                         rows.fetch_add(1, Ordering::Relaxed) < n && n == pixels.n_rows() as usize
                     );
                 }
             };
-            let found = ReferenceKind::Thin.reference(&scene, 0.0, &pixels, &listener).unwrap();
+            let found = ReferenceKind::Thin.render(&scene, 0.0, &pixels, &listener).unwrap();
             assert_eq!(found.rgba, pixels.pick(&whole), "{n}");
             assert_eq!(rows.into_inner(), pixels.n_rows() as usize);
         }
@@ -185,7 +189,7 @@ fn what_is_under_way_says_how_far_it_is_and_stops() {
     judge.ask(View { size: [1024, 1024], ..view(&[]) });
     let begin = Instant::now();
     let counts = |judge: &Judge| {
-        judge.standing().progress.filter(|p| p.work == Work::Drawing && p.n_done > 1)
+        judge.standing().progress.filter(|p| p.work == RenderStage::Drawing && p.n_done > 1)
     };
     let mut seen = None;
     while seen.is_none() {
@@ -233,7 +237,7 @@ fn the_devices_picture_is_judged_as_it_was_seen() {
         judge.ask(view.clone());
         // As the truth is drawn, of which nothing is left out; only the device's f32 and f16 are
         // between them.
-        let exact = ReferenceKind::of_scene(&view.exact());
+        let exact = ReferenceKind::without_approximations(&view.exact());
         let pose = exact.camera.pose(0.0).unwrap();
         let size = view.size;
         let scene_of_window = Scene { camera: view.scene.camera.clone(), ..exact };

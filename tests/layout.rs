@@ -21,6 +21,7 @@ use nimbus::layout::particle::{
 use nimbus::layout::second::{PackedRecord, SourceRecord};
 use nimbus::layout::tiles::SplatRecord;
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
+use nimbus::model::pair_rules;
 use nimbus::passes::{self, SHADERS, cull, generate, sort, texture, tiles, transmit};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -255,6 +256,18 @@ fn shared_constants_have_one_value() {
         ("include/shell.glsl", "SMOOTH_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
         ("include/shell.glsl", "CONDITION_LOW", nimbus::reference::facets::CONDITIONING.0),
         ("include/shell.glsl", "CONDITION_HIGH", nimbus::reference::facets::CONDITIONING.1),
+        ("include/cells.glsl", "LOBE_REACH", pair_rules::LOBE_REACH),
+        ("include/cells.glsl", "LOBE_STEP", pair_rules::LOBE_STEP),
+        ("include/cells.glsl", "LOBE_PARTS", pair_rules::LOBE_PARTS),
+        ("include/cells.glsl", "TURN", pair_rules::TURN),
+        ("include/cells.glsl", "NEAR", pair_rules::NEAR),
+        ("include/cells.glsl", "EDGE_WIDTH", pair_rules::EDGE_WIDTH),
+        ("include/cells.glsl", "SINGLE_EDGE_WIDTH", pair_rules::SINGLE_EDGE_WIDTH),
+        ("include/cells.glsl", "CELL_WIDTH", pair_rules::CELL_WIDTH),
+        ("include/cells.glsl", "CLUSTER_EDGE_WIDTH", pair_rules::CLUSTER_EDGE_WIDTH),
+        ("include/cells.glsl", "CLOUD_THETA", pair_rules::CLOUD_THETA),
+        ("include/cells.glsl", "MIXED", pair_rules::MIXED),
+        ("include/cells.glsl", "EVEN", pair_rules::EVEN),
     ];
     for (file, name, host) in shared {
         assert_eq!(constant(text_of(file), name), Some(host), "{file}: {name}");
@@ -264,7 +277,6 @@ fn shared_constants_have_one_value() {
     assert_eq!(n, shared.iter().filter(|(file, _, _)| *file == "include/records.glsl").count());
     let in_plane = constant(text_of("include/occlude.glsl"), "IN_PLANE");
     assert_eq!(in_plane, Some(nimbus::reference::occlude::IN_PLANE));
-    assert_eq!(transmit::MAX_STEPS, nimbus::reference::transmit::MAX_STEPS);
     assert_eq!(transmit::MAX_STEPS, nimbus::model::grid::MAX_MARCH_STEPS);
     assert!(text_of("include/sort.glsl").contains("#define DIGIT_BITS 8\n"));
     // FOLDED is a number in an expression of the shader.

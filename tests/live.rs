@@ -19,7 +19,7 @@ use nimbus::model::cloud::CloudSource;
 use nimbus::model::disc::Disc;
 use nimbus::model::scene::{Scene, Simulate, Threading};
 use nimbus::reference::live::alive;
-use nimbus::reference::picture::stages::FrameReference;
+use nimbus::reference::picture::FrameReference;
 
 /// The puff, small, with fewer particles.
 fn scene(overrides: &[&str]) -> Scene {

@@ -1,4 +1,4 @@
-//! docs/moisture.md says what the laws say: every number in its tables is computed anew.
+//! Every number in the tables of docs/moisture.md, computed again from the laws.
 
 use nimbus::model::moisture::{Parcel, Saturation, T0_K, Vapour};
 
@@ -8,7 +8,7 @@ fn law(saturation: Saturation) -> Vapour {
     Vapour { saturation, ice: false }
 }
 
-/// Bolton's, and the two that are beside it.
+/// Bolton's law, and the two beside it.
 fn laws() -> [Vapour; 3] {
     [Saturation::Bolton, Saturation::Constant, Saturation::Linear].map(law)
 }
@@ -43,7 +43,7 @@ fn the_pages_pressures_are_the_laws() {
             assert!((number(cell) - 100.0 * (of / bolton - 1.0)).abs() < 0.0051, "{t} °C: {cell}");
         }
     }
-    // What the text says of all temperatures between.
+    // Claims of the text about all temperatures between.
     let off = |k: i32, i: usize| {
         let of = laws().map(|law| law.saturation(T0_K + 0.1 * f64::from(k)));
         of[i] / of[0] - 1.0

@@ -18,7 +18,7 @@ use nimbus::passes::cull::{self, Cull, Order};
 use nimbus::passes::sort::{NO_COUNT, Sort, TILE};
 use nimbus::reference::Blob;
 use nimbus::reference::cull::{CullOutcome, CullTolerance, outcome};
-use nimbus::reference::sprites::View;
+use nimbus::reference::view::View;
 
 type Entry = [u32; 2];
 

@@ -10,7 +10,8 @@ use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
 use nimbus::layout::facet::FacetRecord;
 use nimbus::model::cloud::runs;
-use nimbus::reference::facets::{CONDITIONING, Facet, FacetSources, bunch, grouped};
+use nimbus::reference::facet_runs::{grouped, merged};
+use nimbus::reference::facets::{CONDITIONING, Facet, FacetSources};
 use nimbus::reference::morton;
 use nimbus::reference::rounding::DIVISION_ERROR;
 use shells::{
@@ -244,7 +245,7 @@ fn run_bounds(
     let greatest =
         |of: &dyn Fn(usize) -> f64| run.iter().map(|i| of(*i as usize)).fold(0.0, f64::max);
     let ellipsoids = scene.has_ellipsoids();
-    let (b, first) = (bunch(m, run, ellipsoids), run[0] as usize);
+    let (b, first) = (merged(m, run, ellipsoids), run[0] as usize);
     // κσ³a: four products.
     let by_mass = 4.0 * U;
     let reach = greatest(&|i| (m.blobs[i].position - m.blobs[first].position).length());

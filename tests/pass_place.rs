@@ -11,7 +11,8 @@ use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
 use nimbus::model::texture::Texture;
 use nimbus::passes::place::Place;
-use nimbus::reference::generate::{cloud as generated, uniforms};
+use nimbus::reference::generate::uniforms;
+use nimbus::reference::live;
 use nimbus::reference::place::{add_gusts, cloud_centers, grown, offsets, place, placed_bound};
 use nimbus::reference::rounding::{REDUCTION_ERROR, SINE_ERROR, U_F32};
 
@@ -64,7 +65,7 @@ fn scene(gust: Gust, growth: Growth) -> Scene {
         let first = groups.last().map_or(0, |g: &Group| g.i_first + g.n_particles);
         groups.extend(cloud.groups(i, first));
     }
-    let given: Vec<_> = clouds.iter().flat_map(generated).collect();
+    let given: Vec<_> = clouds.iter().flat_map(|c| live::cloud(c, 0.0)).collect();
     let given = grown(&given, &groups, &clouds, TIME_S).into_iter();
     let (positions, sigmas): (Vec<DVec3>, Vec<f64>) = given.map(|g| (g.position, g.sigma)).unzip();
     let list = |c: &Cloud, g: &Group| match &c.source {

@@ -29,7 +29,7 @@ use nimbus::layout::particle::{DrawnRecord, ParticleRecord, TexturedRecord};
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
 use nimbus::reference::texture::Pool;
-use nimbus::reference::{generate, place};
+use nimbus::reference::{live, place};
 use picture::{FORMATS, Picture};
 
 /// Draws `picture` in both formats, lit and unlit, and compares every number of every pixel.
@@ -105,7 +105,7 @@ fn the_papers_cloud() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cubes-554.toml");
     let scene = scene_file::load(&file, &[], None).expect("the scene").scene;
     let groups = scene.groups();
-    let generated = generate::cloud(&scene.clouds[0]);
+    let generated = live::cloud(&scene.clouds[0], 0.0);
     let positions: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
     let placed = place::place(
         &positions,

@@ -1,5 +1,5 @@
-//! `nimbus render --reference`: the whole picture in f64 against the device's, and what the volume
-//! shows in its place.
+//! `nimbus render --reference`: the whole picture in f64 against the device's picture, and the
+//! volume.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use program::{differ, nimbus, path, run};
 use serde_json::Value;
 
-/// Renders `scene` to `name` in `dir` and gives what `--json` says.
+/// Renders `scene` to `name` in `dir` and returns the output of `--json`.
 fn render(dir: &tempfile::TempDir, name: &str, scene: &[&str], more: &[&str]) -> Value {
     let out = path(dir, name);
     let output = run(&[&["render", "-q", "--json", "--force", "-o", &out], scene, more].concat());
@@ -27,14 +27,14 @@ fn temp() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
 
-/// The volume knows no textures.
+/// The volume has no textures.
 const PLAIN: &str = "cloud.0.texture=\"none\"";
 const CUBES: [&str; 3] = ["scenes/cubes-554.toml", "--size", "100x75"];
 
 const FLAT: [&str; 3] = ["tests/data/flat.toml", "--size", "100x75"];
 
-/// f32 lighting and drawing: some hundred roundings of 2⁻²⁴ a value, 10⁻⁵ where they all go one
-/// way. A pixel on a sprite's edge may be drawn or not: e^{−4.5} of its α.
+/// f32 lighting and drawing make some hundred roundings of 2⁻²⁴ a value, 10⁻⁵ if all have one sign.
+/// A pixel on a sprite's edge may be drawn or not: e^{−4.5} of its α.
 const RMSE_OF_F32: f64 = 1e-5;
 const MAX_OF_F32: f64 = 0.012;
 
@@ -59,7 +59,7 @@ fn the_thin_reference_is_what_the_device_draws() {
                 .concat(),
         ),
         ("ellipsoids", FLAT.to_vec()),
-        // Of a scene that stands still the grid has no more room than it needs.
+        // The grid of a scene that stands still has no spare room.
         ("ellipsoids that stand still", [&FLAT[..], &["--set", "cloud.0.wind=[0,0,0]"]].concat()),
         (
             "ellipsoids that grow",
@@ -84,8 +84,7 @@ fn the_thin_reference_is_what_the_device_draws() {
         println!("{what}: RMSE {rmse:.1e}, greatest {max:.1e}");
         assert!(rmse <= RMSE_OF_F32 && max <= MAX_OF_F32, "{what}: {rmse:e} {max:e}");
     }
-    // What the comparison would say of another picture: other particles, and one particle's share
-    // fewer.
+    // The comparison notices another picture: other particles, and one particle fewer.
     render(&dir, "thin.exr", &CUBES, &["--reference", "thin"]);
     for other in
         [&["--seed", "8"][..], &["--set", "draw.count=\"distance\"", "--set", "draw.count_a=5000"]]
@@ -120,12 +119,12 @@ fn the_volume_has_all_particles_and_says_how_exact_it_is() {
     assert_eq!(all.0["image_hash"], counted.0["image_hash"]);
     assert_ne!(all.1["image_hash"], counted.1["image_hash"]);
     assert!(counted.1["particles"].as_u64().expect("a number") < 554);
-    // Sprites are near it and not it.
+    // Sprites are near the volume but differ from it.
     render(&dir, "volume.exr", &size, &["--reference", "volume"]);
     render(&dir, "thin.exr", &size, &["--reference", "thin"]);
     let (rmse, _) = differ(&dir, "volume.exr", "thin.exr");
     assert!((1e-3..0.05).contains(&rmse), "{rmse:e}");
-    // PNG shows it.
+    // The PNG shows the volume.
     render(&dir, "volume.png", &size, &["--reference", "volume"]);
     assert!(image::open(path(&dir, "volume.png")).is_ok());
 }
@@ -133,7 +132,7 @@ fn the_volume_has_all_particles_and_says_how_exact_it_is() {
 #[test]
 fn a_target_of_eight_bits_holds_steps_of_0_to_1() {
     let dir = temp();
-    // A light that takes the cloud's radiance beyond 1, where the target cuts it.
+    // A light that takes the cloud's radiance beyond 1, where the target clamps it.
     let bright =
         ["--set", "light.0.irradiance=[9,9,9]", "--validation", "--set", "film.format=\"rgba8\""];
     render(&dir, "drawn.exr", &CUBES, &bright);
@@ -148,8 +147,8 @@ fn a_target_of_eight_bits_holds_steps_of_0_to_1() {
         drawn.pixels().any(|p| p.0[0] == 1.0)
             && drawn.pixels().any(|p| p.0[0] > 0.0 && p.0[0] < 0.5)
     );
-    // Where nothing is cut it is near the truth: 20 layers and more, each off by up to two steps
-    // where it covers much.
+    // Where nothing is clamped the picture is near the reference: 20 layers and more, each off by
+    // up to two steps where it covers much.
     render(&dir, "thin.exr", &CUBES, &["--reference", "thin"]);
     let dim = ["--set", "light.0.irradiance=[1,1,1]", "--set", "light.1.irradiance=[0.5,0.5,0.5]"];
     render(&dir, "dim.exr", &CUBES, &[&dim[..], &["--set", "film.format=\"rgba8\""]].concat());
@@ -208,7 +207,7 @@ fn what_a_reference_cannot_do_is_said_and_nothing_written() {
 fn ctrl_c_leaves_nothing_half_written() {
     let dir = temp();
     let out = path(&dir, "late.exr");
-    // Minutes of work; begun when its process is.
+    // Rendering takes minutes; it has begun when its process runs.
     let args = [
         "render",
         "scenes/cubes-554.toml",

@@ -1,6 +1,5 @@
-//! Sums as shaders form them (shaders/include/sum.glsl): numbers of every kind summed plainly,
-//! compensated and pairwise, in f32 and f64, each within its own bound; and that no compiler takes
-//! the compensation for nothing.
+//! Sums as shaders form them (shaders/include/sum.glsl): plain, compensated and pairwise, in f32
+//! and f64, each within its own bound. Compilers must not optimise the compensation away.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -18,7 +17,7 @@ use nimbus::passes::{self, SHADERS};
 use nimbus::reference::rounding::sum_error;
 use sums::{KAHAN, PAIRWISE, PLAIN, every_way};
 
-/// A row of numbers an invocation: their sum as one number, and as the second of three.
+/// A row of numbers for each invocation: their sum as one number, and as the second of three.
 const TEXT: &str = r"#version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
@@ -39,7 +38,7 @@ void main() {
 }
 ";
 
-/// Of every kind of numbers some, and of every length that matters to a counter of blocks of 8.
+/// Rows of every kind of numbers, and of every length that matters to a counter of blocks of 8.
 fn rows() -> Vec<Vec<f32>> {
     let mut r = Random(7);
     let mut rows: Vec<Vec<f32>> =
@@ -48,7 +47,7 @@ fn rows() -> Vec<Vec<f32>> {
         rows.push((0..n).map(|_| r.within(-1.0, 1.0)).collect());
         rows.push(vec![0.1; n]);
         rows.push(one_and_dust(n));
-        // From 2⁻²⁰ to 2²⁰, of both signs, and back: sums far smaller than what they are made of.
+        // From 2⁻²⁰ to 2²⁰ with both signs, and back: sums far smaller than their terms.
         let wide: Vec<f32> =
             (0..n / 2).map(|_| r.within(-1.0, 1.0) * r.within(-20.0, 20.0).exp2()).collect();
         rows.push(
@@ -58,12 +57,12 @@ fn rows() -> Vec<Vec<f32>> {
     rows
 }
 
-/// One, and what by itself is rounded away beside it.
+/// One, and numbers that are each rounded away beside it.
 fn one_and_dust(n: usize) -> Vec<f32> {
     std::iter::once(1.0).chain((1..n).map(|_| 0.4 / 16_777_216.0)).collect()
 }
 
-/// The same by fours, in a loop whose length is known.
+/// The same by fours, in a loop of known length.
 fn by_fours() -> Compiler {
     let (from, to) = ("++i) {", "i += 4u) { UNROLL for (uint k = 0u; k < 4u; ++k) {");
     let text = TEXT
@@ -86,7 +85,7 @@ fn compiler_of(text: &str, wrong: Option<(&str, &str)>) -> Compiler {
     Compiler::new(sources, None).unwrap()
 }
 
-/// Each row's sum, both times.
+/// Sum of each row, both times.
 fn run(gpu: &mut Gpu, compiler: &Compiler, sums: Sums, rows: &[Vec<f32>]) -> [Vec<f64>; 2] {
     let kernel =
         Kernel::with_macros(&gpu.device, compiler, "sums", &[], &[], SumMacros::from(sums).list())
@@ -104,7 +103,7 @@ fn run(gpu: &mut Gpu, compiler: &Compiler, sums: Sums, rows: &[Vec<f32>]) -> [Ve
     [0, 1].map(|k| totals.iter().map(|t| f64::from(t[k])).collect())
 }
 
-/// Sums without error: an f64 beside what its roundings lose.
+/// Sums without error: an f64 with its accumulated rounding error.
 fn exact(row: &[f32]) -> f64 {
     let (mut sum, mut lost) = (0.0f64, 0.0);
     for x in row.iter().map(|x| f64::from(*x)) {
@@ -133,7 +132,7 @@ fn every_sum_is_within_its_bound() {
     }
 }
 
-/// What an optimiser copies of an unrolled body loses `precise`.
+/// Copies of an unrolled body by an optimiser lose `precise`.
 #[test]
 fn sums_in_loops_of_a_known_length_are_within_their_bounds() {
     let (mut gpu, rows) = (Gpu::new(), vec![one_and_dust(8192), vec![0.1; 4096]]);
@@ -164,7 +163,7 @@ fn plain_sums_are_not_within_the_bounds_of_the_others() {
             );
         }
     }
-    // All of the dust is lost.
+    // All of the small numbers are lost.
     assert_eq!(found[0][0], 1.0);
 }
 
@@ -191,7 +190,7 @@ fn wrong_sums_are_noticed() {
 const OP_DECORATE: u32 = 71;
 const NO_CONTRACTION: u32 = 42;
 
-/// Operations of a shader's SPIR-V that may not be joined with others or left out.
+/// Operations of a shader's SPIR-V that may not be fused or removed.
 fn n_kept_as_written(file: &str, sums: Sums) -> usize {
     let compiler = Compiler::new(passes::sources(), None).unwrap();
     let words = compiler.compile_with(file, Optimize::Yes, SumMacros::from(sums).list()).unwrap();
@@ -209,7 +208,7 @@ fn compensation_may_not_be_optimised_away() {
         for way in every_way() {
             let n = n_kept_as_written(file, way);
             match way.summation {
-                // Seven additions wherever something is added.
+                // Seven additions wherever a number is added.
                 Summation::Kahan => assert!(n > 0 && n.is_multiple_of(7), "{file}, {way:?}: {n}"),
                 _ => assert_eq!(n, 0, "{file}, {way:?}"),
             }

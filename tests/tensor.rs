@@ -1,5 +1,7 @@
-//! Light by way of the tensors: what T1 holds, that contracted it is what gathering at once gives,
-//! that an edit's frame is the frame from scratch, and what happens where the tensors do not fit.
+//! Light by the tensors.
+//!
+//! T1 has the right values, contraction gives the light of a direct gather, a frame with edits
+//! equals the frame from scratch, and scenes whose tensors do not fit are refused.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -41,7 +43,7 @@ struct Frames {
     plans: Vec<Plan>,
 }
 
-/// Frames one after the other from one renderer.
+/// Consecutive frames of one renderer.
 fn run(
     gpu: &Gpu,
     compiler: Option<&Compiler>,
@@ -84,14 +86,14 @@ fn an_edit_is_contracted_alone_and_its_frame_is_the_frame_from_scratch() {
             edited.lit[2] == alone.lit[0] && edited.images[2] == alone.images[0],
             "{overrides:?}: alone"
         );
-        // The comparison can fail: an edit changes light and picture.
+        // The comparison is not vacuous: an edit changes light and picture.
         assert!(edited.lit[0] != edited.lit[1] && edited.images[0] != edited.images[1]);
         assert!(edited.lit[1] != edited.lit[2] && edited.images[1] != edited.images[2]);
     }
 }
 
-/// The same scene at frame 3 with the materials as they are then, n_s and so the cells being no
-/// different, and no edits.
+/// The same scene at frame 3 with its materials then, without edits. n_s, and so the cells, do not
+/// differ.
 fn unedited(scene: &Scene) -> Scene {
     let mut fixed = scene.clone();
     for material in &mut fixed.materials {
@@ -101,13 +103,13 @@ fn unedited(scene: &Scene) -> Scene {
     fixed
 }
 
-/// Cells of a facet at the pair_levels = 1 of the comparison.
+/// Cells of a facet at the comparison's pair_levels = 1.
 const MAX_CELLS: f64 = 4.0;
-/// Roundings of the two ways together in the factors of one term: position, offset, form factor and
+/// Roundings of both methods together in the factors of one term: position, offset, form factor and
 /// share some ten each, energy, area, colour, coefficients and table.
 const FACTORS: f64 = 40.0;
-/// Units of round-off that a compiler's choices may move a unit half vector by: those of a position
-/// some four units from its facet within a scene of eight, and of two normalisations.
+/// Units of round-off by which a compiler's choices may turn a unit half vector: a position some
+/// four units from its facet within a scene of eight, and two normalisations.
 const TURN: f64 = 32.0;
 
 #[test]
@@ -126,7 +128,7 @@ fn contracted_light_is_light_gathered_at_once() {
     assert_within_and_say("tensors against fused", &numbers(&tensors.lit[0]), &truths, &bounds);
     let counts = |lit: &[LitRecord]| lit.iter().map(|l| l.n_unresolved).collect::<Vec<_>>();
     assert_eq!(counts(&tensors.lit[0]), counts(&fused.lit[0]));
-    // The bound says something: it is below 1 % of the scene's mean second reflection.
+    // The bound is not vacuous: it is below 1 % of the scene's mean second reflection.
     let mean = |of: fn(&[f64]) -> f64, v: &[f64]| {
         v.chunks(12).map(of).sum::<f64>() / (v.len() / 12) as f64
     };
@@ -173,12 +175,13 @@ fn numbers(lit: &[LitRecord]) -> Vec<f64> {
         .collect()
 }
 
-/// What the two ways may differ in. Both add the same cells' terms, no more than n of them, each
-/// rounded FACTORS times; T splits a lobe into bases of both signs, so what is rounded is a sum of
-/// magnitudes: where gathering at once multiplies a flux φ = Σ E A g/(d² + …) by f_i and f_j,
-/// tensors multiply it by no more than K_d/π + Σ|C_b| max|v_b| of either. φ itself is at most I_i
-/// over the least diffuse albedo/π of any emitter, since no lobe takes away more than `negative` of
-/// it.
+/// Returns a bound on the difference of the two methods, value by value.
+///
+/// Both methods add the terms of the same cells, at most n of them, each rounded FACTORS times.
+/// Tensors split a lobe into bases of both signs, so a sum of magnitudes is rounded. Gathering at
+/// once multiplies a flux φ = Σ E A g/(d² + …) by f_i and f_j; tensors multiply it by at most
+/// K_d/π + Σ|C_b| max|v_b| of each. φ is at most I_i over the least of any emitter's diffuse
+/// albedo/π less the lobe's negative part.
 fn bounds(scene: &Scene, fused: &Frames) -> Vec<f64> {
     let basis = basis_of(scene).expect("a basis");
     let shape = Shape::of(scene, basis.n_bases());
@@ -188,7 +191,7 @@ fn bounds(scene: &Scene, fused: &Frames) -> Vec<f64> {
         + FACTORS;
     let n = n + scene.lights.len() as f64;
     let color = |j: usize| DVec3::from(fused.facets[j].color.map(f64::from));
-    // By region: K_d and Σ|K_s c_b| max|v_b|, the angle's roundings counted into the maximum.
+    // By region: K_d and Σ|K_s c_b| max|v_b|, with the angle's roundings in the maximum.
     let region = |i: usize| {
         let brdf = scene.region_material(i).at(scene.time.at(3));
         let coefficients =
@@ -215,8 +218,8 @@ fn bounds(scene: &Scene, fused: &Frames) -> Vec<f64> {
     fused.lit[0].iter().enumerate().flat_map(bound).collect()
 }
 
-/// The greatest magnitude of a table's values, and what the angle's roundings move them by, as so
-/// many of `n` roundings: δw = |chord| δ chord = √2 t² TURN u, and δt = δw/4t³.
+/// Greatest magnitude of a table's values, and their change by the angle's roundings in units of
+/// `n` roundings: δw = |chord| δ chord = √2 t² TURN u, and δt = δw/4t³.
 fn greatest(table: &[f64], n: f64) -> f64 {
     let at = |i: usize| i as f64 / (table.len() - 1) as f64;
     let moved = |i: usize| {
@@ -232,13 +235,13 @@ fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
     let scene = scene(&[]);
     let shape = Shape::of(&scene, basis_of(&scene).expect("a basis").n_bases());
     // Floor 25, ceiling 16, wall 16 (a lobe), shelf 4 facets, 40 particles with colours and a lobe,
-    // 5 vectors; the floor too has a lobe.
+    // 5 vectors. The floor has a lobe, too.
     let n_rows: u64 = 6 * 25 + 16 + 6 * 16 + 4 + 6 * 40;
     assert_eq!(shape.n_rows, n_rows.next_multiple_of(64));
     assert_eq!(shape.n_columns, 6 + 1 + 6 + 1 + 8);
     let bytes = 4 * 3 * shape.n_rows * 22;
     // Floor, ceiling, wall, shelf and cloud begin at columns 0, 6, 7, 13 and 14. Floor and shelf
-    // face up and don't see each other; nothing sees itself but the cloud.
+    // face up and don't see each other; only the cloud sees itself.
     let spans = shape.spans(&scene);
     let of = |i: usize| spans[spans[i][0] as usize..][..spans[i][1] as usize].to_vec();
     assert_eq!(of(0), [[6, 7], [14, 8]]);
@@ -265,7 +268,7 @@ fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
         limits::tensors(&shape, &limits, u64::MAX),
         Tensors::TooLarge { bytes, most: bytes - 4 }
     );
-    // Sizes beyond 64 bits are only large.
+    // Sizes beyond 64 bits are still only large.
     let huge = Shape { n_rows: u64::MAX / 4, ..shape };
     assert!(matches!(
         limits::tensors(&huge, &limits, u64::MAX),
@@ -278,8 +281,8 @@ fn a_scene_too_large_for_tensors_is_gathered_at_once() {
     let gpu = Gpu::new();
     let dir = tempfile::tempdir().expect("a folder");
     let path = dir.path().join("s.toml");
-    // Two large rectangles back to back: nothing to gather, and 2 · 90 000 · 8 rows of 16 columns
-    // by one light, 92 MB each a light; two lights make 184 MB.
+    // Two large rectangles back to back have nothing to gather. 2 · 90 000 · 8 rows of 16 columns
+    // take 92 MB a light; two lights take 184 MB.
     let text = r#"
         camera = { path = [{ time_s = 0, position = [0, 1, 9], target = [0, 0, 0] }] }
         film = { width = 8, height = 8 }
@@ -289,7 +292,10 @@ fn a_scene_too_large_for_tensors_is_gathered_at_once() {
         ]
         [[material]]
         name = "m"
-        path = [{ time_s = 0, kd = [0.5, 0.5, 0.5], ks = [0.1, 0.1, 0.1] }, { time_s = 1, kd = [0.1, 0.1, 0.1] }]
+        path = [
+            { time_s = 0, kd = [0.5, 0.5, 0.5], ks = [0.1, 0.1, 0.1] },
+            { time_s = 1, kd = [0.1, 0.1, 0.1] },
+        ]
         [[surface]]
         center = [0, 0, 0]
         u = [0, 0, 1]
@@ -321,8 +327,8 @@ fn a_scene_too_large_for_tensors_is_gathered_at_once() {
     assert!(frames.lit[0] != frames.lit[1]);
 }
 
-/// Everything T1 is made of, in f32 numbers on both sides: facets of a glossy and of a diffuse
-/// region, a sun and the sky.
+/// All inputs of T1, in f32 numbers on both sides: facets of a glossy and of a diffuse region, a
+/// sun and the sky.
 fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
     const N: u32 = 3000;
     let mut r = Random(9);
@@ -380,7 +386,7 @@ fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
     for (j, facet) in facets.iter().enumerate() {
         let (normal, region) = (double(facet.normal), regions[j / N as usize]);
         let outgoing = (double(eye) - double(facet.position)).normalize();
-        // A handful of roundings would decide otherwise which side the eye is on.
+        // A few roundings could decide differently on which side the eye is.
         assert!(normal.dot(outgoing).abs() > 1e-6, "choose another seed");
         let of_region = &tables[..if region.i_lobe == NO_LOBE { 0 } else { tables.len() }];
         for (l, light) in lights.iter().enumerate() {
@@ -391,7 +397,7 @@ fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
                 let k = l * n_rows as usize
                     + (region.i_row + j as u32 - region.i_first_facet) as usize
                     + b * N as usize;
-                // g: a cosine of three products, its share and sum, 1 at most; then a product, or
+                // g: a cosine of three products, its share and sum, at most 1; then a product, or
                 // the table's interpolation.
                 let magnitude = if b == 0 { 1.0 } else { greatest(&tables[b - 1], RESPONSE) };
                 (truths[k], bounds[k]) = (truth, RESPONSE * U * magnitude);
@@ -401,7 +407,7 @@ fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
     [values, truths, bounds]
 }
 
-/// Roundings of one number of T1.
+/// Roundings of a number of T1.
 const RESPONSE: f64 = 12.0;
 
 #[test]

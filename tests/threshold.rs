@@ -23,9 +23,10 @@ use nimbus::gpu::TargetFormat;
 use nimbus::layout::particle::{DrawnRecord, TexturedRecord};
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
-use nimbus::reference::sprites::{OpaquePixel, View};
+use nimbus::reference::composite::OpaquePixel;
 use nimbus::reference::texture::Pool;
-use nimbus::reference::threshold::{Omitted, cut};
+use nimbus::reference::threshold::{Omitted, omitted};
+use nimbus::reference::view::View;
 use picture::{Picture, Tiled, Way};
 use scenery::Scenery;
 

@@ -95,7 +95,7 @@ speed = 60
 /// The particles of a cloud that moves.
 fn at(scene: &Scene, time_s: f64) -> std::sync::Arc<Vec<Particle>> {
     match &scene.clouds[0].source {
-        CloudSource::Animated(m) => m.mover.at(time_s).expect("a moment"),
+        CloudSource::Animated(m) => m.animation.at(time_s).expect("a moment"),
         other => panic!("{other:?}"),
     }
 }

@@ -13,8 +13,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
-use crate::reference::picture::kind::ReferenceKind;
-use crate::reference::picture::samples::MAX_SAMPLES;
+use crate::reference::picture::{MAX_SAMPLES, ReferenceKind};
 pub use farm::{
     CalibrateArgs, EmitArgs, EngineArg, FarmArgs, FarmCommand, FormatArg, GcArgs, JobArgs,
     LocalArgs, MergeArgs, PlanArgs, RunArgs, Span, StatusArgs, SubmitArg, SubmitArgs,

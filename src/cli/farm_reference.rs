@@ -7,7 +7,7 @@ use crate::farm::cost::Work as Counted;
 use crate::farm::plan::{PictureFormat, Work};
 use crate::farm::reference;
 use crate::io::scene_file::LoadedScene;
-use crate::reference::picture::kind::ReferenceKind;
+use crate::reference::picture::ReferenceKind;
 
 /// Pixels along a side of a tile, and samples of a range, where nothing is known of what they take.
 const USUAL_TILE: u32 = 256;

@@ -10,10 +10,7 @@ use crate::error::{Error, Result};
 use crate::frame::limits;
 use crate::frame::stage::Bed;
 use crate::io::atomic::check_place;
-use crate::reference::picture::kind::ReferenceKind;
-use crate::reference::picture::model_light::reflections_of;
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::whole::Work;
+use crate::reference::picture::{Pixels, ReferenceKind, RenderStage, n_reflections};
 use crate::report::charts;
 use crate::studies::error::players::Frames;
 use crate::studies::ledger::records::{LEDGER_FILE, Ledger, Row};
@@ -46,11 +43,11 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
         }
         other => other,
     })?;
-    if args.reflections < reflections_of(&scene) {
+    if args.reflections < n_reflections(&scene) {
         return Err(Error::usage(format!(
             "--reflections {}: the scene has {}; expected at least as many",
             args.reflections,
-            reflections_of(&scene)
+            n_reflections(&scene)
         )));
     }
     let bed = Bed::open(&device_choice(&args.options))?;
@@ -96,7 +93,7 @@ fn measure(
 ) -> Result<Ledger> {
     let quiet = args.options.quiet;
     let shown = Mutex::new(Shown::spinner(quiet));
-    let on_part = |work: Work, n: usize| {
+    let on_part = |work: RenderStage, n: usize| {
         shown.lock().unwrap_or_else(PoisonError::into_inner).advance(work, n, quiet);
     };
     let pixels = Pixels::sample(scene.film.width, scene.film.height, args.pixels);

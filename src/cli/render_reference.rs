@@ -14,10 +14,10 @@ use crate::io::atomic;
 use crate::io::image::{self, image_hash};
 use crate::model::film::FilmFormat;
 use crate::model::scene::Scene;
-use crate::reference::picture::kind::ReferenceKind;
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::samples::{self, Subject};
-use crate::reference::picture::whole::{Drawing, Picture, Work, picture};
+use crate::reference::picture::{
+    self, BlobModel, DrawnPicture, Pixels, ReferenceKind, ReferenceRequest, RenderStage,
+    drawn_as_set,
+};
 
 /// The picture of `reference`, of so many samples as were asked for.
 pub fn run(args: &RenderArgs, reference: ReferenceKind, scene: &Scene, time_s: f64) -> Result<()> {
@@ -28,10 +28,10 @@ pub fn run(args: &RenderArgs, reference: ReferenceKind, scene: &Scene, time_s: f
     }
     match reference {
         ReferenceKind::Thin if args.samples == 1 => {
-            centered(args, reference, Drawing::Thin, scene, time_s)
+            centered(args, reference, BlobModel::Thin, scene, time_s)
         }
         ReferenceKind::Volume if args.samples == 1 => {
-            centered(args, reference, Drawing::Volume, scene, time_s)
+            centered(args, reference, BlobModel::Volume, scene, time_s)
         }
         _ => sampled(args, reference, scene, time_s),
     }
@@ -41,13 +41,13 @@ pub fn run(args: &RenderArgs, reference: ReferenceKind, scene: &Scene, time_s: f
 fn centered(
     args: &RenderArgs,
     reference: ReferenceKind,
-    drawing: Drawing,
+    drawing: BlobModel,
     scene: &Scene,
     time_s: f64,
 ) -> Result<()> {
     let shown = Progress::new(args.options.quiet);
-    let Picture { rgba, error, brightest, n_particles, cut } =
-        picture(scene, time_s, drawing, &|work, n| shown.hear(work, n))?;
+    let DrawnPicture { rgba, error, brightest, n_particles, omitted } =
+        drawn_as_set(scene, time_s, drawing, &|work, n| shown.hear(work, n))?;
     drop(shown);
     if let Some(error) = error.filter(|_| args.options.verbose) {
         eprintln!(
@@ -55,10 +55,10 @@ fn centered(
              {brightest:.3e}"
         );
     }
-    let share = (drawing == Drawing::Thin).then(|| cut.share());
+    let share = (drawing == BlobModel::Thin).then(|| omitted.share());
     if let Some(share) = share.filter(|_| args.options.verbose && scene.draw.threshold.is_active())
     {
-        let n = cut.n_layers;
+        let n = omitted.n_layers;
         eprintln!(
             "draw.threshold cuts {n} layers of a pixel at most, and changes it by at most \
              {share:.1e} of the radiances"
@@ -66,7 +66,7 @@ fn centered(
     }
     let more = json!({
         "particles": n_particles, "error": error, "brightest": brightest,
-        "layers_cut": share.map(|_| cut.n_layers), "cut_changes": share,
+        "layers_cut": share.map(|_| omitted.n_layers), "cut_changes": share,
     });
     write((args, reference), scene, time_s, &rgba, more)
 }
@@ -76,12 +76,12 @@ fn sampled(args: &RenderArgs, reference: ReferenceKind, scene: &Scene, time_s: f
     let (film, never) = (scene.film, AtomicBool::new(false));
     let pixels = Pixels::all(film.width, film.height);
     let shown = Progress::new(args.options.quiet);
-    let subject = Subject { of: reference, scene, time_s };
+    let subject = ReferenceRequest { kind: reference, scene, time_s };
     let sums =
-        samples::sums(&subject, &pixels, 0..args.samples, &never, &|work, n| shown.hear(work, n))?;
+        picture::sums(&subject, &pixels, 0..args.samples, &never, &|work, n| shown.hear(work, n))?;
     drop(shown);
     let mean = sums.mean();
-    let accuracy = reference.accuracy_of(scene, args.samples);
+    let accuracy = reference.accuracy_text(scene, args.samples);
     if args.options.verbose {
         eprintln!(
             "off by about {:.1e} (root mean square of the pixels' estimates; {accuracy})",
@@ -100,7 +100,7 @@ fn write(
     rgba: &[[f64; 4]],
     more: Value,
 ) -> Result<()> {
-    let rgba = samples::shown(rgba);
+    let rgba = picture::to_f32(rgba);
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
     if n_bad > 0 && !args.options.quiet {
         // The file has f32, whatever the film's format.
@@ -133,7 +133,7 @@ impl Progress {
         Progress { shown: Mutex::new(Shown::spinner(quiet)), quiet }
     }
 
-    fn hear(&self, work: Work, n: usize) {
+    fn hear(&self, work: RenderStage, n: usize) {
         self.shown.lock().unwrap_or_else(PoisonError::into_inner).advance(work, n, self.quiet);
     }
 }
@@ -146,7 +146,7 @@ pub(super) enum Shown {
         _spinner: Spinner,
     },
     Bar {
-        work: Work,
+        work: RenderStage,
         n_left: usize,
         bar: LateProgress,
     },
@@ -158,12 +158,12 @@ impl Shown {
     }
 
     /// One more of `n` parts of `work` is done.
-    pub(super) fn advance(&mut self, work: Work, n: usize, quiet: bool) {
+    pub(super) fn advance(&mut self, work: RenderStage, n: usize, quiet: bool) {
         if !matches!(self, Shown::Bar { work: shown, .. } if *shown == work) {
             let what = match work {
-                Work::Lighting => "lighting",
-                Work::Drawing => "drawing",
-                Work::Sampling => "samples",
+                RenderStage::Lighting => "lighting",
+                RenderStage::Drawing => "drawing",
+                RenderStage::Sampling => "samples",
             };
             // The line is cleared before another is drawn on it.
             *self = Shown::Nothing;

@@ -293,7 +293,7 @@ fn load_with(args: &ErrorArgs, options: &super::SceneArgs, settings: &[Setting])
 fn reference(args: &ErrorArgs, scene: &Scene, time_s: f64, pixels: &Pixels) -> Result<Kept> {
     let quiet = args.options.quiet;
     let shown = Mutex::new(Shown::spinner(quiet));
-    let on_part = |work: Work, n: usize| {
+    let on_part = |work: RenderStage, n: usize| {
         shown.lock().unwrap_or_else(PoisonError::into_inner).advance(work, n, quiet);
     };
     let folder = reference_cache::default_folder();

@@ -12,7 +12,7 @@ use crate::frame::game::Game;
 use crate::frame::plan::{Pass, Plan, Tensors, Traits, plan};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
-use crate::reference::picture::stages::FrameReference;
+use crate::reference::picture::FrameReference;
 
 /// What a frame would make work of, part by part.
 struct Parts {

@@ -5,7 +5,7 @@ use crate::model::light::Light;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::Blob;
 use crate::reference::grid::n_deposited;
-use crate::reference::picture::stages::FrameReference;
+use crate::reference::picture::FrameReference;
 use crate::reference::transmit::n_samples;
 
 /// Of one frame whose light is made anew; 0 of a scene without lighting.
@@ -19,7 +19,7 @@ pub struct Visits {
 
 impl Visits {
     pub fn of(scene: &Scene, truth: &FrameReference) -> Visits {
-        let grid = &truth.setting.grid;
+        let grid = &truth.state.grid;
         if scene.lighting.mode == LightingMode::None || truth.blobs.is_empty() {
             return Visits::default();
         }
@@ -30,12 +30,12 @@ impl Visits {
 
 /// A facet is taken to be as far from the grid's border as a particle is in the mean.
 fn n_marched(scene: &Scene, truth: &FrameReference) -> f64 {
-    let origin = truth.setting.light_origin;
+    let origin = truth.state.light_origin;
     let of_light = |light: &Light| {
         let samples = |blob: &Blob| {
             let way = light.arrival(blob.position);
             f64::from(n_samples(
-                &truth.setting.grid,
+                &truth.state.grid,
                 blob.position,
                 way.toward,
                 way.distance,
@@ -67,7 +67,7 @@ mod tests {
     fn every_light_marches_from_every_facet_and_cells_are_filled_once() {
         let sun = |scene: &Scene| scene.lights[0];
         let (none, truth) = visits(|scene| scene.lights.clear());
-        let grid = truth.setting.grid;
+        let grid = truth.state.grid;
         assert_eq!(none.marched, 0.0);
         assert_eq!(none.filled - n_deposited(&grid, &truth.blobs), grid.n_total() as f64);
         let (one, _) = visits(|scene| scene.lights = vec![sun(scene)]);

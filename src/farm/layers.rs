@@ -3,9 +3,7 @@
 
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
-use crate::reference::picture::pixels::Tile;
-use crate::reference::picture::stages::FrameReference;
-use crate::reference::picture::whole;
+use crate::reference::picture::{self, FrameReference, Tile};
 use crate::reference::{layers, surfaces};
 
 /// By pixel.
@@ -20,8 +18,8 @@ pub struct Layers {
 impl Layers {
     /// Of a scene as it is in `truth`, lit or not; its blobs end at `reach` σ.
     pub fn of(scene: &Scene, truth: &FrameReference, reach: f64) -> Layers {
-        let view = whole::view(scene, truth);
-        let origin = truth.setting.light_origin;
+        let view = picture::view(scene, truth);
+        let origin = truth.state.light_origin;
         let placed: Vec<Surface> =
             scene.surfaces.iter().map(|s| Surface { center: s.center - origin, ..*s }).collect();
         let sees = |i: u32, j: u32| surfaces::seen(&view, &placed, view.ray(i, j)).is_some();

@@ -22,11 +22,10 @@ use crate::io::folder::replace_files;
 use crate::io::image::{ImageKind, encoded, image_hash};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
-use crate::reference::picture::kind::ReferenceKind;
-use crate::reference::picture::model_light::reflections_of;
-use crate::reference::picture::pixels::{Pixels, Tile};
-use crate::reference::picture::samples::{self, MAX_SAMPLES, Pairs, Subject, Sums};
-use crate::reference::picture::stages::FrameReference;
+use crate::reference::picture::{
+    self, FrameReference, MAX_SAMPLES, N_VALUES, PairwiseSum, Pixels, ReferenceKind,
+    ReferenceRequest, SampleSums, Tile, n_reflections,
+};
 use crate::timing::machine::{self, Device};
 
 /// Most pieces of a picture: a plan of as many shards is about as large as one can be.
@@ -54,7 +53,7 @@ pub struct Cut {
     /// Of a tile that no edge cuts.
     pub tile: [u32; 2],
     pub n_samples: u32,
-    /// Samples of a range: a power of two, so that the sums are those of the whole ([`Pairs`]).
+    /// Samples of a range: a power of two, so that the sums are those of the whole ([`PairwiseSum`]).
     pub range: u32,
     pub format: PictureFormat,
 }
@@ -109,7 +108,7 @@ impl Cut {
         )
     }
 
-    /// The file of piece `k`: [`Sums::bytes`] of its pixels. Names sort as the pieces do.
+    /// The file of piece `k`: [`SampleSums::bytes`] of its pixels. Names sort as the pieces do.
     pub fn sums_file(k: u32) -> String {
         format!("sums-{k:08}.f64")
     }
@@ -152,7 +151,7 @@ impl Cut {
         // Light comes from particles' facets, and from surfaces' areas.
         let n_emitters = n_facets + scene.surfaces.len() as f64;
         let n_reflections =
-            if let ReferenceKind::Reflections(k) = of { k } else { reflections_of(&scene) };
+            if let ReferenceKind::Reflections(k) = of { k } else { n_reflections(&scene) };
         let tile = |i: u32| self.piece(i * self.n_ranges()).0;
         let n_tiles = self.n_pieces() as u32 / self.n_ranges();
         let layers = &seen.layers;
@@ -206,14 +205,15 @@ pub fn draw(
     on_piece: &dyn Fn(),
 ) -> Result<Device> {
     let scene = scene_of(cut, loaded);
-    let subject = Subject { of: cut.against()?, scene: &scene, time_s: scene.time.at(cut.frame) };
+    let subject =
+        ReferenceRequest { kind: cut.against()?, scene: &scene, time_s: scene.time.at(cut.frame) };
     let device = processor();
     store.resume(workplace, plan, shard, &device)?;
     for k in shard.items() {
         let name = Cut::sums_file(k);
         if !workplace.has(&name) {
             let (tile, samples) = cut.piece(k);
-            let sums = samples::sums(&subject, &cut.pixels(tile), samples, stop, &|_, _| ())?;
+            let sums = picture::sums(&subject, &cut.pixels(tile), samples, stop, &|_, _| ())?;
             workplace.add(&name, &sums.bytes())?;
         }
         on_piece();
@@ -238,7 +238,7 @@ pub fn merge(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)], out: &Path) 
     let sums = put_together(plan, cut, parts)?;
     let mean = sums.mean();
     let (scene, kind) = (scene_of(cut, &loaded), ImageKind::of(Path::new(&cut.file()))?);
-    let rgba = samples::shown(&mean.rgba);
+    let rgba = picture::to_f32(&mean.rgba);
     let picture = encoded(kind, &scene.film, cut.width, cut.height, &rgba)?;
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
     let nodes: BTreeSet<&str> = parts.iter().map(|(_, manifest)| manifest.node.as_str()).collect();
@@ -247,7 +247,7 @@ pub fn merge(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)], out: &Path) 
     let about = json!({
         "schema": 1, "reference": cut.of, "frame": cut.frame, "time_s": scene.time.at(cut.frame),
         "width": cut.width, "height": cut.height, "samples": cut.n_samples, "own_error": mean.own_error,
-        "accuracy": cut.against()?.accuracy_of(&scene, cut.n_samples), "file": cut.file(),
+        "accuracy": cut.against()?.accuracy_text(&scene, cut.n_samples), "file": cut.file(),
         "scene_file": plan.scene.file.display().to_string(), "scene_hash": plan.scene.hash, "set": plan.scene.set,
         "seed": plan.scene.seed, "nimbus": plan.nimbus, "revision": plan.revision, "code": plan.code,
         "image_hash": image_hash(&rgba), "not_finite": n_bad, "nodes": nodes, "processors": processors,
@@ -266,10 +266,10 @@ pub fn merge(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)], out: &Path) 
 
 /// The sums of the whole picture: tiles by copy, ranges of samples by their tree, in the order of
 /// their shards.
-fn put_together(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)]) -> Result<Sums> {
+fn put_together(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)]) -> Result<SampleSums> {
     let whole = Pixels::all(cut.width, cut.height);
-    let mut values = vec![0.0; samples::N_VALUES * whole.at.len()];
-    let mut pairs = Pairs::default();
+    let mut values = vec![0.0; N_VALUES * whole.at.len()];
+    let mut pairs = PairwiseSum::default();
     for (shard, (folder, _)) in plan.shards.iter().zip(parts) {
         for k in shard.items() {
             let path = folder.join(Cut::sums_file(k));
@@ -277,7 +277,7 @@ fn put_together(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)]) -> Result
             let (tile, samples) = cut.piece(k);
             let pixels = cut.pixels(tile);
             let is_last = samples.end == cut.n_samples;
-            let sums = Sums::from_bytes(&bytes, pixels.at.len(), samples.len() as u32);
+            let sums = SampleSums::from_bytes(&bytes, pixels.at.len(), samples.len() as u32);
             pairs.push(
                 sums.ok_or_else(|| {
                     Error::io(&path, "has other numbers than its piece has pixels")
@@ -287,14 +287,12 @@ fn put_together(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)]) -> Result
                 continue;
             }
             let Some(of_tile) = std::mem::take(&mut pairs).finish() else { continue };
-            for (at, found) in pixels.at.iter().zip(of_tile.values.chunks_exact(samples::N_VALUES))
-            {
-                values[samples::N_VALUES * whole.index(*at)..][..samples::N_VALUES]
-                    .copy_from_slice(found);
+            for (at, found) in pixels.at.iter().zip(of_tile.values.chunks_exact(N_VALUES)) {
+                values[N_VALUES * whole.index(*at)..][..N_VALUES].copy_from_slice(found);
             }
         }
     }
-    Ok(Sums { n_samples: cut.n_samples, values })
+    Ok(SampleSums { n_samples: cut.n_samples, values })
 }
 
 #[cfg(test)]

@@ -50,7 +50,7 @@ pub fn lived(
     let mut lived = rest.to_vec();
     for group in groups {
         if let CloudSource::Animated(m) = &scene.clouds[group.i_cloud].source {
-            let (particles, first) = (m.mover.at(time_s)?, group.i_first as usize);
+            let (particles, first) = (m.animation.at(time_s)?, group.i_first as usize);
             let records = &mut lived[first..first + group.n_particles as usize];
             records
                 .iter_mut()

@@ -12,7 +12,7 @@ use crate::model::scene::{LightingMode, Scene};
 use crate::model::terrain::Terrain;
 use crate::passes::generate::FOLDED;
 use crate::reference::generate::Generated;
-use crate::reference::picture::stages::{FrameReference, colors};
+use crate::reference::picture::{FrameReference, colors};
 
 /// A particle in the scene's coordinates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -106,10 +106,10 @@ pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
 pub fn particles_reference(scene: &Scene, i_frame: u32) -> Result<Vec<ParticleRow>> {
     let mut unlit = scene.clone();
     unlit.lighting.mode = LightingMode::None;
-    let truth = FrameReference::of(&unlit, scene.time.at(i_frame))?;
+    let truth = FrameReference::new(&unlit, scene.time.at(i_frame))?;
     let colors = colors(scene);
     let rows = truth.blobs.iter().zip(&colors).enumerate().map(|(i, (b, color))| {
-        let position = b.position + truth.setting.light_origin;
+        let position = b.position + truth.state.light_origin;
         particle_row(i, cloud_of(&truth.groups, i), position, b.sigma, b.kappa, *color)
     });
     Ok(rows.collect())
@@ -138,9 +138,9 @@ pub fn facets(stage: &mut Stage, i_frame: u32) -> Result<Vec<FacetRow>> {
 /// The same from the reference.
 pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
     check_lit(scene)?;
-    let truth = FrameReference::of(scene, scene.time.at(i_frame))?;
+    let truth = FrameReference::new(scene, scene.time.at(i_frame))?;
     let rows = truth.facets.iter().enumerate().map(|(i, f)| {
-        let place = f.position + truth.setting.light_origin;
+        let place = f.position + truth.state.light_origin;
         let or_dark = |of: &[DVec3]| of.get(i).copied().unwrap_or(DVec3::ZERO);
         let lit = [
             truth.irradiance[i],
@@ -148,8 +148,7 @@ pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
             truth.radiance[i],
             or_dark(&truth.second),
         ];
-        let lit =
-            toward_camera(scene, f.region, truth.setting.pose.position - place, f.normal, lit);
+        let lit = toward_camera(scene, f.region, truth.state.pose.position - place, f.normal, lit);
         facet_row(i, f.region, [place, f.normal], f.area, lit)
     });
     Ok(rows.collect())
@@ -196,8 +195,12 @@ pub fn boxes(stage: &mut Stage) -> Result<Vec<BoxRow>> {
 /// The same from the reference.
 pub fn boxes_reference(scene: &Scene) -> Vec<BoxRow> {
     let tried = |g: Generated| (u64::from(g.n_attempts), g.folded);
-    let tries: Vec<_> =
-        scene.clouds.iter().flat_map(crate::reference::generate::cloud).map(tried).collect();
+    let tries: Vec<_> = scene
+        .clouds
+        .iter()
+        .flat_map(|c| crate::reference::live::cloud(c, 0.0))
+        .map(tried)
+        .collect();
     box_rows(scene, &tries)
 }
 

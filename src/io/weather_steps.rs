@@ -69,7 +69,7 @@ fn moving_by(
         aspect_mean: mean(&|p| p.aspect),
         kappa_max: greatest(&|p| p.kappa),
         mass_max: greatest(&|p| mass(p.kappa, p.sigma) * p.aspect),
-        mover: Arc::new(steps),
+        animation: Arc::new(steps),
     })
 }
 
@@ -177,7 +177,7 @@ mod tests {
             |all: &[Particle]| all.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).sum::<f64>();
         // Steps of 120 s: at 0, 2 and 4 s.
         for t in [-1.0, 0.0, 0.7, 2.0, 3.1, 4.0, 9.0] {
-            let (a, b) = (many.mover.at(t).unwrap(), few.mover.at(t).unwrap());
+            let (a, b) = (many.animation.at(t).unwrap(), few.animation.at(t).unwrap());
             assert_eq!((a.len(), b.len()), (2001, 2001));
             assert!((mass_of(&a) / mass_of(&b) - 1.0).abs() < 1e-9, "{t}");
             let within = |p: &Particle| {
@@ -189,7 +189,7 @@ mod tests {
         }
         // Who is somewhere else a moment later has no mass there, before or after.
         for (t, is_all) in [(0.5, false), (2.0, false), (4.0, true)] {
-            let [a, b] = [t - 1e-6, t + 1e-6].map(|t| many.mover.at(t).unwrap());
+            let [a, b] = [t - 1e-6, t + 1e-6].map(|t| many.animation.at(t).unwrap());
             let whole = mass_of(&a);
             for (p, q) in a.iter().zip(b.iter()) {
                 let of = |p: &Particle| mass(p.kappa, p.sigma) * p.aspect;
@@ -207,8 +207,8 @@ mod tests {
         }
         // The same forwards, backwards and at once.
         let (c, d) = (of(0), of(0));
-        let [late, early] = [3.0, 1.0].map(|t| c.mover.at(t).unwrap());
-        assert!(d.mover.at(1.0).unwrap() == early && d.mover.at(3.0).unwrap() == late);
-        assert!(many.mover.at(3.0).unwrap() == late);
+        let [late, early] = [3.0, 1.0].map(|t| c.animation.at(t).unwrap());
+        assert!(d.animation.at(1.0).unwrap() == early && d.animation.at(3.0).unwrap() == late);
+        assert!(many.animation.at(3.0).unwrap() == late);
     }
 }

@@ -1,21 +1,23 @@
-//! The air that a scene's clouds form in: where a parcel from the ground becomes saturated
-//! (docs/model.md §4).
+//! The air that a scene's clouds form in, and the height where a parcel lifted from the ground
+//! becomes saturated (docs/model.md §4).
 
 use super::moisture::{Level, Parcel, Saturation, T0_K, Vapour};
 
+/// The air of a scene, given by a parcel at the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Air {
-    /// At the ground.
+    /// Air at the ground.
     pub parcel: Parcel,
+    /// Law of the saturation vapour pressure.
     pub law: Vapour,
-    /// Of a scene unit.
+    /// Length of a scene unit in metres.
     pub metres_per_unit: f64,
     /// Height of the ground, scene units.
     pub ground: f64,
 }
 
 impl Air {
-    /// A fair day: its clouds are some 1000 m up.
+    /// A fair day, with cloud bases about 1000 m up.
     pub const FAIR: Air = Air {
         parcel: Parcel { t_k: T0_K + 20.0, pressure_pa: 101_325.0, humidity: 0.6 },
         law: Vapour { saturation: Saturation::Bolton, ice: false },
@@ -23,17 +25,18 @@ impl Air {
         ground: 0.0,
     };
 
+    /// Returns the lifted condensation level of air from the ground.
     pub fn condensation(&self) -> Level {
         self.parcel.condensation(self.law)
     }
 
-    /// Height of the clouds' bases, scene units.
+    /// Returns the height of the clouds' bases, scene units.
     pub fn base(&self) -> f64 {
         self.ground + self.condensation().height_m / self.metres_per_unit
     }
 
-    /// How much higher a parcel of the same vapour condenses that is warmer by a kelvin, scene
-    /// units.
+    /// Returns how much higher a parcel of the same vapour condenses if it is 1 K warmer, scene
+    /// units per kelvin.
     pub fn lift(&self) -> f64 {
         let t_k = self.parcel.t_k + 1.0;
         let humidity = self.law.relative_humidity(self.parcel.vapour_pa(self.law), t_k);

@@ -1,45 +1,51 @@
-//! Particles that somebody else moves: those of a weather file, between its steps (docs/model.md
-//! §15 "Time").
+//! Particles whose places are given by a file over time, such as those of a weather model between
+//! its steps (docs/model.md §15 "Time").
 
 use std::fmt::Debug;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::cloud::Particle;
+use super::particle::Particle;
 use crate::error::Result;
 
-/// Who moves them.
+/// A source of particles over time.
 pub trait Animation: Debug + Send + Sync {
-    /// All particles at `time_s`, relative to the cloud's position: always as many, and within the
-    /// bounds that [`AnimatedParticles`] says.
+    /// Returns all particles at `time_s`, relative to the cloud's position. Their number is
+    /// constant, and they stay within the bounds that [`AnimatedParticles`] states.
     ///
     /// # Errors
-    /// What cannot be read.
+    /// The file of that time cannot be read.
     fn at(&self, time_s: f64) -> Result<Arc<Vec<Particle>>>;
 }
 
-/// A cloud's particles, and what bounds them at all times.
+/// A cloud's animated particles, with bounds that hold at all times.
 #[derive(Debug, Clone)]
 pub struct AnimatedParticles {
-    pub mover: Arc<dyn Animation>,
+    /// Where the particles come from.
+    pub animation: Arc<dyn Animation>,
+    /// Number of particles.
     pub n_particles: u32,
-    /// Of the positions.
+    /// Lowest coordinates of all positions.
     pub low: DVec3,
+    /// Highest coordinates of all positions.
     pub high: DVec3,
-    /// Along x and z; and along y.
+    /// Greatest σ along x and z.
     pub sigma_max: f64,
+    /// Greatest σ along y.
     pub sigma_y_max: f64,
-    /// Means, at the first moment.
+    /// Mean σ along x and z at the first moment.
     pub sigma_mean: f64,
+    /// Mean of σ along y over σ along x and z at the first moment.
     pub aspect_mean: f64,
-    /// At the first moment: no bounds.
+    /// Greatest peak extinction at the first moment. It may be exceeded later.
     pub kappa_max: f64,
+    /// Greatest mass of a blob at the first moment. It may be exceeded later.
     pub mass_max: f64,
 }
 
 impl PartialEq for AnimatedParticles {
     fn eq(&self, other: &AnimatedParticles) -> bool {
-        Arc::ptr_eq(&self.mover, &other.mover) && self.n_particles == other.n_particles
+        Arc::ptr_eq(&self.animation, &other.animation) && self.n_particles == other.n_particles
     }
 }

@@ -1,59 +1,61 @@
 //! The BRDF basis, C (12): the diffuse lobe and the principal components of Blinn–Phong lobes
-//! (model.md §6). f = K_d·(1/π) + K_s Σ_b c_b(n_s) v_b(γ): basis 0 is 1/π and its coefficient is
-//! K_d itself; the lobes stand on the vectors alone.
+//! (model.md §6).
+//!
+//! f = K_d·(1/π) + K_s Σ_b c_b(n_s) v_b(γ). Basis 0 is 1/π with coefficient K_d; the lobes use the
+//! other vectors only.
 
 use nalgebra::{DMatrix, SVD};
 
 use super::material::Brdf;
 
-/// How the lobes that the basis is made from are spread over the range of exponents.
+/// Spacing of the lobes that the basis is made from over the range of exponents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sampling {
-    /// Evenly in ln n_s, each lobe of unit norm. Over a range that begins below 1, evenly in ln(1 +
+    /// Even spacing in ln n_s, each lobe of unit norm. If the range begins below 1, even in ln(1 +
     /// n_s).
     Log,
-    /// Evenly in n_s, each lobe as it is: C's own.
+    /// Even spacing in n_s, each lobe unscaled, as C has it.
     Uniform,
 }
 
 impl Sampling {
+    /// Names in scene files.
     pub const NAMES: [(&'static str, Sampling); 2] =
         [("log", Sampling::Log), ("uniform", Sampling::Uniform)];
 }
 
-/// Most bases: the diffuse one and 31 of lobes.
+/// Greatest number of bases: the diffuse one and 31 of lobes.
 pub const MAX_BASES: u32 = 32;
 
-/// Nodes of a tabulated lobe, even in t = (1 − cos γ)^¼. A lobe is nearly exp(−n_s t⁴), whose
-/// second derivative by t is at most 3.83 √n_s of its peak, so linear interpolation is wrong by at
-/// most 3.83 √n_s/(8·1024²) of it: 4.6·10⁻⁵ at n_s = 10⁴, 4.6·10⁻⁴ at 10⁶. 1024 nodes would do as
-/// well; with 1025 the spacing is 2⁻¹⁰, and nodes are exact in f32.
+/// Number of nodes of a tabulated lobe, even in t = (1 − cos γ)^¼. A lobe is nearly exp(−n_s t⁴),
+/// whose second derivative by t is at most 3.83 √n_s of its peak. Linear interpolation therefore
+/// errs by at most 3.83 √n_s/(8·1024²): 4.6·10⁻⁵ at n_s = 10⁴, 4.6·10⁻⁴ at 10⁶. With 1025 nodes the
+/// spacing is 2⁻¹⁰, so nodes are exact in f32.
 pub const N_NODES: usize = 1025;
 
-/// N_s of model.md §6: the lobes that the basis is made from.
+/// N_s of model.md §6: number of lobes that the basis is made from.
 const N_SAMPLES: usize = 64;
 
-/// Exponents at which [`Basis::greatest_error`] looks. The error rises and falls about once a
-/// vector, 31 times at most, and 33 points a swing find its top to (π/66)²/2 = 0.1 % of it.
+/// Number of exponents that [`Basis::worst`] tries. The error rises and falls about once a vector,
+/// at most 31 times. With 33 points a swing its maximum is found to (π/66)²/2 = 0.1 %.
 const N_PROBES: usize = 1024;
 
-/// Weights of the outermost nodes in Gregory's rule with three differences; the others have 1.
-/// Plain trapezoids would be wrong by 6·10⁻⁸ in the norm of n_s = 10⁶ and by 3·10⁻⁶ in that of n_s
-/// = 0.
+/// Weights of the outermost nodes in Gregory's rule with three differences; all others are 1. Plain
+/// trapezoids would err by 6·10⁻⁸ in the norm of n_s = 10⁶ and by 3·10⁻⁶ in that of n_s = 0.
 const GREGORY: [f64; 4] = [251.0 / 720.0, 299.0 / 240.0, 211.0 / 240.0, 739.0 / 720.0];
 
-/// t at node `i`: from 0 (γ = 0) to 1 (γ = π/2).
+/// Returns t at node `i`, from 0 (γ = 0) to 1 (γ = π/2).
 pub fn node_t(i: usize) -> f64 {
     i as f64 / (N_NODES - 1) as f64
 }
 
-/// 1 − cos γ at node `i`.
+/// Returns 1 − cos γ at node `i`.
 pub fn node(i: usize) -> f64 {
     node_t(i).powi(4)
 }
 
-/// Linear interpolation in t of a table at w = 1 − cos γ, cut to [0, 1]. `table`: [`N_NODES`]
-/// values.
+/// Interpolates a table linearly in t at w = 1 − cos γ, clamped to [0, 1]. *Shape*: `table` has
+/// [`N_NODES`] values.
 pub fn evaluate(table: &[f64], w: f64) -> f64 {
     let x = w.clamp(0.0, 1.0).sqrt().sqrt() * (N_NODES - 1) as f64;
     let i = (x as usize).min(N_NODES - 2);
@@ -61,24 +63,26 @@ pub fn evaluate(table: &[f64], w: f64) -> f64 {
     table[i] + part * (table[i + 1] - table[i])
 }
 
-/// Tables of the vectors, and what makes coefficients of an exponent.
+/// Tabulated basis vectors, with the quadrature that projects lobes onto them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Basis {
     exponents: [f64; 2],
     n_asked: u32,
-    /// Quadrature of 4 cos γ sin γ dγ on the nodes.
+    /// Quadrature weights of 4 cos γ sin γ dγ at the nodes.
     weights: Vec<f64>,
     vectors: Vec<Vec<f64>>,
     singular_values: Vec<f64>,
 }
 
 impl Basis {
-    /// `exponents`: least and greatest n_s, finite and not negative. `n_bases` = N_b counts the
-    /// diffuse one.
+    /// Computes the basis for a range of exponents.
+    ///
+    /// `exponents` are the least and greatest n_s, finite and not negative. `n_bases` is N_b and
+    /// counts the diffuse one. *Source*: C (12), model.md §6.
     pub fn new(exponents: [f64; 2], n_bases: u32, sampling: Sampling) -> Basis {
         let weights = quadrature();
         let lobes = samples(exponents, sampling, &weights);
-        // The lobes are the columns: what §6 calls right-singular vectors are the left ones here.
+        // Lobes are the columns here, so the right-singular vectors of §6 are the left ones.
         let weighted =
             DMatrix::from_fn(N_NODES, lobes.len(), |i, k| weights[i].sqrt() * lobes[k][i]);
         let svd = SVD::new(weighted, false, true);
@@ -89,8 +93,8 @@ impl Basis {
         let Some(shares) = svd.v_t else { unreachable!("the decomposition was asked for them") };
         let mut vectors: Vec<Vec<f64>> = Vec::with_capacity(n_vectors);
         for (b, singular_value) in singular_values.iter().enumerate().take(n_vectors) {
-            // A sum of the lobes' own values: smooth, and known where the weight is 0 (the first
-            // node and the last).
+            // A sum of the lobes' own values is smooth, and defined where the weight is 0 (the
+            // first and the last node).
             let mut vector = vec![0.0; N_NODES];
             for (share, lobe) in shares.row(b).iter().zip(&lobes) {
                 add(&mut vector, share / singular_value, lobe);
@@ -102,48 +106,49 @@ impl Basis {
         Basis { exponents, n_asked: n_bases, weights, vectors, singular_values }
     }
 
+    /// Returns the least and greatest n_s that the basis was made for.
     pub fn exponents(&self) -> [f64; 2] {
         self.exponents
     }
 
-    /// N_b as asked for.
+    /// Returns N_b as asked for.
     pub fn n_asked(&self) -> u32 {
         self.n_asked
     }
 
-    /// The diffuse basis and the vectors that were kept: fewer than asked for where the lobes have
-    /// no more that differ.
+    /// Returns the number of bases kept, the diffuse one included. It is less than asked for if the
+    /// lobes have fewer independent components.
     pub fn n_bases(&self) -> u32 {
         self.vectors.len() as u32 + 1
     }
 
-    /// Bases 1.. at the nodes, orthonormal under the weight 4 cos γ sin γ dγ.
+    /// Returns bases 1.. at the nodes, orthonormal under the weight 4 cos γ sin γ dγ.
     pub fn vectors(&self) -> &[Vec<f64>] {
         &self.vectors
     }
 
-    /// The product under that weight of two functions at the nodes.
+    /// Returns the product of two tabulated functions under that weight.
     pub fn product(&self, a: &[f64], b: &[f64]) -> f64 {
         product(a, b, &self.weights)
     }
 
-    /// Of all lobes that the basis is made from, falling; the first `n_bases` − 1 are those of the
-    /// vectors.
+    /// Returns the singular values of all lobes, in falling order. The first `n_bases` − 1 belong
+    /// to the vectors.
     pub fn singular_values(&self) -> &[f64] {
         &self.singular_values
     }
 
-    /// c_b(n_s) of the vectors: the weighted projection of the lobe.
+    /// Returns c_b(n_s) of the vectors: the weighted projection of the lobe.
     pub fn coefficients(&self, ns: f64) -> Vec<f64> {
         self.project(&lobe_table(ns))
     }
 
-    /// Σ_b c_b v_b at the nodes: the lobe as the basis has it.
+    /// Returns Σ_b c_b v_b at the nodes: the lobe as the basis represents it.
     pub fn lobe(&self, ns: f64) -> Vec<f64> {
         self.combine(&self.coefficients(ns))
     }
 
-    /// ‖lobe − its projection‖/‖lobe‖; 1 without vectors.
+    /// Returns ‖lobe − its projection‖/‖lobe‖; 1 without vectors.
     pub fn error(&self, ns: f64) -> f64 {
         let lobe = lobe_table(ns);
         let mut rest = lobe.clone();
@@ -151,12 +156,12 @@ impl Basis {
         norm(&rest, &self.weights) / norm(&lobe, &self.weights)
     }
 
-    /// The greatest [`Basis::error`] over the range.
+    /// Returns the greatest [`Basis::error`] over the range.
     pub fn greatest_error(&self) -> f64 {
         self.worst().1
     }
 
-    /// The exponent of the range with the greatest error, and that error.
+    /// Returns the exponent of the range with the greatest error, and that error.
     pub fn worst(&self) -> (f64, f64) {
         let tried = even(self.exponents, N_PROBES, true).into_iter().map(|ns| (ns, self.error(ns)));
         tried.fold(
@@ -165,7 +170,7 @@ impl Basis {
         )
     }
 
-    /// `n` exponents over the range, ends included, even in ln(1 + n_s).
+    /// Returns `n` exponents over the range, ends included, even in ln(1 + n_s).
     pub fn spread(&self, n: usize) -> Vec<f64> {
         even(self.exponents, n, true)
     }
@@ -183,7 +188,7 @@ impl Basis {
     }
 }
 
-/// The lobes that the basis is made from: one where the range is a point.
+/// Returns the lobes that the basis is made from: a single one if the range is a point.
 fn samples(exponents: [f64; 2], sampling: Sampling, weights: &[f64]) -> Vec<Vec<f64>> {
     let n = if exponents[0] == exponents[1] { 1 } else { N_SAMPLES };
     let mut lobes = match sampling {
@@ -201,9 +206,9 @@ fn samples(exponents: [f64; 2], sampling: Sampling, weights: &[f64]) -> Vec<Vec<
     lobes
 }
 
-/// Even in ln n_s, or (`from_zero`) in ln(1 + n_s): there the product of two lobes of unit norm,
-/// 1/cosh(½ ln((1 + a)/(1 + b))), depends on their distance alone, and n_s = 0 lies at a finite
-/// place.
+/// Returns exponents even in ln n_s, or in ln(1 + n_s) if `from_zero`. In the latter the product of
+/// two lobes of unit norm, 1/cosh(½ ln((1 + a)/(1 + b))), depends on their distance alone, and n_s
+/// = 0 has a finite place.
 fn even(exponents: [f64; 2], n: usize, from_zero: bool) -> Vec<f64> {
     if from_zero {
         even_by(exponents, n, f64::ln_1p, f64::exp_m1)
@@ -212,7 +217,7 @@ fn even(exponents: [f64; 2], n: usize, from_zero: bool) -> Vec<f64> {
     }
 }
 
-/// `n` values from `low` to `high`, both included to the bit, even under `law`.
+/// Returns `n` values from `low` to `high`, even under `law`. Both ends are exact.
 fn even_by(
     [low, high]: [f64; 2],
     n: usize,
@@ -232,7 +237,7 @@ fn lobe_table(ns: f64) -> Vec<f64> {
     (0..N_NODES).map(|i| Brdf::lobe(ns, node(i))).collect()
 }
 
-/// 4 cos γ sin γ dγ = 4 (1 − w) dw = 16 t³ (1 − t⁴) dt.
+/// Quadrature weights of 4 cos γ sin γ dγ = 4 (1 − w) dw = 16 t³ (1 − t⁴) dt.
 fn quadrature() -> Vec<f64> {
     let weight = |i: usize| {
         let t = node_t(i);
@@ -255,9 +260,9 @@ fn add(to: &mut [f64], share: f64, table: &[f64]) {
     to.iter_mut().zip(table).for_each(|(sum, value)| *sum += share * value);
 }
 
-/// Takes out of `vector` what lies along `others`, and gives it unit norm. Division by a small
-/// singular value has blown up roundings along the greater ones; the second round takes out what
-/// the first one's own rounding left.
+/// Orthogonalises `vector` against `others` and normalises it. Division by a small singular value
+/// amplifies roundings along the greater ones; the second round removes the first one's own
+/// rounding.
 fn orthonormalise(vector: &mut [f64], others: &[Vec<f64>], weights: &[f64]) {
     for _ in 0..2 {
         for other in others {
@@ -269,7 +274,7 @@ fn orthonormalise(vector: &mut [f64], others: &[Vec<f64>], weights: &[f64]) {
     }
 }
 
-/// The first of the values of greatest magnitude is positive.
+/// Flips signs so that the first of the values of greatest magnitude is positive.
 fn fix_sign(vector: &mut [f64]) {
     let greatest = vector.iter().fold(0.0f64, |g, v| if v.abs() > g.abs() { *v } else { g });
     if greatest < 0.0 {

@@ -1,18 +1,18 @@
-//! A cloud's macrostructure as boxes: P, Table 1 and P (1)–(11). The rules that generation on the
-//! GPU and its reference share as *data*: the two forms, the radius law's constants, the bound on
-//! rejection.
+//! A cloud's macrostructure as boxes: P, Table 1 and P (1)–(11). The two readings of the equations,
+//! the radius law's constants and the bound on rejection, which the GPU and the reference share.
 
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Attempts before a particle is folded back into its box. P's Fig. 1 has no bound; a needle of a
-/// box accepts almost nothing, and 64 attempts of 50 % acceptance already fail only once in 2⁶⁴
+/// Attempts before a particle is folded back into its box. P's Fig. 1 sets no bound, but a box as
+/// thin as a needle accepts almost nothing. At an acceptance of 50 %, 64 attempts fail once in 2⁶⁴
 /// particles.
 pub const MAX_ATTEMPTS: u32 = 64;
 
 /// One line of a box file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloudBox {
+    /// Number of particles.
     pub n_particles: u32,
     /// X_L, Y_L, Z_L: whole edge lengths along x, y, z.
     pub extent: DVec3,
@@ -22,28 +22,31 @@ pub struct CloudBox {
     pub radius_max: f64,
 }
 
-/// How P (1)–(11) are read.
+/// A reading of P (1)–(11).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
-    /// As printed: positions from [0, L), y from Z, radii that exceed R_max.
+    /// The equations as printed: positions from [0, L), y from Z, radii that exceed R_max.
     Printed,
-    /// Positions from [−L, L), y from Y, radii scaled so that P (9) holds.
+    /// Corrected: positions from [−L, L), y from Y, radii scaled so that P (9) holds.
     Centred,
 }
 
 impl Form {
+    /// Names in scene files.
     pub const NAMES: [(&'static str, Form); 2] =
         [("centred", Form::Centred), ("printed", Form::Printed)];
 }
 
-/// P (10)–(11) without scale: R + π/2 sin R.
+/// Returns P (10)–(11) without scale: R + π/2 sin R.
 pub fn radius_shape(r: f64) -> f64 {
     r + FRAC_PI_2 * r.sin()
 }
 
-/// Greatest value of [`radius_shape`] over [0, `radius_max`]. Interior maxima lie at R* + 2πk, cos
-/// R* = −2/π, and grow with k, so the last one inside and the right end are the only candidates.
-pub fn radius_shape_max(radius_max: f64) -> f64 {
+/// Returns the greatest value of [`radius_shape`] over [0, `radius_max`].
+///
+/// Interior maxima lie at R* + 2πk, cos R* = −2/π, and grow with k. Only the last one inside and
+/// the right end can be greatest.
+fn radius_shape_max(radius_max: f64) -> f64 {
     let first = (-2.0 / PI).acos();
     let end = radius_shape(radius_max);
     if radius_max < first {
@@ -53,7 +56,8 @@ pub fn radius_shape_max(radius_max: f64) -> f64 {
     end.max(radius_shape(first + 2.0 * PI * k))
 }
 
-/// Factor on P (11)'s radius: 1 as printed; centred, the one that makes the greatest radius R_max.
+/// Returns the factor on P (11)'s radius: 1 as printed; in the centred form the one for which the
+/// greatest radius is R_max.
 pub fn radius_factor(form: Form, radius_max: f64) -> f64 {
     match form {
         Form::Printed => 1.0,
@@ -62,8 +66,8 @@ pub fn radius_factor(form: Form, radius_max: f64) -> f64 {
     }
 }
 
-/// Mean radius of a box's particles: the mean of `factor`·(R + π/2 sin R) over R uniform in [0,
-/// R_max].
+/// Returns the mean radius of a box's particles: the mean of `factor`·(R + π/2 sin R) over R
+/// uniform in [0, R_max].
 pub fn mean_radius(form: Form, radius_max: f64) -> f64 {
     if radius_max <= 0.0 {
         return 0.0;
@@ -74,7 +78,7 @@ pub fn mean_radius(form: Form, radius_max: f64) -> f64 {
         * (0.5 * radius_max + FRAC_PI_2 * 2.0 * half * half / radius_max)
 }
 
-/// Greatest radius a particle of the box can have.
+/// Returns the greatest radius that a particle of the box can have.
 pub fn max_radius(form: Form, radius_max: f64) -> f64 {
     radius_factor(form, radius_max) * radius_shape_max(radius_max)
 }

@@ -1,43 +1,53 @@
-//! The camera: fixed, or a Catmull–Rom path. Every pixel's ray goes through its centre, row 0 is
-//! the top, the frustum is OpenGL's perspective.
+//! The camera: fixed, or on a Catmull–Rom path. Rays go through the pixels' centres, row 0 is the
+//! top, and the frustum is OpenGL's perspective.
 
 use glam::DVec3;
 
+/// A perspective camera on a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
+    /// Keys of the path in rising time; a fixed camera has one.
     pub keys: Vec<CameraKey>,
+    /// Direction that is up in the picture.
     pub up: DVec3,
     /// Vertical field of view.
     pub fov_y_rad: f64,
-    /// Particles whose centre is nearer than this (view depth) are not drawn.
+    /// Least view depth of the centre of a drawn particle.
     pub near: f64,
 }
 
-/// One key of a path; a fixed camera has one.
+/// A key of the camera's path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraKey {
+    /// Time of the key.
     pub time_s: f64,
+    /// Position of the eye, scene units.
     pub position: DVec3,
+    /// Point that the camera looks at, scene units.
     pub target: DVec3,
 }
 
-/// The camera at one time: an orthonormal frame, right × up = −forward.
+/// Camera at one time: an orthonormal frame with right × up = −forward.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
+    /// Position of the eye, scene units.
     pub position: DVec3,
+    /// Unit vector to the right of the picture.
     pub right: DVec3,
+    /// Unit vector to the top of the picture.
     pub up: DVec3,
+    /// Unit vector of the view direction.
     pub forward: DVec3,
 }
 
 impl Camera {
-    /// Pose at `time_s`; before the first and after the last key the camera stands still. `None`
-    /// where the camera looks nowhere: position equals target, the view runs along `up`, or a
-    /// number is not finite.
+    /// Returns the pose at `time_s`. Before the first and after the last key the camera stands
+    /// still. `None` if the camera has no direction: position equals target, the view runs along
+    /// `up`, or a number is not finite.
     pub fn pose(&self, time_s: f64) -> Option<Pose> {
         let (position, target) = self.interpolate(time_s);
         let forward = (target - position).try_normalize()?;
-        // Below this sine the frame would be made of rounding errors alone.
+        // Below this sine the frame would consist of rounding errors alone.
         const LEAST_SINE: f64 = 1e-9;
         let right = forward.cross(self.up.try_normalize()?);
         if right.length() < LEAST_SINE {
@@ -64,7 +74,7 @@ impl Camera {
     }
 }
 
-/// The cubic through p₁ (u = 0) and p₂ (u = 1) with tangents (p₂ − p₀)/2 and (p₃ − p₁)/2.
+/// Returns the cubic through p₁ (u = 0) and p₂ (u = 1) with tangents (p₂ − p₀)/2 and (p₃ − p₁)/2.
 fn catmull_rom(p: [DVec3; 4], u: f64) -> DVec3 {
     let a = 2.0 * p[1];
     let b = p[2] - p[0];

@@ -1,59 +1,61 @@
-//! A cloud: where its particles come from, and the frames of reference its particles are kept in.
+//! Clouds: where their particles come from, and the groups that keep their positions accurate.
 
 use glam::DVec3;
 
 use super::animated::AnimatedParticles;
 use super::boxes::{CloudBox, Form, max_radius, mean_radius};
 use super::disc::Disc;
+pub use super::group::{Group, max_blob_mass, runs};
 use super::growth::Growth;
 use super::gust::Gust;
+pub use super::particle::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
 use super::texture::Texture;
 
-/// A Gaussian blob's standard deviation from its radius: σ = R/3 (model.md §1).
-pub const SIGMA_PER_RADIUS: f64 = 1.0 / 3.0;
-
-/// Blobs' σ along y over those along x and z are no less, nor their inverses.
-pub const MIN_ASPECT: f64 = 1e-3;
-
-/// √(2π): optical depth through a blob's centre is √(2π) κ σ.
-pub const SQRT_TAU: f64 = 2.506_628_274_631_000_5;
-
+/// A cloud of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cloud {
+    /// Where the particles come from.
     pub source: CloudSource,
-    /// Of the cloud's own origin at time 0, in the scene.
+    /// Position of the cloud's origin at time 0, in the scene.
     pub position: DVec3,
-    /// Scene units per second; the cloud's origin at time t is position + wind·t. A disc stands
+    /// Velocity, scene units per second: the origin at time t is position + wind·t. A disc stands
     /// still, and the wind carries its particles from where they were born.
     pub wind: DVec3,
+    /// Turbulence that displaces the particles.
     pub gust: Gust,
+    /// Growth about the cloud's centre.
     pub growth: Growth,
+    /// Texture of the particles.
     pub texture: Texture,
     /// Index into the scene's materials.
     pub i_material: usize,
+    /// Direction of facets where the density has none.
     pub facing: Facing,
+    /// Seed of the cloud's random numbers.
     pub seed: u32,
 }
 
-/// Which way a cloud's facets look where the density around them has no direction (docs/model.md
-/// §11 "facets").
+/// Direction that a cloud's facets face where the density around them has none (docs/model.md §11
+/// "facets").
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Facing {
-    /// Away from the cloud's centre.
+    /// Away from the cloud's centre; for a single cloud.
     Outward,
-    /// Of clouds that are layers, or many.
+    /// Upward; for layers of clouds, or many clouds.
     Up,
 }
 
 impl Facing {
+    /// Names in scene files.
     pub const NAMES: [(&'static str, Facing); 2] =
         [("outward", Facing::Outward), ("up", Facing::Up)];
 }
 
-/// So far below a cloud lies what its facets look away from where they look up: directions differ
-/// by the cloud's extent over that.
+/// Depth below the cloud of the point that upward facets face away from. Their directions differ by
+/// the cloud's extent over this depth.
 const FAR_BELOW: f64 = 1e9;
 
+/// Source of a cloud's particles.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CloudSource {
     /// P (1)–(11). `optical_depth` is through the centre of a blob of the box's mean radius;
@@ -61,71 +63,25 @@ pub enum CloudSource {
     Boxes { boxes: Vec<CloudBox>, form: Form, optical_depth: f64, radius_scale: f64 },
     /// A list of blobs as given.
     Particles(Vec<Particle>),
-    /// Particles that are born on a disc, live and are born anew.
+    /// Particles that are born on a disc, live for some time and are replaced.
     Disc(Disc),
-    /// Those of somebody else, anew at every time.
+    /// Particles that an animation places at every time.
     Animated(AnimatedParticles),
 }
 
-/// One Gaussian blob of extinction, relative to its cloud's position.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Particle {
-    pub position: DVec3,
-    /// Along x and z.
-    pub sigma: f64,
-    /// σ along y over that along x and z (docs/model.md §14); 1: a ball.
-    pub aspect: f64,
-    /// Peak extinction per unit length.
-    pub kappa: f64,
-    /// Linear RGB: radiance where the lighting mode is "none", a factor on the material's K_d
-    /// otherwise.
-    pub color: DVec3,
-}
-
-/// A run of consecutive particles that share an origin, so that their f32 positions keep their
-/// accuracy wherever the origin lies: a box, or a whole particle list.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Group {
-    pub i_cloud: usize,
-    pub i_first: u32,
-    pub n_particles: u32,
-    /// Origin of the group's positions, relative to the cloud's.
-    pub center: DVec3,
-    /// The cloud's own centre, relative to its origin: what it grows about.
-    pub cloud_center: DVec3,
-    /// What its facets look away from, relative to the cloud's origin.
-    pub facing_from: DVec3,
-    /// Lengths over those at time 0: 1 but in what [`Group::grown`] gives.
-    pub scale: f64,
-    /// Positions lie within center ± half_extent.
-    pub half_extent: DVec3,
-    /// σ along x and z.
-    pub sigma_max: f64,
-    /// And along y.
-    pub sigma_y_max: f64,
-    pub sigma_mean: f64,
-    /// Blobs' σ along y over those along x and z: the least, the mean and the greatest.
-    pub aspects: [f64; 3],
-    pub kappa_max: f64,
-    /// Greatest mass κ (2π)^{3/2} σ² σ_y of a blob.
-    pub mass_max: f64,
-    /// How far the cloud's gusts carry a particle at most.
-    pub gust_reach: f64,
-}
-
 impl Cloud {
-    /// The cloud's origin at `time_s`.
+    /// Returns the cloud's origin at `time_s`.
     pub fn origin_at(&self, time_s: f64) -> DVec3 {
         self.position + self.drift() * time_s
     }
 
-    /// Speed of the cloud's origin.
+    /// Returns the velocity of the cloud's origin.
     pub fn drift(&self) -> DVec3 {
         if matches!(self.source, CloudSource::Disc(_)) { DVec3::ZERO } else { self.wind }
     }
 
-    /// The cloud's own centre, relative to its origin: the mean of its groups' centres by particle
-    /// count.
+    /// Returns the cloud's centre relative to its origin: the mean of its groups' centres by
+    /// particle count.
     pub fn center(&self) -> DVec3 {
         match &self.source {
             CloudSource::Boxes { boxes, .. } => {
@@ -142,7 +98,7 @@ impl Cloud {
         }
     }
 
-    /// What the cloud's facets look away from, relative to its origin.
+    /// Returns the point that the cloud's facets face away from, relative to its origin.
     pub fn facing_from(&self) -> DVec3 {
         match self.facing {
             Facing::Outward => self.center(),
@@ -152,6 +108,7 @@ impl Cloud {
         }
     }
 
+    /// Returns the number of particles.
     pub fn n_particles(&self) -> u64 {
         match &self.source {
             CloudSource::Boxes { boxes, .. } => {
@@ -163,6 +120,7 @@ impl Cloud {
         }
     }
 
+    /// Returns the number of groups.
     pub fn n_groups(&self) -> u64 {
         match &self.source {
             CloudSource::Boxes { boxes, .. } => boxes.len() as u64,
@@ -170,11 +128,26 @@ impl Cloud {
         }
     }
 
-    /// The cloud's groups, particle numbers counted from `i_first`. Empty boxes give empty groups,
-    /// so that a group's number is its box's number.
+    /// Returns the cloud's groups, with particle indices counted from `i_first`. Empty boxes give
+    /// empty groups, so that a group's index is its box's index.
     pub fn groups(&self, i_cloud: usize, mut i_first: u32) -> Vec<Group> {
-        let (cloud_center, facing_from, gust_reach) =
-            (self.center(), self.facing_from(), self.gust.reach());
+        let at_rest = Group {
+            i_cloud,
+            i_first,
+            n_particles: 0,
+            center: DVec3::ZERO,
+            cloud_center: self.center(),
+            facing_from: self.facing_from(),
+            scale: 1.0,
+            half_extent: DVec3::ZERO,
+            sigma_max: 0.0,
+            sigma_y_max: 0.0,
+            sigma_mean: 0.0,
+            aspects: [1.0; 3],
+            kappa_max: 0.0,
+            mass_max: 0.0,
+            gust_reach: self.gust.reach(),
+        };
         match &self.source {
             CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
                 .iter()
@@ -183,130 +156,45 @@ impl Cloud {
                         max_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
                     let kappa = box_kappa(b, *form, *optical_depth, *radius_scale);
                     let group = Group {
-                        i_cloud,
                         i_first,
                         n_particles: b.n_particles,
                         center: b.center,
-                        cloud_center,
-                        facing_from,
-                        scale: 1.0,
                         half_extent: 0.5 * b.extent,
                         sigma_max,
                         sigma_y_max: sigma_max,
                         sigma_mean: mean_radius(*form, b.radius_max)
                             * radius_scale
                             * SIGMA_PER_RADIUS,
-                        aspects: [1.0; 3],
                         kappa_max: kappa,
                         mass_max: mass(kappa, sigma_max),
-                        gust_reach,
+                        ..at_rest
                     };
-                    // Of more particles than can be numbered only the bounds are of use: such a
-                    // scene is refused.
+                    // A scene with more particles than u32 can count is refused later; until then
+                    // only its bounds are used.
                     i_first = i_first.wrapping_add(b.n_particles);
                     group
                 })
                 .collect(),
-            CloudSource::Particles(list) => {
-                vec![Group {
-                    cloud_center,
-                    facing_from,
-                    gust_reach,
-                    ..list_group(list, i_cloud, i_first)
-                }]
-            }
-            CloudSource::Disc(disc) => {
-                vec![Group {
-                    cloud_center,
-                    facing_from,
-                    gust_reach,
-                    ..disc_group(disc, self.wind, i_cloud, i_first)
-                }]
-            }
-            CloudSource::Animated(m) => {
-                vec![Group {
-                    cloud_center,
-                    facing_from,
-                    gust_reach,
-                    ..moving_group(m, i_cloud, i_first)
-                }]
-            }
+            CloudSource::Particles(list) => vec![list_group(list, at_rest)],
+            CloudSource::Disc(disc) => vec![disc_group(disc, self.wind, at_rest)],
+            CloudSource::Animated(m) => vec![animated_group(m, at_rest)],
         }
     }
 }
 
-impl Group {
-    /// Bounds its blobs' σ along every axis.
-    pub fn sigma_bounds(&self) -> DVec3 {
-        DVec3::new(self.sigma_max, self.sigma_y_max, self.sigma_max)
-    }
-
-    /// Bounds its blobs' σ in every direction.
-    pub fn sigma_widest(&self) -> f64 {
-        self.sigma_bounds().max_element()
-    }
-
-    /// Whether some blob is no ball.
-    pub fn has_ellipsoids(&self) -> bool {
-        self.n_particles > 0 && self.aspects != [1.0; 3]
-    }
-
-    /// The group in its cloud grown to `scale`: every place x is at c + s (x − c), c the cloud's
-    /// centre, every length s times as long, κ the same. To the bit as it was where nothing has
-    /// grown.
-    pub fn grown(&self, scale: f64) -> Group {
-        if scale == 1.0 {
-            return *self;
-        }
-        Group {
-            center: self.cloud_center + scale * (self.center - self.cloud_center),
-            scale,
-            half_extent: scale * self.half_extent,
-            sigma_max: scale * self.sigma_max,
-            sigma_y_max: scale * self.sigma_y_max,
-            sigma_mean: scale * self.sigma_mean,
-            mass_max: scale.powi(3) * self.mass_max,
-            ..*self
-        }
-    }
-}
-
-/// κ of a box's blobs: √(2π) κ σ̄ = optical_depth at the mean radius (model.md §1). 0 where blobs
-/// have no size.
+/// Returns κ of a box's blobs: √(2π) κ σ̄ = optical_depth at the mean radius (model.md §1). 0 if
+/// blobs have no size.
 pub fn box_kappa(b: &CloudBox, form: Form, optical_depth: f64, radius_scale: f64) -> f64 {
     let sigma = mean_radius(form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
     if sigma > 0.0 { optical_depth / (SQRT_TAU * sigma) } else { 0.0 }
 }
 
-/// The `n_runs` (at most `n`) runs [first, end) that n places are divided into: [⌊g n/G⌋, ⌊(g+1)
-/// n/G⌋).
-pub fn runs(n: u64, n_runs: u64) -> impl Iterator<Item = (u64, u64)> {
-    // Both counts fit u32.
-    let bound = move |g: u64| g * n / n_runs;
-    (0..n_runs).map(move |g| (bound(g), bound(g + 1)))
-}
-
-/// Integral of a ball's extinction, κ (2π)^{3/2} σ³; of a blob's that times its aspect.
-pub fn mass(kappa: f64, sigma: f64) -> f64 {
-    kappa * (SQRT_TAU * sigma).powi(3)
-}
-
-/// Bounds the mass of every blob of `groups`.
-pub fn max_blob_mass(groups: &[Group]) -> f64 {
-    groups.iter().filter(|g| g.n_particles > 0).map(|g| g.mass_max).fold(0.0, f64::max)
-}
-
-fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
+fn list_group(list: &[Particle], at_rest: Group) -> Group {
     let low = list.iter().map(|p| p.position).reduce(DVec3::min).unwrap_or(DVec3::ZERO);
     let high = list.iter().map(|p| p.position).reduce(DVec3::max).unwrap_or(DVec3::ZERO);
     Group {
-        i_cloud,
-        i_first,
         n_particles: list.len() as u32,
         center: 0.5 * (low + high),
-        cloud_center: DVec3::ZERO,
-        facing_from: DVec3::ZERO,
-        scale: 1.0,
         half_extent: 0.5 * (high - low),
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
         sigma_y_max: list.iter().map(|p| p.sigma * p.aspect).fold(0.0, f64::max),
@@ -314,52 +202,41 @@ fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
         aspects: aspects(list),
         kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
         mass_max: list.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).fold(0.0, f64::max),
-        gust_reach: 0.0,
+        ..at_rest
     }
 }
 
-/// Least, mean and greatest.
+/// Returns the least, mean and greatest aspect.
 fn aspects(list: &[Particle]) -> [f64; 3] {
     if list.is_empty() {
         return [1.0; 3];
     }
     let all = || list.iter().map(|p| p.aspect);
     let [least, greatest] = [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)];
-    // Of equal ones exactly that, whatever their sum rounds to.
+    // If all aspects are equal, so is their mean, whatever their sum rounds to.
     [least, (all().sum::<f64>() / list.len() as f64).clamp(least, greatest), greatest]
 }
 
-/// Bounds over the whole life, so that they stand still.
-fn disc_group(disc: &Disc, wind: DVec3, i_cloud: usize, i_first: u32) -> Group {
+/// Returns a group whose bounds hold over the particles' whole life, so that they stand still.
+fn disc_group(disc: &Disc, wind: DVec3, at_rest: Group) -> Group {
     let (low, high) = disc.bounds(wind);
     Group {
-        i_cloud,
-        i_first,
         n_particles: disc.n_particles,
         center: 0.5 * (low + high),
-        cloud_center: DVec3::ZERO,
-        facing_from: DVec3::ZERO,
-        scale: 1.0,
         half_extent: 0.5 * (high - low),
         sigma_max: disc.sigma_max(),
         sigma_y_max: disc.sigma_max(),
         sigma_mean: disc.sigma_mean(),
-        aspects: [1.0; 3],
         kappa_max: disc.kappa(),
         mass_max: disc.mass_max(),
-        gust_reach: 0.0,
+        ..at_rest
     }
 }
 
-fn moving_group(m: &AnimatedParticles, i_cloud: usize, i_first: u32) -> Group {
+fn animated_group(m: &AnimatedParticles, at_rest: Group) -> Group {
     Group {
-        i_cloud,
-        i_first,
         n_particles: m.n_particles,
         center: 0.5 * (m.low + m.high),
-        cloud_center: DVec3::ZERO,
-        facing_from: DVec3::ZERO,
-        scale: 1.0,
         half_extent: 0.5 * (m.high - m.low),
         sigma_max: m.sigma_max,
         sigma_y_max: m.sigma_y_max,
@@ -367,7 +244,7 @@ fn moving_group(m: &AnimatedParticles, i_cloud: usize, i_first: u32) -> Group {
         aspects: [MIN_ASPECT, m.aspect_mean, 1.0 / MIN_ASPECT],
         kappa_max: m.kappa_max,
         mass_max: m.mass_max,
-        gust_reach: 0.0,
+        ..at_rest
     }
 }
 
@@ -386,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_share_the_places_out() {
+    fn runs_divide_all_places() {
         assert_eq!(runs(10, 3).collect::<Vec<_>>(), [(0, 3), (3, 6), (6, 10)]);
         assert_eq!((runs(2, 2).collect::<Vec<_>>(), runs(0, 0).count()), (vec![(0, 1), (1, 2)], 0));
         let last = runs(u64::from(u32::MAX), 1 << 20).last();
@@ -394,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn groups_count_on_and_keep_empty_boxes() {
+    fn groups_number_particles_through_and_keep_empty_boxes() {
         let b =
             |n| CloudBox { n_particles: n, extent: DVec3::ONE, center: DVec3::X, radius_max: 1.0 };
         let source = CloudSource::Boxes {
@@ -459,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn the_heaviest_blob_is_a_blob_and_not_two_maxima() {
+    fn the_greatest_mass_is_of_one_blob_and_not_of_two_maxima() {
         let blob = |sigma, kappa| Particle {
             aspect: 1.0,
             position: DVec3::ZERO,

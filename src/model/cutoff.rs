@@ -1,17 +1,20 @@
-//! What a scene says of a bound below which something is left out of the picture.
+//! Bounds below which particles or layers are left out of the picture.
 
+/// A bound below which something is left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cutoff {
-    /// What is below this is left out; 0: nothing.
+    /// Leaves out whatever is below this value; 0 leaves out nothing.
     At(f64),
-    /// Whatever is the fastest at the scene's first frame of what changes it little enough.
+    /// Chosen at the scene's first frame: the fastest value whose change to the picture is small
+    /// enough.
     Auto,
 }
 
 impl Cutoff {
+    /// Leaves out nothing.
     pub const NONE: Cutoff = Cutoff::At(0.0);
 
-    /// The bound; 0 where it is not chosen yet.
+    /// Returns the bound; 0 if it is not chosen yet.
     pub fn bound(self) -> f64 {
         match self {
             Cutoff::At(bound) => bound,
@@ -19,7 +22,7 @@ impl Cutoff {
         }
     }
 
-    /// Whether something may be left out.
+    /// Returns whether something may be left out.
     pub fn is_active(self) -> bool {
         self.bound() > 0.0
     }

@@ -3,38 +3,39 @@
 
 use glam::DVec3;
 
-use super::cloud::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
+use super::particle::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
 use super::philox::{philox4x32_10, uniform};
 
-/// Most that a size or a lifetime may vary: what is left of either is a tenth.
+/// Greatest spread of a size or a lifetime; a tenth of either is left.
 pub const MAX_SPREAD: f64 = 0.9;
 
-/// Least share of a life that fading in or out takes: shorter, and particles would pop.
+/// Least share of a life that fading in or out takes. With less, particles would pop.
 pub const MIN_FADE: f64 = 0.01;
 
-/// Second word of the Philox key and last of the counter; boxes use their number and 0, gusts and
-/// textures their own.
+/// Second word of the Philox key and last word of the counter. Boxes use their index and 0, gusts
+/// and textures words of their own.
 const STREAM: u32 = 0x6469_7363;
 
-/// 2³²: steps of a period.
+/// Time steps of a period: 2³².
 const STEPS: f64 = 4_294_967_296.0;
 
-/// What becomes of a blob's extinction as it takes in air: κ ∝ σ^−k.
+/// Change of a blob's extinction as it entrains air: κ ∝ σ^−k.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dilution {
-    /// Its droplets are spread out: κ σ³ stays, and with it the mass.
+    /// Droplets are spread out: κ σ³, and with it the mass, is constant.
     Mass,
-    /// κ σ stays, and with it the optical depth through the centre.
+    /// κ σ, and with it the optical depth through the centre, is constant.
     Depth,
-    /// κ stays: as much condenses as air is taken in.
+    /// κ is constant: as much water condenses as air is entrained.
     None,
 }
 
 impl Dilution {
+    /// Names in scene files.
     pub const NAMES: [(&'static str, Dilution); 3] =
         [("mass", Dilution::Mass), ("depth", Dilution::Depth), ("none", Dilution::None)];
 
-    /// k.
+    /// Returns k.
     pub fn exponent(self) -> u32 {
         match self {
             Dilution::Mass => 3,
@@ -44,94 +45,102 @@ impl Dilution {
     }
 }
 
-/// Where particles begin to be seen.
+/// Heights at which particles become visible.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Condensation {
-    /// Height over the disc, scene units.
+    /// Height of the condensation level over the disc, scene units.
     pub base: f64,
-    /// Height over which a particle comes to its whole κ, scene units.
+    /// Height over which a particle's κ rises from 0 to its full value, scene units.
     pub over: f64,
-    /// How much higher a particle condenses that is warmer by a kelvin, scene units.
+    /// Rise of a particle's condensation level per kelvin of excess temperature, scene units.
     pub lift: f64,
 }
 
-/// The law of a cloud's particles. Lengths in scene units, times in s, temperatures as excess over
-/// the air's in K.
+/// Law of a disc's particles. *Units*: lengths in scene units, times in s, temperatures as excess
+/// over the air's in K.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
-    /// Slots: particles at a time.
+    /// Number of slots: particles at a time.
     pub n_particles: u32,
+    /// Radius of the disc.
     pub radius: f64,
-    /// L: every slot's particle is born anew after so long.
+    /// L: period after which every slot's particle is replaced.
     pub period_s: f64,
-    /// Lifetimes lie between this share less of the period, and all of it.
+    /// Lifetimes lie between this share less than the period, and the period.
     pub life_spread: f64,
-    /// σ at birth, its mean, and the share that it varies by on either side.
+    /// Mean σ at birth.
     pub sigma: f64,
+    /// Share that σ at birth varies by on either side.
     pub sigma_spread: f64,
-    /// Through the centre of a particle of mean σ at birth, when it has faded in and condensed.
+    /// Optical depth through the centre of a particle of mean σ at birth, after it has faded in and
+    /// condensed.
     pub optical_depth: f64,
-    /// At birth, its mean, and the share that it varies by on either side.
+    /// Mean excess temperature at birth.
     pub warmth: f64,
+    /// Share that the excess temperature varies by on either side.
     pub warmth_spread: f64,
-    /// The share that the disc's rim is less warm than its centre.
+    /// Share by which the disc's rim is less warm than its centre.
     pub core: f64,
-    /// Speed of rise, units/s by kelvin.
+    /// Speed of rise per kelvin, units/(s K).
     pub buoyancy: f64,
-    /// T: warmth and speeds decay in this time to 1/e.
+    /// T: time in which warmth and speeds decay to 1/e.
     pub cooling_s: f64,
     /// Greatest horizontal speed at birth.
     pub outflow: f64,
-    /// α: the radius grows by this share of the rise.
+    /// α: growth of the radius as a share of the rise.
     pub entrainment: f64,
+    /// Change of κ with size.
     pub dilution: Dilution,
-    /// Shares of a life.
+    /// Share of a life that fading in takes.
     pub fade_in: f64,
+    /// Share of a life that fading out takes.
     pub fade_out: f64,
+    /// Condensation level; `None` if particles are visible from birth.
     pub condensation: Option<Condensation>,
 }
 
-/// A time by a disc's period: t = (generation + phase/2³²) L.
+/// Time in units of a disc's period: t = (generation + phase/2³²) L.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cycle {
-    /// Modulo 2³².
+    /// Whole periods, modulo 2³².
     pub generation: u32,
+    /// Fraction of a period, in steps of 2⁻³².
     pub phase: u32,
 }
 
 impl Disc {
-    /// No steps of time are lost: the remainder of a division is exact in f64, however large the
-    /// time.
+    /// Returns `time_s` in periods. No step is lost at large times, since the remainder of a
+    /// division is exact in f64.
     pub fn cycle_at(&self, time_s: f64) -> Cycle {
         let age = time_s.rem_euclid(self.period_s);
         let phase = (age / self.period_s * STEPS).floor();
         let n = ((time_s - age) / self.period_s).round();
-        // A time just below a whole period may round to it.
+        // A time just below a whole period may round to the period.
         let (n, phase) = if phase < STEPS { (n, phase) } else { (n + 1.0, 0.0) };
         Cycle { generation: n.rem_euclid(STEPS) as u32, phase: phase as u32 }
     }
 
-    /// κ₀, of a particle that is new, has faded in and condensed.
+    /// Returns κ₀, of a particle that is new, has faded in and condensed.
     pub fn kappa(&self) -> f64 {
         self.optical_depth / (SQRT_TAU * self.sigma)
     }
 
-    /// D(a) = T (1 − e^{−a/T}): what a speed of 1 that decays has covered.
+    /// Returns D(a) = T (1 − e^{−a/T}): the distance that a decaying speed of 1 covers.
     fn covered(&self, age_s: f64) -> f64 {
         -self.cooling_s * libm::expm1(-age_s / self.cooling_s)
     }
 
-    /// What a particle of mean warmth rises in the end, were it to live so long.
+    /// Returns the final rise of a particle of mean warmth if it lived forever.
     pub fn rise(&self) -> f64 {
         self.buoyancy * self.warmth * self.cooling_s
     }
 
-    /// No particle rises higher over where the wind alone would have it.
+    /// Returns a bound on how far a particle rises above where the wind alone would carry it.
     fn rise_max(&self) -> f64 {
         self.buoyancy * self.warmth * (1.0 + self.warmth_spread) * self.covered(self.period_s)
     }
 
-    /// Bounds (low, high) of all particles' positions over the whole of their lives, relative to
+    /// Returns bounds (low, high) of all particles' positions over their whole life, relative to
     /// the disc's centre.
     pub fn bounds(&self, wind: DVec3) -> (DVec3, DVec3) {
         let drift = wind * self.period_s;
@@ -140,8 +149,8 @@ impl Disc {
         (low - DVec3::new(reach, 0.0, reach), high + DVec3::new(reach, self.rise_max(), reach))
     }
 
-    /// Where a particle of mean warmth from the disc's centre is at half the mean lifetime,
-    /// relative to that centre.
+    /// Returns the place of a particle of mean warmth from the disc's centre at half the mean
+    /// lifetime, relative to that centre.
     pub fn center(&self, wind: DVec3) -> DVec3 {
         let age = 0.5 * self.mean_life_s();
         wind * age + DVec3::Y * (self.buoyancy * self.warmth * self.covered(age))
@@ -151,31 +160,35 @@ impl Disc {
         self.period_s * (1.0 - 0.5 * self.life_spread)
     }
 
-    /// How σ grows as a particle rises by 1: R = 3σ.
+    /// Returns the growth of σ per unit of rise; R = 3σ.
     pub fn growth(&self) -> f64 {
         self.entrainment * SIGMA_PER_RADIUS
     }
 
+    /// Returns a bound on σ.
     pub fn sigma_max(&self) -> f64 {
         self.sigma * (1.0 + self.sigma_spread) + self.growth() * self.rise_max()
     }
 
-    /// Of a particle of mean size and warmth from the disc's centre, over the mean lifetime.
+    /// Returns σ of a particle of mean size and warmth from the disc's centre, averaged over the
+    /// mean lifetime.
     pub fn sigma_mean(&self) -> f64 {
         let life = self.mean_life_s();
         let covered = self.cooling_s * (1.0 - self.covered(life) / life);
         self.sigma + self.growth() * self.buoyancy * self.warmth * covered
     }
 
-    /// Bounds κ (2π)^{3/2} σ³: κ₀ σ₀^k σ^{3−k} is greatest where both are.
+    /// Returns a bound on κ (2π)^{3/2} σ³. κ₀ σ₀^k σ^{3−k} is greatest where both σ are.
     pub fn mass_max(&self) -> f64 {
         let (born, grown) = (self.sigma * (1.0 + self.sigma_spread), self.sigma_max());
         mass(self.kappa(), grown) * (born / grown).powi(self.dilution.exponent() as i32)
     }
 
-    /// The particle in `slot` of a cloud of `seed` in `wind`, relative to the disc's centre.
+    /// Returns the particle in `slot` of a cloud of `seed` in `wind`, relative to the disc's
+    /// centre.
     pub fn particle(&self, seed: u32, wind: DVec3, slot: u32, turn: Cycle) -> Particle {
-        // The places of a van der Corput sequence: any first slots are spread evenly over all ages.
+        // Slots' phases form a van der Corput sequence, so that any first slots are spread evenly
+        // over all ages.
         let (phase, is_next) = turn.phase.overflowing_add(slot.reverse_bits());
         let generation = turn.generation.wrapping_add(u32::from(is_next));
         let words =
@@ -212,13 +225,13 @@ impl Disc {
     }
 }
 
-/// A place on a disc of `radius` about 0, uniform over its area, or a velocity.
+/// Returns a place on a disc of `radius` about 0, uniform over its area.
 fn on_disc(radius: f64, u: f64, turns: f64) -> DVec3 {
     let (r, angle) = (radius * u.sqrt(), std::f64::consts::TAU * turns);
     DVec3::new(r * libm::cos(angle), 0.0, r * libm::sin(angle))
 }
 
-/// 0 up to 0, 1 from 1 on, and without a bend.
+/// Returns the smooth step from 0 at 0 to 1 at 1.
 fn smooth(v: f64) -> f64 {
     let w = v.clamp(0.0, 1.0);
     w * w * (3.0 - 2.0 * w)
@@ -251,7 +264,7 @@ mod tests {
     const WIND: DVec3 = DVec3::new(0.5, 0.0, -1.0);
 
     #[test]
-    fn time_turns_forward_and_backward_alike() {
+    fn cycles_count_forward_and_backward_alike() {
         let turn = |t| DISC.cycle_at(t);
         assert_eq!(turn(0.0), Cycle { generation: 0, phase: 0 });
         assert_eq!(turn(25.0), Cycle { generation: 2, phase: 1 << 31 });
@@ -268,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn a_life_by_hand() {
+    fn a_particle_matches_values_worked_by_hand() {
         // Slot 1 of phase ½ is 7 s old at 2 s, in its first generation.
         let p = DISC.particle(3, WIND, 1, DISC.cycle_at(2.0));
         let covered = 4.0 * (1.0 - (-7.0f64 / 4.0).exp());
@@ -289,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_warmer_condenses_higher() {
+    fn warmer_particles_condense_higher() {
         let at = |lift, base| {
             let disc = Disc { condensation: Some(Condensation { base, over: 2.0, lift }), ..DISC };
             disc.particle(3, WIND, 0, disc.cycle_at(5.0)).kappa
@@ -303,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_hold_all_of_many_lives() {
+    fn bounds_hold_many_lives_and_are_tight() {
         let disc = Disc {
             life_spread: 0.5,
             sigma_spread: 0.4,

@@ -1,24 +1,28 @@
-//! From linear radiance to a display: composition over the background, tone map, sRGB.
+//! Film: composition of linear radiance over the background, tone map and sRGB encoding.
 
 use glam::DVec3;
 
+/// Format of the render target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FilmFormat {
-    /// Values 0 to 1 in steps of 1/255, linear: what a layer makes of them is cut there.
+    /// Linear values 0 to 1 in steps of 1/255. Every blended layer is clamped to that range.
     Rgba8,
+    /// Half floats.
     Rgba16f,
+    /// Single floats.
     Rgba32f,
 }
 
 impl FilmFormat {
+    /// Names in scene files.
     pub const NAMES: [(&'static str, FilmFormat); 3] = [
         ("rgba8", FilmFormat::Rgba8),
         ("rgba16f", FilmFormat::Rgba16f),
         ("rgba32f", FilmFormat::Rgba32f),
     ];
 
-    /// Unit round-off of one stored channel: half of the spacing of numbers in [1, 2), which
-    /// shrinks with them; of rgba8 half of its step, whatever the number.
+    /// Returns the unit round-off of a stored channel: half of the spacing of numbers in [1, 2).
+    /// For rgba8 it is half of a step, whatever the number.
     pub fn unit_roundoff(self) -> f64 {
         match self {
             FilmFormat::Rgba8 => 0.5 / 255.0,
@@ -28,33 +32,41 @@ impl FilmFormat {
     }
 }
 
+/// Tone map of the display.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ToneMap {
-    /// Khronos PBR Neutral: the identity for what a display can show, highlights compressed.
+    /// Khronos PBR Neutral: the identity for displayable values, with highlights compressed.
     Neutral,
-    /// Cut at 1.
+    /// Clamps to 1.
     Clip,
 }
 
 impl ToneMap {
+    /// Names in scene files.
     pub const NAMES: [(&'static str, ToneMap); 2] =
         [("neutral", ToneMap::Neutral), ("clip", ToneMap::Clip)];
 }
 
+/// Picture size, format and display settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Film {
+    /// Columns.
     pub width: u32,
+    /// Rows.
     pub height: u32,
+    /// Format of the render target.
     pub format: FilmFormat,
-    /// Linear RGB.
+    /// Background, linear RGB.
     pub background: DVec3,
     /// Factor before the tone map.
     pub exposure: f64,
+    /// Tone map.
     pub tone_map: ToneMap,
 }
 
 impl Film {
-    /// Display value in [0, 1]³ of one premultiplied linear pixel (alpha = 1 − transmittance).
+    /// Returns the display value in [0, 1]³ of a premultiplied linear pixel (alpha = 1 −
+    /// transmittance).
     pub fn display(&self, rgb: DVec3, alpha: f64) -> DVec3 {
         let linear = self.exposure * (rgb + (1.0 - alpha) * self.background);
         let mapped = match self.tone_map {
@@ -65,8 +77,8 @@ impl Film {
     }
 }
 
-/// Khronos PBR Neutral tone mapper, with its published constants, without the Fresnel offset (that
-/// undoes the 4 % of a dielectric's specular reflection, which a cloud does not have).
+/// Applies the Khronos PBR Neutral tone mapper with its published constants. The Fresnel offset is
+/// left out: it removes the 4 % specular reflection of a dielectric, which a cloud does not have.
 fn neutral(color: DVec3) -> DVec3 {
     const START_COMPRESSION: f64 = 0.8;
     const DESATURATION: f64 = 0.15;
@@ -74,7 +86,7 @@ fn neutral(color: DVec3) -> DVec3 {
     if peak.is_nan() || peak < START_COMPRESSION {
         return color;
     }
-    // The curve's limit; its quotient would be ∞·0.
+    // The limit of the curve; its quotient would be ∞·0.
     if peak == f64::INFINITY {
         return DVec3::ONE;
     }
@@ -84,20 +96,21 @@ fn neutral(color: DVec3) -> DVec3 {
     (color * (new_peak / peak)).lerp(DVec3::splat(new_peak), gray)
 }
 
-/// IEC 61966-2-1, clamped to [0, 1]; NaN becomes 0.
+/// Encodes a linear value as sRGB, clamped to [0, 1]; NaN becomes 0. *Source*: IEC 61966-2-1.
 pub fn srgb_encode(linear: f64) -> f64 {
     let v = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
     if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// What is added before rounding down: (B + ½)/64 with Bayer's 8×8 matrix B, between 0 and 1 and ½
-/// on average, so it rounds to nearest with ±½ of a code value of ordered noise. A cloud is all
-/// soft gradients: rounded alone, steps of one code value show as bands. Ordered and not random, so
-/// that equal pixels give equal files; the same for all three channels, so that grey stays grey;
-/// and exact code values stay what they are.
+/// Returns the ordered dither added to a code value before it is rounded down.
+///
+/// It is (B + ½)/64 with Bayer's 8×8 matrix B: between 0 and 1 and ½ on average, so that values
+/// round to nearest with ±½ of ordered noise. Without it the soft gradients of clouds show bands.
+/// The pattern is ordered, so that equal pixels give equal files, and the same for all channels, so
+/// that grey stays grey. Exact code values are unchanged.
 pub fn dither(x: usize, y: usize) -> f64 {
-    // Bits of x ^ y and y interleaved, the lowest first and the greatest weight: Bayer's recursion
-    // unrolled.
+    // Bayer's recursion unrolled: bits of x ^ y and y interleaved, the lowest with the greatest
+    // weight.
     let (a, b) = ((x ^ y) & 7, y & 7);
     let bayer = (0..3).fold(0, |sum, i| sum << 2 | (a >> i & 1) << 1 | (b >> i & 1));
     (bayer as f64 + 0.5) / 64.0
@@ -145,12 +158,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_infinitely_bright_is_white() {
+    fn infinite_radiance_is_white() {
         for tone_map in [ToneMap::Neutral, ToneMap::Clip] {
             let white = film(tone_map).display(DVec3::INFINITY, 1.0);
             assert_eq!(white, DVec3::splat(srgb_encode(1.0)));
         }
-        // One channel alone desaturates as any highlight does.
+        // A single infinite channel desaturates as any highlight does.
         assert_eq!(neutral(DVec3::new(f64::INFINITY, 0.2, 0.0)), DVec3::ONE);
         assert!((neutral(DVec3::new(1e30, 0.2, 0.0)) - DVec3::ONE).length() < 1e-12);
     }

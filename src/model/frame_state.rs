@@ -1,4 +1,4 @@
-//! The state of a scene at one time: where the camera is, and where the density grid lies.
+//! State of a scene at one time: the camera and the density grid.
 
 use glam::DVec3;
 
@@ -8,15 +8,17 @@ use crate::model::cloud::Group;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use crate::model::scene::Scene;
 
-/// Camera, origin and density grid of a scene at one time, in f64. The game step turns it into
-/// records; the references use it as it is.
+/// Camera, lighting origin and density grid of a scene at one time, in f64. The game step converts
+/// it to records; the references use it as it is.
 #[derive(Debug, Clone)]
 pub struct FrameState {
+    /// Time of the state.
     pub time_s: f64,
+    /// Pose of the camera.
     pub pose: Pose,
-    /// The lighting origin O: centre of the scene's bounds (docs/model.md §11).
+    /// Lighting origin O: centre of the scene's bounds (docs/model.md §11).
     pub light_origin: DVec3,
-    /// The density grid, relative to O.
+    /// Density grid, relative to O.
     pub grid: GridSpec,
     /// Half the diagonal of the bounds.
     pub radius: f64,

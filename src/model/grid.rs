@@ -1,51 +1,53 @@
-//! The density grid of model.md §8: cells over everything that attenuates light, positions relative
-//! to the lighting origin. Cells are cubes where blobs are balls, and as flat as they are on the
-//! mean elsewhere (docs/model.md §14).
+//! The density grid of model.md §8: cells over everything that attenuates light, relative to the
+//! lighting origin. Cells are cubes for round blobs, otherwise as flat as the mean blob
+//! (docs/model.md §14).
 
 use glam::{DVec3, UVec3};
 
-/// Blobs are deposited within this many σ of their centre along each axis, and what lies outside is
-/// given to the rest so that mass is kept: 1 − erf(3/√2) = 0.27 % an axis moves by at most 3σ.
+/// Half width of a deposited blob along each axis, σ. Mass outside, 1 − erf(3/√2) = 0.27 % an axis,
+/// is spread over the rest, so that mass is kept.
 pub const DEPOSIT_CUT_SIGMA: f64 = 3.0;
 
-/// Cells of margin around the bounds, so that trilinear sampling at the bounds never leaves the
-/// grid.
+/// Margin around the bounds, cells: trilinear sampling at the bounds never leaves the grid.
 pub const MARGIN_CELLS: u32 = 2;
 
-/// Greatest number of cells along an axis, the deposit kernel's shared memory: 3 axes of this many
-/// weights are 6 KiB of the 16 KiB every Vulkan device has.
+/// Greatest number of cells along an axis. It bounds the deposit kernel's shared memory: 3 axes of
+/// this many weights are 6 KiB of the 16 KiB that every Vulkan device has.
 pub const MAX_CELLS: u32 = 512;
 
-/// Most steps of one march toward a light. A scene whose step is finer than its grid's diagonal in
-/// this many is refused, so that no march is ever cut short.
+/// Greatest number of steps of a march toward a light. A scene whose step is finer than its grid's
+/// diagonal over this number is refused, so that no march is cut short.
 pub const MAX_MARCH_STEPS: u32 = 4096;
 
-/// The finest march step, in cells, of a grid of `n` cells a side.
+/// Returns the finest march step, in cells, of a grid of `n` cells a side.
 pub fn min_step(n: u32) -> f64 {
     3f64.sqrt() * f64::from(n) / f64::from(MAX_MARCH_STEPS)
 }
 
+/// Place and size of a density grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridSpec {
+    /// Number of cells along each axis.
     pub n_cells: UVec3,
     /// Edge of the cells along x and z.
     pub cell: f64,
-    /// Their edge along y over that; 1: cubes.
+    /// Edge along y over the edge along x and z; 1 for cubes.
     pub aspect: f64,
     /// Low corner of cell (0, 0, 0).
     pub low: DVec3,
 }
 
 impl GridSpec {
-    /// The grid of cubes whose longest axis has `n` cells, margin included, and covers
-    /// `low`..`high`.
+    /// Returns the grid of cubes that covers `low`..`high`. Its longest axis has `n` cells, margin
+    /// included.
     pub fn fit(low: DVec3, high: DVec3, n: u32) -> GridSpec {
         GridSpec::fit_cells(low, high, n, 1.0)
     }
 
-    /// The same of cells `aspect` times as high as wide: no axis has more than `n` cells.
+    /// Returns the grid whose cells are `aspect` times as high as wide. No axis has more than `n`
+    /// cells.
     pub fn fit_cells(low: DVec3, high: DVec3, n: u32, aspect: f64) -> GridSpec {
-        // Bounds without extent still need a cell: 1 unit, since there is no other length to take.
+        // Bounds without extent still need a cell; there is no other length to take than 1 unit.
         let shape = DVec3::new(1.0, aspect, 1.0);
         let extent = (high - low).max(DVec3::ZERO) / shape;
         let longest = extent.max_element();
@@ -58,25 +60,27 @@ impl GridSpec {
         GridSpec { n_cells, cell, aspect, low }
     }
 
+    /// Returns the number of cells.
     pub fn n_total(&self) -> u64 {
         u64::from(self.n_cells.x) * u64::from(self.n_cells.y) * u64::from(self.n_cells.z)
     }
 
+    /// Returns the high corner of the last cell.
     pub fn high(&self) -> DVec3 {
         self.low + self.edges() * self.n_cells.as_dvec3()
     }
 
-    /// Edges of a cell.
+    /// Returns the edges of a cell along x, y and z.
     pub fn edges(&self) -> DVec3 {
         self.cell * DVec3::new(1.0, self.aspect, 1.0)
     }
 
+    /// Returns the volume of a cell.
     pub fn cell_volume(&self) -> f64 {
         self.cell.powi(3) * self.aspect
     }
 
-    /// Cells' widths that a unit along `d` passes: 1/cell where cells are cubes and `d` is a unit
-    /// vector.
+    /// Returns how many cell widths a step of `d` passes: |d|/cell where cells are cubes.
     pub fn cells_along(&self, d: DVec3) -> f64 {
         (d / self.edges()).length()
     }

@@ -1,5 +1,6 @@
-//! Gusts: a frozen-spectrum kinematic turbulence that stirs a cloud's particles (docs/model.md §12;
-//! Kraichnan 1970, Fung et al. 1992). Closed form of time, so any frame can be computed alone.
+//! Gusts: frozen-spectrum kinematic turbulence that displaces a cloud's particles (docs/model.md
+//! §12; Kraichnan 1970, Fung et al. 1992). A closed form of time, so that any frame can be computed
+//! alone.
 
 use std::f64::consts::TAU;
 
@@ -7,15 +8,16 @@ use glam::DVec3;
 
 use super::philox::{philox4x32_10, uniform};
 
-/// Most waves of a cloud's gusts.
+/// Greatest number of waves of a cloud's gusts.
 pub const MAX_WAVES: u32 = 2048;
 
-/// Smallest eddies are this much smaller than the largest: three octaves.
+/// Largest over smallest eddy: three octaves.
 const SPECTRUM_WIDTH: f64 = 8.0;
 
-/// Philox counter's last word for gusts; particles use 0, so the streams are apart.
+/// Last word of the Philox counter for gusts. Particles use 0, so that the streams differ.
 const STREAM: u32 = 0x6775_7374;
 
+/// Gusts of a cloud.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gust {
     /// Root mean square displacement, scene units; 0 is calm.
@@ -24,29 +26,35 @@ pub struct Gust {
     pub length: f64,
     /// Period of the largest eddy.
     pub period_s: f64,
-    /// How many waves stand for the spectrum; at least 1.
+    /// Number of waves of the spectrum, at least 1.
     pub n_waves: u32,
 }
 
-/// One wave of the displacement d(x, t) = Σ a sin(k·x + ω t + φ), a ⟂ k.
+/// A wave of the displacement d(x, t) = Σ a sin(k·x + ω t + φ), a ⟂ k.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mode {
+    /// Wave vector, radians per scene unit.
     pub k: DVec3,
+    /// Amplitude, scene units.
     pub a: DVec3,
+    /// Angular frequency, rad/s.
     pub omega: f64,
+    /// Phase at time 0.
     pub phase: f64,
 }
 
 impl Gust {
+    /// No gusts.
     pub const CALM: Gust = Gust { amplitude: 0.0, length: 1.0, period_s: 1.0, n_waves: 16 };
 
-    pub fn is_calm(&self) -> bool {
+    /// Returns whether there are no gusts.
+    fn is_calm(&self) -> bool {
         self.amplitude == 0.0
     }
 
-    /// The waves of a cloud's gusts: none where it is calm. Wave numbers are spaced evenly in log
-    /// k; displacements fall as 1/k and frequencies rise as k^{2/3}, as a Kolmogorov spectrum's
-    /// velocities k^{−1/3} ask for.
+    /// Returns the waves of a cloud's gusts; none if it is calm. Wave numbers are even in log k.
+    /// Displacements fall as 1/k and frequencies rise as k^{2/3}, as the velocities k^{−1/3} of a
+    /// Kolmogorov spectrum require.
     pub fn modes(&self, seed: u32) -> Vec<Mode> {
         if self.is_calm() {
             return vec![];
@@ -70,7 +78,7 @@ impl Gust {
             .collect()
     }
 
-    /// No displacement is longer: Σ|a|.
+    /// Returns a bound on the displacement: Σ|a|.
     pub fn reach(&self) -> f64 {
         if self.is_calm() {
             return 0.0;
@@ -79,20 +87,20 @@ impl Gust {
         (0..self.n_waves).map(|m| first / self.scale(m)).sum()
     }
 
-    /// |a| of the first wave: the mean square of the sum is half the sum of the squares.
+    /// |a| of the first wave. The mean square of the sum is half the sum of the squares.
     fn first_amplitude(&self) -> f64 {
         let sum: f64 = (0..self.n_waves).map(|m| 0.5 * self.scale(m).powi(-2)).sum();
         self.amplitude / sum.sqrt()
     }
 
-    /// Wave number of wave m over the first one's.
+    /// Wave number of wave m over that of the first wave.
     fn scale(&self, m: u32) -> f64 {
         SPECTRUM_WIDTH.powf(f64::from(m) / f64::from(self.n_waves.max(2) - 1))
     }
 }
 
 impl Mode {
-    /// ω t + φ, reduced to [0, 2π) in f64: t may be large.
+    /// Returns ω t + φ, reduced to [0, 2π) in f64, since t may be large.
     pub fn phase_at(&self, time_s: f64) -> f64 {
         (self.omega * time_s + self.phase).rem_euclid(TAU)
     }

@@ -1,7 +1,8 @@
-//! The gusts' displacement for several particles at once: d(x, t) = Σ a sin(k·x + ω t + φ)
-//! (docs/model.md §12), wave by wave for [`LANES`] particles side by side, with a sine that has no
-//! branch and no call, so that the compiler makes vector instructions of it. Multiplications and
-//! additions are never fused: every machine gives the same bytes.
+//! The gusts' displacement d(x, t) = Σ a sin(k·x + ω t + φ) (docs/model.md §12) for [`LANES`]
+//! particles at once.
+//!
+//! The sine has no branch and no call, so that the compiler vectorises the loop over particles.
+//! Multiplications and additions are never fused: every machine gives the same bytes.
 
 use std::f64::consts::{FRAC_1_PI, TAU};
 
@@ -9,27 +10,31 @@ use glam::DVec3;
 
 use super::gust::Mode;
 
-/// Particles side by side: two vectors of four, so that one's latency is the other's work.
+/// Number of particles computed at once: two vectors of four, so that one hides the other's
+/// latency.
 pub const LANES: usize = 8;
 
 /// One coordinate of [`LANES`] particles.
 pub type Lanes = [f64; LANES];
 
-/// Bound on |sine(x) − sin x|, |x| ≤ [`SINE_REACH`], u = 2⁻⁵³: the reduction rounds once, at most
-/// u, since k π₁ and x − k π₁ are exact and k π₂ below 1.3e-4; the series' first missing term is
-/// (π/2)²¹/21! = 2.6e-16; in r + (r s) p the product, at most 0.571, has six roundings and the sum
-/// one: 4.5 u. Together 8.7e-16; the rest is `f64::sin`'s own ulp.
+/// Bound on |sine(x) − sin x| for |x| ≤ [`SINE_REACH`], u = 2⁻⁵³.
+///
+/// The reduction rounds once, at most u: k π₁ and x − k π₁ are exact and k π₂ is below 1.3e-4. The
+/// series' first missing term is (π/2)²¹/21! = 2.6e-16. In r + (r s) p the product, at most 0.571,
+/// has six roundings and the sum one: 4.5 u. Together that is 8.7e-16; the rest is `f64::sin`'s own
+/// ulp.
 pub const SINE_ERROR: f64 = 1e-15;
 
-/// The sine's reduction is exact for |k| ≤ 2²⁰ half turns: π₁ has 33 bits.
+/// Greatest argument of [`sine`]: the reduction is exact for |k| ≤ 2²⁰ half turns, as π₁ has 33
+/// bits.
 pub const SINE_REACH: f64 = 2_097_152.0;
 
-/// Adding it rounds to an integer, whose parity is the sum's lowest bit: 1.5 · 2⁵².
+/// 1.5 · 2⁵²: adding it rounds to an integer whose parity is the sum's lowest bit.
 const TO_INTEGER: f64 = 6_755_399_441_055_744.0;
-/// π's first 33 bits, and the rest.
+/// First 33 bits of π, and the rest.
 const PI_1: f64 = f64::from_bits(0x4009_21fb_5440_0000);
 const PI_2: f64 = 1.215_420_101_301_238_5e-10;
-/// (−1)ⁿ/(2n + 1)!, n from 9 to 1.
+/// Coefficients (−1)ⁿ/(2n + 1)!, n from 9 to 1.
 const SERIES: [f64; 9] = [
     -1.0 / 121_645_100_408_832_000.0,
     1.0 / 355_687_428_096_000.0,
@@ -42,7 +47,7 @@ const SERIES: [f64; 9] = [
     -1.0 / 6.0,
 ];
 
-/// sin x to [`SINE_ERROR`] for |x| ≤ [`SINE_REACH`]; anything beyond.
+/// Returns sin x to [`SINE_ERROR`] for |x| ≤ [`SINE_REACH`]. Beyond, the result is arbitrary.
 #[inline(always)]
 pub fn sine(x: f64) -> f64 {
     let shifted = x * FRAC_1_PI + TO_INTEGER;
@@ -58,7 +63,7 @@ pub fn sine(x: f64) -> f64 {
     f64::from_bits(value.to_bits() ^ (shifted.to_bits() << 63))
 }
 
-/// One wave at a time t.
+/// A wave at one time.
 #[derive(Debug, Clone, Copy)]
 struct Wave {
     k: [f64; 3],
@@ -76,7 +81,7 @@ pub struct Waves {
 }
 
 impl Waves {
-    /// `modes` at `time_s`.
+    /// Evaluates the phases of `modes` at `time_s`.
     pub fn at(modes: &[Mode], time_s: f64) -> Waves {
         let wave =
             |m: &Mode| Wave { k: m.k.to_array(), phase: m.phase_at(time_s), a: m.a.to_array() };
@@ -86,7 +91,7 @@ impl Waves {
         }
     }
 
-    /// Displacements (along x, along y, along z) of the particles at rest at `x`, relative to their
+    /// Returns the displacements along x, y and z of particles at rest at `x`, relative to their
     /// cloud's origin.
     pub fn displace(&self, x: &[Lanes; 3]) -> [Lanes; 3] {
         if self.waves.is_empty() {
@@ -106,7 +111,7 @@ impl Waves {
         d
     }
 
-    /// The displacement of one particle, wherever it is.
+    /// Returns the displacement of one particle anywhere.
     fn displacement(&self, x: DVec3) -> DVec3 {
         let of = |w: &Wave| DVec3::from(w.a) * libm::sin(DVec3::from(w.k).dot(x) + w.phase);
         self.waves.iter().map(of).sum()
@@ -116,13 +121,13 @@ impl Waves {
 fn in_reach(waves: &[Wave], x: &[Lanes; 3]) -> [Lanes; 3] {
     #[cfg(target_arch = "x86_64")]
     if std::is_x86_feature_detected!("avx2") {
-        // SAFETY: the processor has what the function was compiled for.
+        // SAFETY: the processor has the instructions that the function was compiled for.
         return unsafe { sum_avx2(waves, x) };
     }
     sum(waves, x)
 }
 
-/// [`sum`] with vectors of four instead of two: the same operations, so the same bytes.
+/// [`sum`] with vectors of four instead of two. The operations, and so the bytes, are the same.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn sum_avx2(waves: &[Wave], x: &[Lanes; 3]) -> [Lanes; 3] {
@@ -172,12 +177,11 @@ mod tests {
             println!("{low} to {high}: {error:e}");
         }
         assert_eq!((sine(0.0), sine(1e-300)), (0.0, 1e-300));
-        // The bound is no wider than it need be: a term of the series or a part of π that was
-        // missing would be seen.
+        // The bound is tight: a missing term of the series or part of π would be noticed.
         assert!(worst(-SINE_REACH, SINE_REACH, 400_000) > 0.1 * SINE_ERROR);
     }
 
-    /// Some particles about `center`.
+    /// Returns some particles about `center`.
     fn lanes(center: f64, spread: f64, seed: usize) -> [Lanes; 3] {
         let of = |axis: usize| {
             std::array::from_fn(|l| {
@@ -193,7 +197,7 @@ mod tests {
             let gust = Gust { amplitude: 0.3, length: 4.0, period_s: 5.0, n_waves };
             let modes = gust.modes(7);
             let waves = Waves::at(&modes, 1234.5);
-            // Within the vectors' reach, across its end, and far beyond.
+            // Centres within the vectors' reach, across its end, and far beyond.
             for (i, center) in [0.0, -50.0, 1e4, 1.6e5, 1e9].into_iter().enumerate() {
                 let x = lanes(center, 2e4, i);
                 let d = waves.displace(&x);
@@ -201,7 +205,7 @@ mod tests {
                     let p = DVec3::new(x[0][l], x[1][l], x[2][l]);
                     let of = |m: &Mode| m.a * (m.k.dot(p) + m.phase_at(1234.5)).sin();
                     let exact: DVec3 = modes.iter().map(of).sum();
-                    // The sine's bound for every wave, and n sums' rounding.
+                    // The sine's bound for every wave, and the rounding of n sums.
                     let bound = gust.reach() * (SINE_ERROR + f64::from(n_waves) * 2f64.powi(-53));
                     let off = (DVec3::new(d[0][l], d[1][l], d[2][l]) - exact).abs().max_element();
                     assert!(off <= bound, "{n_waves} waves, {p}: {off:e} > {bound:e}");
@@ -223,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_harms_no_other() {
+    fn nan_affects_no_other_lane() {
         let gust = Gust { amplitude: 0.3, length: 4.0, period_s: 5.0, n_waves: 16 };
         let waves = Waves::at(&gust.modes(3), 7.0);
         let mut x = lanes(0.0, 1.0, 1);

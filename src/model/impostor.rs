@@ -1,64 +1,73 @@
-//! A picture of what is far, seen again from elsewhere: where it shows what, and how far off that
-//! may be (docs/model.md §11 "impostors").
+//! Impostors: a picture of distant particles, reused from another view, with a bound on its error
+//! (docs/model.md §11 "impostors").
 
 use glam::{DMat3, DVec2, DVec3};
 
-/// A view depth over what it was when the shell was made; below it no bound is given. Shells that
-/// are used again have ratios near 1, since a bound of pixels leaves the eye no long way.
-pub const MIN_DEPTH_RATIO: f64 = 0.9;
+/// Least ratio of a view depth now to the depth when the impostor was drawn; below it no bound is
+/// known. Reused impostors have ratios near 1, since an error of few pixels lets the eye move only
+/// a short way.
+const MIN_DEPTH_RATIO: f64 = 0.9;
 
-/// Where a picture is taken from; slopes are those of rays along (right, up, forward).
+/// A view. Slopes are those of rays along (right, up, forward).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
+    /// Position of the eye.
     pub eye: DVec3,
+    /// Unit vector to the right.
     pub right: DVec3,
+    /// Unit vector up.
     pub up: DVec3,
+    /// Unit view direction.
     pub forward: DVec3,
     /// Greatest slopes across and up.
     pub tangents: DVec2,
 }
 
-/// What is far, as seen when its picture was made.
+/// Distant particles as seen when their picture was drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FarField {
-    /// View depths of its particles' centres lie between these.
+    /// Least view depth of their centres.
     pub nearest: f64,
+    /// Greatest view depth of their centres.
     pub farthest: f64,
     /// Greatest σ.
     pub sigma: f64,
-    /// How far its sprites reach.
+    /// Greatest reach of their sprites.
     pub radius: f64,
 }
 
-/// A picture of what is far.
+/// An impostor layer: a picture of distant particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shell {
+    /// View that it was drawn from.
     pub view: View,
+    /// Particles that it shows.
     pub far: FarField,
 }
 
-/// How far off a shell's picture is at most.
+/// Bound on the error of an impostor's picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictedError {
-    /// Slopes between where a centre is shown and where it is seen.
+    /// Error of a centre's place, slopes.
     pub shift: f64,
-    /// Share of σ between what is shown and what is seen.
+    /// Error of a blob's size, as a share of σ.
     pub growth: f64,
-    /// Greatest σ that is seen, in slopes.
+    /// Greatest σ seen, slopes.
     pub sigma: f64,
-    /// Least view depth of a centre now over what it was.
+    /// Least ratio of a centre's view depth now to that when drawn.
     pub depth_ratio: f64,
 }
 
 impl PredictedError {
-    /// Slopes by which a point one σ from its blob's centre is off: there a blob is steepest.
+    /// Returns the error in slopes of a point one σ from its blob's centre, where a blob is
+    /// steepest.
     pub fn slopes(&self) -> f64 {
         self.shift + self.growth * self.sigma
     }
 }
 
 impl View {
-    /// Direction of the ray of slopes (x, y); its view depth is 1.
+    /// Returns the ray of slopes (x, y); its view depth is 1.
     pub fn ray(&self, slopes: DVec2) -> DVec3 {
         slopes.x * self.right + slopes.y * self.up + self.forward
     }
@@ -70,12 +79,13 @@ impl View {
 }
 
 impl Shell {
-    /// 1/z of the plane that stands for all that is far: the middle of what its depths have.
+    /// Returns 1/z of the plane that stands for all distant particles: the mean of their least and
+    /// greatest 1/z.
     pub fn inverse_depth(&self) -> f64 {
         0.5 * (1.0 / self.far.nearest + 1.0 / self.far.farthest)
     }
 
-    /// From slopes (x, y, 1) of `now` to slopes of the shell's picture, homogeneous.
+    /// Returns the homography from slopes (x, y, 1) of `now` to slopes of the impostor's picture.
     pub fn homography(&self, now: &View) -> DMat3 {
         let (then, t, w) = (&self.view, now.eye - self.view.eye, self.inverse_depth());
         let left = 1.0 - w * t.dot(then.forward);
@@ -87,11 +97,12 @@ impl Shell {
         DMat3::from_cols(column(now.right), column(now.up), column(now.forward))
     }
 
-    /// Whether all that `now` sees lies in the shell's picture, `margin` slopes within its edges.
+    /// Returns whether the impostor's picture covers the whole view `now`, `margin` slopes within
+    /// its edges.
     pub fn covers(&self, now: &View, margin: f64) -> bool {
         let to_shell = self.homography(now);
-        // A straight line stays one where no ray of the view runs along the shell's plane or away
-        // from it.
+        // Straight lines stay straight unless a ray of the view runs along the plane or away from
+        // it.
         let within = |corner: DVec2| {
             let at = to_shell * corner.extend(1.0);
             let most = self.view.tangents - margin;
@@ -101,13 +112,13 @@ impl Shell {
             && now.corners().into_iter().all(within)
     }
 
-    /// What the shell's picture may be off by in `now`'s view; `None` where no bound is known: the
-    /// eye comes near to what is far, or turns away.
+    /// Returns the error of the impostor's picture in the view `now`; `None` if no bound is known
+    /// because the eye comes near the particles or turns away.
     pub fn predict(&self, now: &View) -> Option<PredictedError> {
         let FarField { nearest, farthest, sigma, radius } = self.far;
         let (then, t, w) = (&self.view, now.eye - self.view.eye, self.inverse_depth());
         let spread = 0.5 * (1.0 / nearest - 1.0 / farthest);
-        // Centres beside the view whose sprites reach into it, at least so deep.
+        // Centres beside the view count if their sprites reach into it from at least this depth.
         let depth = MIN_DEPTH_RATIO * nearest;
         let beside = |tan: f64| tan + radius / depth * (1.0 + tan * tan).sqrt();
         let [tan_x, tan_y] = now.tangents.to_array().map(beside);
@@ -120,10 +131,10 @@ impl Shell {
         if !(least > 0.0 && left > 0.0) {
             return None;
         }
-        // λ_p: the plane's depth when made over its depth now.
+        // λ_p: depth of the plane when drawn, over its depth now.
         let (plane, along) = (most / left, t.dot(now.forward).abs());
         let depth_ratio = 1.0 / plane - spread * along;
-        // NaN is no bound.
+        // NaN is not a bound.
         if depth_ratio.is_nan() || depth_ratio < MIN_DEPTH_RATIO {
             return None;
         }

@@ -1,17 +1,18 @@
-//! Lights: C's I(x, y, z, θ, φ, λ) as directional, point and spot lights, and the sky beside them
-//! (model.md §7, §8).
+//! Lights: C's I(x, y, z, θ, φ, λ) as directional, point and spot lights, and the sky (model.md §7,
+//! §8).
 
 use glam::DVec3;
 
+/// A light of a scene; energies are linear RGB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Light {
-    /// Parallel light: `direction` of travel (unit), irradiance on a plane across it.
+    /// Parallel light: `direction` of travel (unit), irradiance on a plane across it, W m⁻².
     Directional { direction: DVec3, irradiance: DVec3 },
-    /// Intensity (power per solid angle) alike in every direction. Nearer than `radius` the
-    /// irradiance does not grow.
+    /// The same intensity (power per solid angle, W sr⁻¹) in every direction. Nearer than `radius`
+    /// the irradiance is constant.
     Point { position: DVec3, intensity: DVec3, radius: f64 },
-    /// A point light inside a cone about `direction` (unit): full inside the inner angle, nothing
-    /// outside the outer.
+    /// A point light in a cone about `direction` (unit): full inside the inner angle, nothing
+    /// outside the outer one.
     Spot {
         position: DVec3,
         direction: DVec3,
@@ -20,32 +21,32 @@ pub enum Light {
         cos_inner: f64,
         cos_outer: f64,
     },
-    /// Irradiance E (½ + ½ n·up) e^{−(1−g)τ toward up} + E·constant; reflected by the diffuse basis
-    /// alone.
+    /// Irradiance E (½ + ½ n·up) e^{−(1−g)τ toward up} + E·constant. Only the diffuse basis
+    /// reflects it.
     Sky { irradiance: DVec3, constant: f64 },
 }
 
-/// The sky's up, whatever the camera's.
+/// The sky's up direction, whatever the camera's.
 pub const UP: DVec3 = DVec3::Y;
 
-/// Least difference of a spot's cosines, as KHR_lights_punctual has it: the edge of a cone without
+/// Least difference of a spot's cosines, as in KHR_lights_punctual: the edge of a cone without
 /// penumbra.
 pub const MIN_PENUMBRA: f64 = 1e-3;
 
-/// How a light reaches a point where nothing is in its way.
+/// Unobstructed arrival of a light at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arrival {
-    /// Unit vector toward the light; for the sky, up.
+    /// Unit vector toward the light; up for the sky.
     pub toward: DVec3,
-    /// How far the light is; infinite for directional lights and the sky.
+    /// Distance of the light; infinite for directional lights and the sky.
     pub distance: f64,
-    /// Irradiance across `toward`, as a share of the light's energy: 1, or 1/d² times the cone's
+    /// Irradiance across `toward` as a share of the light's energy: 1, or 1/d² times the cone's
     /// share.
     pub falloff: f64,
 }
 
 impl Light {
-    /// The light as it is seen from `origin`: facets' positions are relative to O.
+    /// Returns the light relative to `origin`.
     pub fn relative_to(mut self, origin: DVec3) -> Light {
         if let Light::Point { position, .. } | Light::Spot { position, .. } = &mut self {
             *position -= origin;
@@ -53,6 +54,7 @@ impl Light {
         self
     }
 
+    /// Returns how the light arrives at `p` if nothing is in its way.
     pub fn arrival(&self, p: DVec3) -> Arrival {
         match *self {
             Light::Directional { direction, .. } => {
@@ -69,8 +71,7 @@ impl Light {
         }
     }
 
-    /// Irradiance on a facet of normal `n` as a share of the light's energy, the transmittance
-    /// toward it being `transmittance`.
+    /// Returns the irradiance on a facet of normal `n` as a share of the light's energy.
     pub fn share(&self, n: DVec3, arrival: &Arrival, transmittance: f64) -> f64 {
         match self {
             Light::Sky { constant, .. } => transmittance * (0.5 + 0.5 * n.dot(UP)) + constant,
@@ -78,8 +79,8 @@ impl Light {
         }
     }
 
-    /// Irradiance of directional lights and the sky, intensity of point and spot lights; linear
-    /// RGB.
+    /// Returns the light's energy, linear RGB: irradiance of directional lights and the sky,
+    /// intensity of point and spot lights.
     pub fn energy(&self) -> DVec3 {
         match *self {
             Light::Directional { irradiance, .. } | Light::Sky { irradiance, .. } => irradiance,
@@ -87,7 +88,7 @@ impl Light {
         }
     }
 
-    /// The sky has no direction that a lobe could reflect.
+    /// Returns whether the light is a sky, which has no direction that a lobe could reflect.
     pub fn is_sky(&self) -> bool {
         matches!(self, Light::Sky { .. })
     }
@@ -96,7 +97,7 @@ impl Light {
 fn from_point(position: DVec3, radius: f64, p: DVec3) -> Arrival {
     let offset = position - p;
     let distance = offset.length();
-    // At the light itself every direction is as good as another.
+    // At the light itself the direction is arbitrary.
     let toward = if distance > 0.0 { offset / distance } else { UP };
     Arrival { toward, distance, falloff: distance.max(radius).powi(-2) }
 }

@@ -2,29 +2,38 @@
 
 use glam::DVec3;
 
-/// A material, which a scene may edit over time: keys in growing time, straight lines between them,
-/// constant before the first and after the last. A material that is never edited has one key.
+/// A material that may change over time: keys in rising time, linear between them, constant before
+/// the first and after the last. A constant material has one key.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
+    /// Name in the scene file.
     pub name: String,
+    /// Keys in rising time.
     pub keys: Vec<MaterialKey>,
 }
 
+/// Material at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaterialKey {
+    /// Time of the key.
     pub time_s: f64,
+    /// Coefficients at that time.
     pub brdf: Brdf,
 }
 
-/// C (11) with linear RGB coefficients.
+/// Coefficients of C (11), linear RGB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Brdf {
+    /// K_d, diffuse albedo.
     pub kd: DVec3,
+    /// K_s, weight of the lobe.
     pub ks: DVec3,
+    /// n_s, exponent of the lobe.
     pub ns: f64,
 }
 
 impl Material {
+    /// Returns the coefficients at `time_s`.
     pub fn at(&self, time_s: f64) -> Brdf {
         let i = self.keys.partition_point(|k| k.time_s <= time_s);
         if i == 0 || i == self.keys.len() {
@@ -39,17 +48,17 @@ impl Material {
         }
     }
 
-    /// Whether it changes over time.
+    /// Returns whether the material changes over time.
     pub fn is_edited(&self) -> bool {
         self.keys.iter().any(|k| k.brdf != self.keys[0].brdf)
     }
 
-    /// Whether it has a lobe at some time.
+    /// Returns whether the material has a lobe at some time.
     pub fn is_glossy(&self) -> bool {
         self.keys.iter().any(|k| k.brdf.ks != DVec3::ZERO)
     }
 
-    /// Least and greatest n_s over time.
+    /// Returns the least and greatest n_s over time.
     pub fn exponents(&self) -> [f64; 2] {
         let of = |pick: fn(f64, f64) -> f64| {
             self.keys.iter().map(|k| k.brdf.ns).fold(self.keys[0].brdf.ns, pick)
@@ -57,17 +66,17 @@ impl Material {
         [of(f64::min), of(f64::max)]
     }
 
-    /// The greatest K_d + 4 K_s over channels and time: above 1 the material can reflect more than
-    /// it receives (model.md §5: with γ from the half vector the lobe's albedo tends to 4 K_s
-    /// cos²θ).
+    /// Returns the greatest K_d + 4 K_s over channels and time. Above 1 the material can reflect
+    /// more than it receives: with γ from the half vector the lobe's albedo tends to 4 K_s cos²θ
+    /// (model.md §5).
     pub fn max_albedo(&self) -> f64 {
         self.keys.iter().map(|k| (k.brdf.kd + 4.0 * k.brdf.ks).max_element()).fold(0.0, f64::max)
     }
 }
 
 impl Brdf {
-    /// The lobe (n_s+2)/(2π) cos^{n_s} γ at 1 − cos γ = `w`: exp(n ln cos γ), ln cos γ = ln1p(−w),
-    /// never the power of a number near 1.
+    /// Returns the lobe (n_s+2)/(2π) cos^{n_s} γ at 1 − cos γ = `w`. It is evaluated as exp(n
+    /// ln1p(−w)), not as a power of a number near 1.
     pub fn lobe(ns: f64, w: f64) -> f64 {
         let power =
             if w >= 1.0 { if ns > 0.0 { 0.0 } else { 1.0 } } else { (ns * (-w).ln_1p()).exp() };

@@ -1,5 +1,7 @@
-//! What is drawn and lit, as plain f64 data and pure functions: no files, no GPU.
-//! Lengths are scene units, angles radians, times seconds, radiance and irradiance linear RGB.
+//! The scene: what is drawn and lit, as plain f64 data and pure functions. No files, no GPU.
+//!
+//! *Units*: lengths are scene units, angles radians, times seconds; radiance (W m⁻² sr⁻¹) and
+//! irradiance (W m⁻²) are linear RGB.
 
 pub mod air;
 pub mod animated;
@@ -10,17 +12,22 @@ pub mod cloud;
 pub mod count;
 pub mod cutoff;
 pub mod disc;
+mod draw;
 pub mod film;
 pub mod frame_state;
 pub mod grid;
+mod group;
 pub mod growth;
 pub mod gust;
 pub mod gust_lanes;
 pub mod impostor;
 pub mod light;
+mod lighting;
 pub mod material;
 pub mod moisture;
+pub mod pair_rules;
 pub mod pairings;
+mod particle;
 pub mod philox;
 pub mod resolution;
 pub mod scene;

@@ -1,34 +1,35 @@
-//! Saturation, relative humidity and the height at which a lifted parcel is saturated: C (1)–(3),
-//! docs/model.md §4.
+//! Saturation, relative humidity and the lifted condensation level: C (1)–(3), docs/model.md §4.
 
 use std::fmt;
 
 /// Saturation vapour pressure at [`T0_K`], Pa.
 pub const E0_PA: f64 = 611.2;
+/// Temperature of the melting point, K.
 pub const T0_K: f64 = 273.15;
 /// Gas constant of water vapour, J/(kg K).
 pub const R_VAPOUR: f64 = 461.5;
-/// Latent heat of evaporation where it is taken to be constant, J/kg.
+/// Constant latent heat of evaporation, J/kg.
 pub const LATENT_HEAT: f64 = 2.5e6;
-/// Latent heat at [`T0_K`] where it falls with temperature, J/kg, and by how much a kelvin, J/(kg
-/// K).
+/// Latent heat at [`T0_K`] of the law that falls with temperature, J/kg.
 pub const LATENT_HEAT_T0: f64 = 2.501e6;
+/// Fall of that latent heat with temperature, J/(kg K).
 pub const LATENT_HEAT_FALL: f64 = 2361.0;
-/// Latent heat of sublimation, J/kg: it hardly depends on temperature.
-pub const SUBLIMATION_HEAT: f64 = 2.834e6;
+/// Latent heat of sublimation, J/kg; it hardly depends on temperature.
+const SUBLIMATION_HEAT: f64 = 2.834e6;
 
-/// What E(T) is computed by, over water.
+/// Law of the saturation vapour pressure E(T) over water.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Saturation {
-    /// Clausius and Clapeyron with constant L, as C has it.
+    /// Clausius–Clapeyron with constant L, as in C.
     Constant,
-    /// The same with L(T) = 2.501e6 − 2361 (T − 273.15).
+    /// Clausius–Clapeyron with L(T) = 2.501e6 − 2361 (T − 273.15).
     Linear,
     /// Bolton's fit (1980, eq. 10).
     Bolton,
 }
 
 impl Saturation {
+    /// Names in scene files.
     pub const NAMES: [(&'static str, Saturation); 3] = [
         ("constant", Saturation::Constant),
         ("linear", Saturation::Linear),
@@ -44,16 +45,17 @@ impl fmt::Display for Saturation {
     }
 }
 
-/// The saturation vapour pressure's law.
+/// Law of the saturation vapour pressure, over water or ice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Vapour {
+    /// Law over water.
     pub saturation: Saturation,
-    /// Below 0 °C over ice.
+    /// Whether the law of ice holds below 0 °C.
     pub ice: bool,
 }
 
 impl Vapour {
-    /// ln(E/E₀); −∞ at 0 K and below, where nothing evaporates.
+    /// Returns ln(E/E₀); −∞ at 0 K and below, where nothing evaporates.
     pub fn log_saturation(self, t_k: f64) -> f64 {
         if t_k <= 0.0 {
             return f64::NEG_INFINITY;
@@ -65,41 +67,42 @@ impl Vapour {
             }
             Saturation::Constant => clapeyron(LATENT_HEAT, t_k),
             Saturation::Linear => {
-                // L is cut where it has fallen to 0, some 1332 K, far beyond water's critical
-                // point: E stays from there on.
+                // L is clamped where it reaches 0, at some 1332 K, far beyond water's critical
+                // point. E is constant from there on.
                 let t = t_k.min(T0_K + LATENT_HEAT_T0 / LATENT_HEAT_FALL);
                 let at_0 = LATENT_HEAT_T0 + LATENT_HEAT_FALL * T0_K;
                 clapeyron(at_0, t) - LATENT_HEAT_FALL / R_VAPOUR * log_ratio(t, T0_K)
             }
-            // Sonntag (1990), Magnus' form over ice.
+            // Sonntag (1990): Magnus' form over ice.
             Saturation::Bolton if self.ice && t_k < T0_K => magnus(22.46, 0.53, t_k),
             Saturation::Bolton => magnus(17.67, 29.65, t_k),
         }
     }
 
-    /// Saturation vapour pressure E at `t_k` kelvin, Pa: 0 at 0 K, finite for every temperature.
+    /// Returns the saturation vapour pressure E at `t_k` kelvin, Pa. 0 at 0 K, finite at every
+    /// temperature.
     pub fn saturation(self, t_k: f64) -> f64 {
         E0_PA * self.log_saturation(t_k).exp()
     }
 
-    /// f = e/E, `vapour_pa` the vapour's pressure e: above 1 where the air holds more than it can,
-    /// 0 of dry air at every temperature, and infinite of moist air where E is 0.
+    /// Returns f = e/E for the vapour pressure e: above 1 in supersaturated air, 0 in dry air, and
+    /// infinite in moist air where E is 0.
     pub fn relative_humidity(self, vapour_pa: f64, t_k: f64) -> f64 {
         if vapour_pa == 0.0 {
             return 0.0;
         }
-        // By the logarithm: E may be 0 where the quotient is not beyond what f64 holds.
+        // The logarithm avoids an E that underflows where the quotient does not.
         ((vapour_pa / E0_PA).ln() - self.log_saturation(t_k)).exp()
     }
 }
 
-/// L/R_v (1/T₀ − 1/T), as one quotient: the two cancel about T₀.
+/// Returns L/R_v (1/T₀ − 1/T) as one quotient, without cancellation about T₀.
 fn clapeyron(latent_heat: f64, t_k: f64) -> f64 {
     let share = if t_k.is_infinite() { 1.0 } else { (t_k - T0_K) / t_k };
     latent_heat / R_VAPOUR / T0_K * share
 }
 
-/// a (T − T₀)/(T − c); −∞ at c and below, where the fit has its pole.
+/// Returns a (T − T₀)/(T − c); −∞ at the pole c and below.
 fn magnus(a: f64, pole_k: f64, t_k: f64) -> f64 {
     if t_k <= pole_k {
         f64::NEG_INFINITY
@@ -110,25 +113,30 @@ fn magnus(a: f64, pole_k: f64, t_k: f64) -> f64 {
     }
 }
 
-/// ln(a/b), also where the quotient is near 1.
+/// Returns ln(a/b), accurate where the quotient is near 1.
 fn log_ratio(a: f64, b: f64) -> f64 {
     let d = (a - b) / b;
-    // Of the least numbers the quotient would be 0.
+    // For the least numbers the quotient would be 0.
     if d.abs() < 0.5 { libm::log1p(d) } else { a.ln() - b.ln() }
 }
 
-/// Constants of the air that is lifted, SI.
+/// Constants of air, SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gases {
+    /// Gas constant of dry air, J/(kg K).
     pub r_dry: f64,
+    /// Gas constant of water vapour, J/(kg K).
     pub r_vapour: f64,
+    /// Heat capacity c_p of dry air, J/(kg K).
     pub cp_dry: f64,
+    /// Heat capacity c_p of water vapour, J/(kg K).
     pub cp_vapour: f64,
+    /// Gravity, m/s².
     pub gravity: f64,
 }
 
-/// c_p as Bolton (1980) and Emanuel (1994) have it.
-pub const GASES: Gases = Gases {
+/// Constants of air, with c_p as in Bolton (1980) and Emanuel (1994).
+const GASES: Gases = Gases {
     r_dry: 287.04,
     r_vapour: R_VAPOUR,
     cp_dry: 1005.7,
@@ -139,28 +147,32 @@ pub const GASES: Gases = Gases {
 /// Air at the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parcel {
+    /// Temperature, K.
     pub t_k: f64,
+    /// Pressure, Pa.
     pub pressure_pa: f64,
-    /// f, from above 0 to 1.
+    /// Relative humidity f, above 0 and at most 1.
     pub humidity: f64,
 }
 
-/// Where a parcel that is lifted without exchange of heat becomes saturated.
+/// Level at which an adiabatically lifted parcel becomes saturated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
-    /// Over where it started.
+    /// Height above the start, m.
     pub height_m: f64,
+    /// Temperature at the level, K.
     pub t_k: f64,
+    /// Pressure at the level, Pa.
     pub pressure_pa: f64,
 }
 
 impl Parcel {
-    /// The vapour's pressure e.
+    /// Returns the vapour pressure e, Pa.
     pub fn vapour_pa(&self, law: Vapour) -> f64 {
         self.humidity * law.saturation(self.t_k)
     }
 
-    /// The temperature at which it is saturated at its own pressure.
+    /// Returns the dew point, K: the temperature of saturation at constant pressure.
     pub fn dew_point_k(&self, law: Vapour) -> f64 {
         saturated_at(
             |t| self.humidity.ln() + law.log_saturation(self.t_k) - law.log_saturation(t),
@@ -168,19 +180,19 @@ impl Parcel {
         )
     }
 
-    /// The lifted condensation level.
+    /// Returns the lifted condensation level.
     pub fn condensation(&self, law: Vapour) -> Level {
         self.condensation_by(&|t| law.log_saturation(t), self.vapour_pa(law), &GASES)
     }
 
-    /// The same for any E(T), given as ln(E/E₀), of air of `vapour_pa` and other constants.
-    pub fn condensation_by(
+    /// Returns the lifted condensation level for any E(T), given as ln(E/E₀), and other constants.
+    fn condensation_by(
         &self,
         log_saturation: &dyn Fn(f64) -> f64,
         vapour_pa: f64,
         gases: &Gases,
     ) -> Level {
-        // Mass of vapour in a mass of air; it stays, and with it e/p.
+        // Specific humidity. It is constant during the lift, and so is e/p.
         let share = gases.r_dry / gases.r_vapour;
         let q = share * vapour_pa / (self.pressure_pa - (1.0 - share) * vapour_pa);
         let cp = (1.0 - q) * gases.cp_dry + q * gases.cp_vapour;
@@ -196,25 +208,26 @@ impl Parcel {
     }
 }
 
-/// The greatest T up to `t_k` with `log_humidity`(T) ≥ 0, which rises as T falls: halved until two
-/// neighbouring numbers are left.
+/// Returns the greatest T up to `t_k` with `log_humidity`(T) ≥ 0, which rises as T falls. The
+/// interval is halved until two neighbouring numbers are left.
 fn saturated_at(log_humidity: impl Fn(f64) -> f64, t_k: f64) -> f64 {
     if log_humidity(t_k) >= 0.0 {
         return t_k;
     }
-    // At 0 K all is saturated.
+    // At 0 K everything is saturated.
     let (mut low, mut high) = (0.0, t_k);
     loop {
         let middle = 0.5 * (low + high);
         if middle <= low || middle >= high {
             return low;
         }
-        // What is no number, where both logarithms are infinite, is far below.
+        // NaN, where both logarithms are infinite, counts as far below.
         if log_humidity(middle) < 0.0 { high = middle } else { low = middle }
     }
 }
 
-/// Bolton (1980), eq. 22: the temperature at the condensation level, K, to 0.1 K from −35 to 35 °C.
+/// Returns the temperature at the condensation level, K, accurate to 0.1 K from −35 to 35 °C.
+/// *Source*: Bolton (1980), eq. 22.
 pub fn bolton_level_k(t_k: f64, humidity: f64) -> f64 {
     1.0 / (1.0 / (t_k - 55.0) - humidity.ln() / 2840.0) + 55.0
 }
@@ -246,7 +259,7 @@ mod tests {
         assert!((LINEAR.saturation(293.15) - 2336.7).abs() < 0.2, "{}", LINEAR.saturation(293.15));
         // 17.67 · 20/263.5 = 1.341176, e^… = 3.82354.
         assert!((BOLTON.saturation(293.15) - 2336.9).abs() < 0.2, "{}", BOLTON.saturation(293.15));
-        // Cooling at constant e raises f (the paper says the opposite).
+        // Cooling at constant e raises f; the paper says the opposite.
         assert!(
             CONSTANT.relative_humidity(1000.0, 280.0) > CONSTANT.relative_humidity(1000.0, 290.0)
         );
@@ -266,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn laws_are_near_to_what_is_measured() {
+    fn laws_are_near_measured_values() {
         for k in -40..=40 {
             let t = T0_K + f64::from(k);
             let off = |law: Vapour, ice| (law.saturation(t) / murphy_koop(t, ice) - 1.0).abs();
@@ -291,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lifted_parcel_condenses_where_romps_says() {
+    fn condensation_levels_match_romps() {
         // Romps (2017), "Exact Expression for the Lifting Condensation Level", his constants and
         // the heights that his code is published with.
         let gases = Gases {
@@ -313,15 +326,16 @@ mod tests {
     }
 
     #[test]
-    fn a_lifted_parcel_condenses_where_bolton_says() {
+    fn condensation_levels_match_bolton() {
         for t in [-35, -20, -5, 10, 25, 35] {
             for humidity in [0.2, 0.5, 0.8, 0.99] {
                 let parcel = Parcel { t_k: T0_K + f64::from(t), pressure_pa: 1e5, humidity };
                 let level = parcel.condensation(BOLTON);
-                // His own 0.1 K, and that his air is dry: R/c_p of moist air is 1 % less at 35 °C.
+                // Bolton's own 0.1 K, plus his assumption of dry air: R/c_p of moist air is 1 %
+                // less at 35 °C.
                 let off = level.t_k - bolton_level_k(parcel.t_k, humidity);
                 assert!(off.abs() < 0.2, "{t} °C, {humidity}: {off}");
-                // It is saturated there, and its potential temperature is what it was.
+                // The parcel is saturated there, and its potential temperature is unchanged.
                 let f = BOLTON.relative_humidity(
                     parcel.vapour_pa(BOLTON) * level.pressure_pa / parcel.pressure_pa,
                     level.t_k,
@@ -331,7 +345,7 @@ mod tests {
         }
         let wet = Parcel { t_k: 290.0, pressure_pa: 9e4, humidity: 1.0 };
         assert_eq!(wet.condensation(LINEAR), Level { height_m: 0.0, t_k: 290.0, pressure_pa: 9e4 });
-        // Dew points: back to the humidity that they come from; at 20 °C and one half 9.3 °C.
+        // Dew points give back the humidity; at 20 °C and one half the dew point is 9.3 °C.
         let half = Parcel { t_k: T0_K + 20.0, pressure_pa: 1e5, humidity: 0.5 };
         let dew = half.dew_point_k(BOLTON);
         assert!((dew - T0_K - 9.27).abs() < 0.02, "{dew}");
@@ -339,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn nearly_dry_air_condenses_high_and_is_no_fault() {
+    fn nearly_dry_air_condenses_at_a_finite_height() {
         for law in [CONSTANT, LINEAR, BOLTON] {
             for humidity in [1e-3, 1e-12, 1e-300] {
                 let level = Parcel { t_k: 300.0, pressure_pa: 1e5, humidity }.condensation(law);

@@ -1,24 +1,26 @@
-//! Which regions can send light to which, and which surfaces may stand between them: what a gather
-//! can leave out for whole regions, because surfaces do not move (model.md §7).
+//! Pairs of regions that can exchange light, and the surfaces that may stand between them (model.md
+//! §7). Surfaces do not move, so a gather skips whole regions by this table.
 
 use glam::DVec3;
 
 use super::surface::Surface;
 
-/// What may be between a receiving and an emitting region.
+/// A region whose light can reach a receiving region.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pairing {
+    /// Index of the emitting region.
     pub i_emitter: usize,
-    /// Surfaces that may hide one from the other.
+    /// Indices of the surfaces that may hide one region from the other.
     pub occluders: Vec<usize>,
 }
 
-/// Within this share of its reach a corner lies in a plane: rounding of typed digits must not
-/// decide. The GPU's own tolerance (2⁻²⁰) is larger, so nothing is left out that it would see.
+/// Share of its reach within which a corner lies in a plane, so that the rounding of typed digits
+/// does not decide. The GPU's own tolerance (2⁻²⁰) is larger, so nothing that it would see is left
+/// out.
 const IN_PLANE: f64 = 1e-9;
 
-/// For every region, surfaces before the `n_others` (ground and clouds, which face every way), the
-/// regions whose light can reach it.
+/// Returns for every region the regions whose light can reach it. Surfaces come before the
+/// `n_others` (ground and clouds), which face every way.
 pub fn pairings(surfaces: &[Surface], n_others: usize) -> Vec<Vec<Pairing>> {
     let n = surfaces.len() + n_others;
     let of = |i: usize| (0..n).filter_map(|k| pairing(surfaces, i, k)).collect();
@@ -34,7 +36,7 @@ fn pairing(surfaces: &[Surface], i_receiver: usize, i_emitter: usize) -> Option<
     }
     let may_hide = |&i: &usize| {
         let c = &surfaces[i];
-        // The way runs before both: what lies behind either is never on it.
+        // The way runs in front of both, so whatever lies behind either is never on it.
         let before = |s: Option<&Surface>| s.is_none_or(|s| reaches_before(s, c));
         let between = match (a, b) {
             (Some(a), Some(b)) => parts(c, a, b) && near_both(c, a, b),
@@ -45,7 +47,8 @@ fn pairing(surfaces: &[Surface], i_receiver: usize, i_emitter: usize) -> Option<
     Some(Pairing { i_emitter, occluders: (0..surfaces.len()).filter(may_hide).collect() })
 }
 
-/// Least and greatest signed distance of `s`'s corners from the plane of `plane`, 0 within it.
+/// Returns the least and greatest signed distance of `s`'s corners from the plane of `plane`; 0
+/// within it.
 fn sides(plane: &Surface, s: &Surface) -> (f64, f64) {
     let n = plane.normal();
     let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
@@ -65,22 +68,22 @@ fn sides(plane: &Surface, s: &Surface) -> (f64, f64) {
     )
 }
 
-/// Whether some of `s` lies before `plane`'s front side.
+/// Returns whether part of `s` lies in front of `plane`.
 fn reaches_before(plane: &Surface, s: &Surface) -> bool {
     sides(plane, s).1 > 0.0
 }
 
-/// Whether `a` and `b` together lie on both sides of `c`'s plane.
+/// Returns whether `a` and `b` together lie on both sides of `c`'s plane.
 fn parts(c: &Surface, a: &Surface, b: &Surface) -> bool {
     let (a, b) = (sides(c, a), sides(c, b));
     a.0.min(b.0) < 0.0 && a.1.max(b.1) > 0.0
 }
 
-/// Whether `c` reaches into the box around `a` and `b`.
+/// Returns whether `c` reaches into the box around `a` and `b`.
 fn near_both(c: &Surface, a: &Surface, b: &Surface) -> bool {
     let (a, b, c) = (a.bounds(), b.bounds(), c.bounds());
     let (low, high): (DVec3, DVec3) = (a.0.min(b.0), a.1.max(b.1));
-    // Boxes of typed numbers: their sums round, and touching is enough.
+    // Bounds are sums of typed numbers that round, and touching suffices.
     let slack = DVec3::splat(1e-9 * (low.abs().max_element() + high.abs().max_element()));
     c.0.cmple(high + slack).all() && c.1.cmpge(low - slack).all()
 }
@@ -98,15 +101,15 @@ mod tests {
     }
 
     #[test]
-    fn only_what_faces_each_other_is_paired_and_only_what_is_between_hides() {
+    fn surfaces_that_face_each_other_are_paired_with_the_ones_between() {
         let floor = surface([0.0, 0.0, 0.0], DVec3::Z, DVec3::X);
         let ceiling = surface([0.0, 2.0, 0.0], DVec3::X, DVec3::Z);
         let shelf = surface([0.0, 1.0, 0.0], DVec3::Z * 0.1, DVec3::X * 0.1);
         let below = surface([0.0, -1.0, 0.0], DVec3::Z, DVec3::X);
         let aside = surface([9.0, 1.0, 0.0], DVec3::Z, DVec3::X);
         let found = pairings(&[floor, ceiling, shelf, below, aside], 0);
-        // Floor (up) and ceiling (down) see each other, the shelf (up) only the ceiling; of what is
-        // below, the floor hides all but its rim, and it faces the floor's back, which sends
+        // Floor (up) and ceiling (down) see each other, the shelf (up) sees only the ceiling. The
+        // floor hides all of `below` but its rim, and `below` faces the floor's back, which sends
         // nothing.
         assert_eq!(emitters(&found[0]), [(1, &[2][..])]);
         assert_eq!(emitters(&found[2]), [(1, &[][..])]);
@@ -122,7 +125,7 @@ mod tests {
         let below = surface([0.0, -1.0, 0.0], DVec3::Z, DVec3::X);
         let found = pairings(&[floor, below], 1);
         assert_eq!(emitters(&found[2]), [(0, &[][..]), (1, &[0][..]), (2, &[0, 1][..])]);
-        // What lies behind the floor cannot stand between it and the cloud.
+        // A surface behind the floor cannot stand between the floor and the cloud.
         assert_eq!(emitters(&found[0]), [(2, &[][..])]);
     }
 }

@@ -1,13 +1,13 @@
 //! Philox4x32-10, the counter-based generator of Salmon et al., "Parallel random numbers: as easy
-//! as 1, 2, 3", SC 2011 (Random123). The same integers on the host and in
-//! `shaders/include/philox.glsl`; no state, so any particle can be computed alone.
+//! as 1, 2, 3", SC 2011 (Random123). `shaders/include/philox.glsl` gives the same integers. Without
+//! state any particle can be computed alone.
 
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 /// Weyl increments of the key schedule: the golden ratio and √3 − 1 in 32 bits.
 const KEY_INCREMENTS: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const ROUNDS: usize = 10;
 
-/// Four random words of `counter` under `key`.
+/// Returns four random words of `counter` under `key`.
 pub fn philox4x32_10(key: [u32; 2], counter: [u32; 4]) -> [u32; 4] {
     let (mut k, mut c) = (key, counter);
     for round in 0..ROUNDS {
@@ -26,8 +26,8 @@ pub fn philox4x32_10(key: [u32; 2], counter: [u32; 4]) -> [u32; 4] {
     c
 }
 
-/// The upper 24 bits of `word` as a number in [0, 1). 24 bits are what an f32 holds exactly, so
-/// that host and GPU start from the same numbers.
+/// Returns the upper 24 bits of `word` as a number in [0, 1). An f32 holds 24 bits exactly, so that
+/// host and GPU start from the same numbers.
 pub fn uniform(word: u32) -> f64 {
     f64::from(word >> 8) / f64::from(1u32 << 24)
 }

@@ -1,20 +1,22 @@
-//! How wide the keys are that particles are sorted by (docs/model.md §11 "sort").
+//! Width of the keys that particles are sorted by (docs/model.md §11 "sort").
 
 /// Bits of the sort key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SortBits {
-    /// 16 where they tell depths apart that matter, else 32.
+    /// 16 if such keys resolve the depths that matter, else 32.
     Auto,
+    /// 16 bits.
     Narrow,
+    /// 32 bits.
     Wide,
 }
 
-/// Keys of 16 bits do where a step of theirs is no more than this share of σ: which of two blobs
-/// whose centres lie so close is the nearer one, sprites only say by convention.
+/// Greatest step of a 16-bit key, as a share of σ. The order of two blobs whose centres are closer
+/// is only a convention of thin sprites.
 const SORT_STEP: f64 = 1.0 / 64.0;
 
 impl SortBits {
-    /// The number, where it does not depend on the scene.
+    /// Returns the number of bits; `None` if it depends on the scene.
     pub fn number(self) -> Option<u32> {
         match self {
             SortBits::Auto => None,
@@ -23,7 +25,7 @@ impl SortBits {
         }
     }
 
-    /// 16 or 32, for depths within ± `radius` and blobs whose groups' mean σ is `sigma` at least.
+    /// Returns 16 or 32 for depths within ± `radius` and groups whose mean σ is at least `sigma`.
     pub fn of(self, radius: f64, sigma: f64) -> u32 {
         match self {
             SortBits::Narrow => 16,

@@ -1,18 +1,19 @@
-//! How the long sums of light are formed (model.md §11 "sums").
+//! Formation of the long sums of light (model.md §11 "sums").
 
-/// In what order, and whether what is lost is kept.
+/// Order of a sum's terms and compensation of its rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Summation {
-    /// One term after the other.
+    /// Term by term.
     #[default]
     Plain,
-    /// One after the other, and what each addition loses is added with the next.
+    /// Term by term, with each addition's rounding error added to the next term.
     Kahan,
-    /// By blocks, and these two by two.
+    /// Blocks term by term, then block sums in pairs.
     Pairwise,
 }
 
 impl Summation {
+    /// Names in scene files.
     pub const NAMES: [(&'static str, Summation); 3] = [
         ("plain", Summation::Plain),
         ("kahan", Summation::Kahan),
@@ -20,22 +21,27 @@ impl Summation {
     ];
 }
 
-/// In which numbers.
+/// Floating-point format of a sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Precision {
+    /// Single precision.
     #[default]
     F32,
-    /// Needs a device with `shaderFloat64`.
+    /// Double precision; it needs a device with `shaderFloat64`.
     F64,
 }
 
 impl Precision {
+    /// Names in scene files.
     pub const NAMES: [(&'static str, Precision); 2] =
         [("f32", Precision::F32), ("f64", Precision::F64)];
 }
 
+/// Formation of a sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Sums {
+    /// Order and compensation.
     pub summation: Summation,
+    /// Format.
     pub precision: Precision,
 }

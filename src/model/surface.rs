@@ -1,48 +1,54 @@
-//! Rectangles of the scene, each divided into a grid of facets (model.md §5).
+//! Rectangles of a scene, each divided into a grid of facets (model.md §5).
 
 use glam::DVec3;
 
+/// A rectangle with a grid of facets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surface {
+    /// Centre.
     pub center: DVec3,
-    /// Half axes, perpendicular to each other. The front side is where u × v points.
+    /// Half axis along u, perpendicular to v. The front faces u × v.
     pub u: DVec3,
+    /// Half axis along v.
     pub v: DVec3,
     /// Index into the scene's materials.
     pub i_material: usize,
-    /// Facets along u and along v.
+    /// Number of facets along u and along v.
     pub subdivide: [u32; 2],
 }
 
 impl Surface {
-    /// Unit normal of the front side.
+    /// Returns the unit normal of the front.
     pub fn normal(&self) -> DVec3 {
-        // Each axis scaled first: the product of two long or two short ones has no number.
+        // Each axis is scaled first, since the product of two long or two short ones overflows or
+        // underflows.
         let unit = |v: DVec3| (v / v.abs().max_element()).normalize();
         unit(self.u).cross(unit(self.v)).normalize()
     }
 
+    /// Returns the area.
     pub fn area(&self) -> f64 {
         4.0 * self.u.length() * self.v.length()
     }
 
+    /// Returns the number of facets.
     pub fn n_facets(&self) -> u64 {
         self.subdivide.iter().map(|n| u64::from(*n)).product()
     }
 
-    /// Half axes of one facet.
+    /// Returns the half axes of a facet.
     pub fn facet_axes(&self) -> (DVec3, DVec3) {
         (self.u / f64::from(self.subdivide[0]), self.v / f64::from(self.subdivide[1]))
     }
 
-    /// Centre of facet `i`; facets run along u first, row by row along v.
+    /// Returns the centre of facet `i`. Facets run along u first, row by row along v.
     pub fn facet_center(&self, i: u32) -> DVec3 {
         let [n_u, n_v] = self.subdivide;
         let at = |i: u32, n: u32| (2.0 * f64::from(i) + 1.0) / f64::from(n) - 1.0;
         self.center + at(i % n_u, n_u) * self.u + at(i / n_u, n_v) * self.v
     }
 
-    /// Low and high corner of what encloses it.
+    /// Returns the low and high corner of its bounding box.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let reach = self.u.abs() + self.v.abs();
         (self.center - reach, self.center + reach)

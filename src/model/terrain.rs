@@ -1,50 +1,51 @@
-//! Ground under clouds: heights over columns, a point a column, drawn as triangles between them and
-//! lit at them (docs/model.md §16).
+//! Ground under clouds: heights over columns, drawn as triangles between points and lit at the
+//! points (docs/model.md §16).
 
 use std::sync::Arc;
 
 use glam::DVec3;
 
-/// Rows of points, each seen from above to the left of the next where one looks along a row: u
-/// along a row, v from row to row, u × v up.
+/// Points in rows: u runs along a row, v from row to row, and u × v points up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Terrain {
-    /// In the scene.
+    /// Position of the origin in the scene.
     pub origin: DVec3,
-    /// Relative to the origin, row after row.
+    /// Points relative to the origin, row after row.
     pub points: Arc<Vec<DVec3>>,
-    /// Points along u, and rows: 2 at least.
+    /// Number of points along u, and number of rows; each at least 2.
     pub n: [u32; 2],
     /// Index into the scene's materials.
     pub i_material: usize,
 }
 
-/// What stands for a point's surroundings in the light.
+/// A point's facet in the light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TerrainFacet {
-    /// Relative to the terrain's origin.
+    /// Position relative to the terrain's origin.
     pub position: DVec3,
-    /// Unit, upward.
+    /// Unit normal, upward.
     pub normal: DVec3,
+    /// Area.
     pub area: f64,
 }
 
-/// The two halves of a cell by their corners' numbers (0: low u, low v; 1: high u; 2: high v; 3:
-/// both): a corner, the one along u from it or back, the one along v or back. The first's corner
-/// and the second's lie across, so both have one front.
+/// Corners of the two triangles of a cell (0: low u, low v; 1: high u; 2: high v; 3: both). Each
+/// lists a corner, its neighbour along u and its neighbour along v. The two first corners are
+/// opposite, so that both triangles have the same front.
 pub const HALVES: [[usize; 3]; 2] = [[0, 1, 2], [3, 2, 1]];
 
 impl Terrain {
+    /// Returns the number of facets, one a point.
     pub fn n_facets(&self) -> u64 {
         self.n.iter().map(|n| u64::from(*n)).product()
     }
 
-    /// Cells between four points each.
+    /// Returns the number of cells between four points each.
     pub fn n_cells(&self) -> u64 {
         self.n.iter().map(|n| u64::from(n.saturating_sub(1))).product()
     }
 
-    /// Numbers of the points at the corners of cell `i`, in the order of [`HALVES`].
+    /// Returns the indices of the points at the corners of cell `i`, in the order of [`HALVES`].
     pub fn corners(&self, i: u32) -> [usize; 4] {
         let n_u = self.n[0] as usize;
         let (row, column) = (i as usize / (n_u - 1), i as usize % (n_u - 1));
@@ -52,8 +53,8 @@ impl Terrain {
         [low, low + 1, low + n_u, low + n_u + 1]
     }
 
-    /// The facet of point `i`: its normal and area by the differences to its neighbours on both
-    /// sides, at the edges to the one.
+    /// Returns the facet of point `i`. Normal and area follow from the differences to its
+    /// neighbours on both sides, at the edges to the single one.
     pub fn facet(&self, i: u32) -> TerrainFacet {
         let [n_u, n_v] = self.n;
         let (column, row) = (i % n_u, i / n_u);
@@ -70,17 +71,18 @@ impl Terrain {
         }
     }
 
+    /// Returns all facets.
     pub fn facets(&self) -> impl Iterator<Item = TerrainFacet> + '_ {
         (0..self.n[0] * self.n[1]).map(|i| self.facet(i))
     }
 
-    /// Low and high corner of what encloses it, in the scene.
+    /// Returns the low and high corner of its bounding box, in the scene.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let (low, high) = self.extent();
         (self.origin + low, self.origin + high)
     }
 
-    /// The same relative to the origin.
+    /// Returns the low and high corner of its bounding box, relative to the origin.
     pub fn extent(&self) -> (DVec3, DVec3) {
         let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.points.iter().fold(start, |(low, high), p| (low.min(*p), high.max(*p)))
@@ -144,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_between_neighbours_is_no_trouble() {
+    fn degenerate_cells_have_no_area_and_no_nan() {
         // All points of a row at one place: no area, and no NaN.
         let t =
             Terrain { points: Arc::new(vec![DVec3::ZERO; 4]), n: [2, 2], ..terrain(|_, _| 0.0) };

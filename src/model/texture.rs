@@ -1,29 +1,33 @@
-//! Which of the pool's fields a cloud's particles are drawn with (docs/model.md §9).
+//! Selection of the texture pool's fields for a cloud's particles (docs/model.md §9).
 
-/// Fields of the pool.
+/// Number of fields of the pool.
 pub const N_FIELDS: u32 = 8;
 
-/// Greatest `texture_strength`: n is at most 8, and exp(4 · 8) is far from f32's end.
+/// Greatest `texture_strength`: n is at most 8, and exp(4 · 8) is far below f32's greatest number.
 pub const MAX_STRENGTH: f64 = 4.0;
 
+/// Texture of a cloud's particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Texture {
+    /// Field of each box.
     pub choice: Choice,
     /// s: τ is multiplied by exp(s n − s² ⟨n²⟩/2).
     pub strength: f64,
 }
 
+/// Assignment of fields to boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Choice {
-    /// Blobs are drawn plain.
+    /// Plain blobs.
     None,
-    /// All boxes have this field.
+    /// The same field for all boxes.
     Field(u32),
-    /// Box i has field i modulo [`N_FIELDS`]; a particle list is one box.
+    /// Field i modulo [`N_FIELDS`] for box i; a particle list is one box.
     ByBox,
 }
 
 impl Choice {
+    /// Names in scene files.
     pub const NAMES: [(&'static str, Choice); 10] = [
         ("none", Choice::None),
         ("by-box", Choice::ByBox),
@@ -39,13 +43,15 @@ impl Choice {
 }
 
 impl Texture {
+    /// Plain blobs.
     pub const NONE: Texture = Texture { choice: Choice::None, strength: 1.0 };
 
+    /// Returns whether blobs are plain.
     pub fn is_none(&self) -> bool {
         self.choice == Choice::None
     }
 
-    /// Field of box `i_box`, and s: 0 where blobs are plain.
+    /// Returns the field of box `i_box` and s, which is 0 for plain blobs.
     pub fn of_box(&self, i_box: u32) -> (u32, f64) {
         match self.choice {
             Choice::None => (0, 0.0),

@@ -1,25 +1,25 @@
-//! The tree of clusters over the facets of a region: its form follows from their number alone, so
-//! that it is laid out once a scene, and only what the nodes hold follows from the frame (model.md
-//! §7, "tree").
+//! The tree of clusters over the facets of a region (model.md §7, "tree"). Its form depends only on
+//! the number of facets, so that it is built once a scene; only the nodes' contents change with the
+//! frame.
 
-/// Children of a node. Four are a quadrant each on a surface in Morton order; a cloud's octants are
-/// two heights.
-pub const FAN: u32 = 4;
+/// Number of children of a node. On a surface in Morton order four are a quadrant each; a cloud's
+/// octant takes two levels.
+const FAN: u32 = 4;
 
-/// Nodes in the order of a depth-first walk, a node before its children.
+/// Nodes in depth-first order, parents before their children.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Tree {
-    /// Nodes of each one's subtree, itself included: where the walk goes on that does not enter it.
-    /// 1 is a facet.
+    /// Size of each node's subtree, itself included: the offset to the next node outside it. 1 is a
+    /// facet.
     pub n_nodes: Vec<u32>,
-    /// Node of each place in the order of facets.
+    /// Node of each facet, in the order of facets.
     pub leaves: Vec<u32>,
-    /// Clusters by height: those of `merges[h]` need only those before.
+    /// Clusters by height. A cluster of `merges[h]` depends only on lower ones.
     pub merges: Vec<Vec<u32>>,
 }
 
 impl Tree {
-    /// Adds the tree over the next `n` places and gives its root, which is no node where n is 0.
+    /// Adds the tree over the next `n` facets and returns its root; there is no node if n is 0.
     pub fn push(&mut self, n: u32) -> u32 {
         let root = self.n_nodes.len() as u32;
         if n > 0 {
@@ -28,7 +28,7 @@ impl Tree {
         root
     }
 
-    /// Adds the next `n` places without clusters and gives the first one's node.
+    /// Adds the next `n` facets without clusters and returns the first one's node.
     pub fn push_flat(&mut self, n: u32) -> u32 {
         let root = self.n_nodes.len() as u32;
         self.leaves.extend(root..root + n);
@@ -36,7 +36,7 @@ impl Tree {
         root
     }
 
-    /// Gives the node's height: 0 for a facet.
+    /// Adds a subtree and returns its height: 0 for a facet.
     fn push_node(&mut self, n: u32) -> usize {
         let i = self.n_nodes.len();
         self.n_nodes.push(1);
@@ -44,8 +44,8 @@ impl Tree {
             self.leaves.push(i as u32);
             return 0;
         }
-        // Children are full but for the last: runs of a power of FAN places, that a power of two's
-        // quadrants fit.
+        // All children but the last are full: runs of a power of FAN facets, which the quadrants of
+        // a power of two fit.
         let mut run = 1;
         while run < n.div_ceil(FAN) {
             run *= FAN;
@@ -71,7 +71,7 @@ mod tests {
     fn a_node_stands_before_its_children_and_its_run_holds_them() {
         let mut tree = Tree::default();
         assert_eq!(tree.push(6), 0);
-        // 6 places: a full run of 4 and one of 2.
+        // 6 facets: a full run of 4 and one of 2.
         assert_eq!(tree.n_nodes, [9, 5, 1, 1, 1, 1, 3, 1, 1]);
         assert_eq!(tree.leaves, [2, 3, 4, 5, 7, 8]);
         assert_eq!(tree.merges, [vec![1, 6], vec![0]]);
@@ -96,7 +96,7 @@ mod tests {
                 done[i] = true;
             }
             assert!(done.iter().all(|d| *d) && tree.n_nodes[0] as usize == done.len());
-            // A third of the facets, and a last run at each height that may not be full.
+            // Clusters are a third of the facets, plus one partial run at each height.
             assert!(done.len() as u32 <= n + n / 3 + 12, "{n}: {}", done.len());
         }
     }

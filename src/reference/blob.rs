@@ -1,87 +1,88 @@
-//! One Gaussian blob of extinction, model.md §14: a ball, or an ellipsoid with an axis along y.
-//! What a line through it meets, and between which slopes it is seen, in f64.
+//! A Gaussian blob of extinction, model.md §14: a ball, or an ellipsoid with an axis along y.
+//! Optical depths along lines through it, and the slopes between which it is seen, in f64.
 
 use glam::{DMat2, DVec2, DVec3};
 
 use crate::model::cloud::SQRT_TAU;
 
-/// ρ(x) = κ exp(−|M (x − p)|²/2σ²), M = diag(1, 1/a, 1), its position relative to the lighting
-/// origin.
+/// A blob of extinction ρ(x) = κ exp(−|M (x − p)|²/2σ²), M = diag(1, 1/a, 1), relative to the
+/// lighting origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blob {
+    /// p: centre.
     pub position: DVec3,
-    /// Along x and z.
+    /// σ along x and z.
     pub sigma: f64,
-    /// a: σ along y over that; 1: a ball.
+    /// a: σ along y over σ along x and z; 1 for a ball.
     pub aspect: f64,
-    /// Peak extinction per unit length.
+    /// κ: peak extinction per unit length.
     pub kappa: f64,
 }
 
-/// What a whole line through a blob meets.
+/// A whole line through a blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Line {
-    /// b/σ, where the blob is made a ball: τ falls off as e^{−b²/2σ²}.
+    /// b/σ, the distance from the centre where the blob is scaled to a ball: τ falls off as
+    /// e^{−b²/2σ²}.
     pub off: f64,
-    /// τ of a line of that direction through the centre.
+    /// τ of a line of the same direction through the centre.
     pub depth: f64,
 }
 
 impl Line {
-    /// τ of the line.
+    /// Returns τ of the line.
     pub fn tau(&self) -> f64 {
         self.depth * (-0.5 * self.off * self.off).exp()
     }
 }
 
 impl Blob {
-    /// (1, a, 1).
+    /// Returns (1, a, 1).
     pub fn axes(&self) -> DVec3 {
         DVec3::new(1.0, self.aspect, 1.0)
     }
 
-    /// M v: the blob is a ball of σ among such.
+    /// Returns M v: the space in which the blob is a ball of σ.
     pub fn whiten(&self, v: DVec3) -> DVec3 {
         v / self.axes()
     }
 
-    /// σ in the direction that it is widest in.
+    /// Returns the greatest σ over all directions.
     pub fn widest(&self) -> f64 {
         self.sigma * self.aspect.max(1.0)
     }
 
-    /// And narrowest.
+    /// Returns the least σ over all directions.
     pub fn narrowest(&self) -> f64 {
         self.sigma * self.aspect.min(1.0)
     }
 
-    /// √(2π) κ σ max(1, a): no line meets more.
+    /// Returns a bound on the optical depth of any line: √(2π) κ σ max(1, a).
     pub fn deepest(&self) -> f64 {
         SQRT_TAU * self.kappa * self.widest()
     }
 
-    /// m = ∫ρ dV = κ (2π)^{3/2} σ³ a.
+    /// Returns m = ∫ρ dV = κ (2π)^{3/2} σ³ a.
     pub fn mass(&self) -> f64 {
         self.kappa * (SQRT_TAU * self.sigma).powi(3) * self.aspect
     }
 
-    /// The line along `d`, of any length, that passes the centre off by `c`.
+    /// Returns the line along `d`, of any length, that passes the centre at offset `c`.
     pub fn along(&self, c: DVec3, d: DVec3) -> Line {
         let (white, ray) = (self.whiten(c), self.whiten(d));
         let off = white.cross(ray).length() / (ray.length() * self.sigma);
         Line { off, depth: SQRT_TAU * self.kappa * self.sigma * (d.length() / ray.length()) }
     }
 
-    /// Between which slopes along `side` over those along `forward`, unit vectors, lines through
-    /// the eye can meet the blob out to `reach` σ; `c` is its place from there. All where it
-    /// reaches beside the eye, or is behind.
+    /// Returns the slopes along `side` over `forward`, unit vectors, between which lines through
+    /// the eye can meet the blob out to `reach` σ. `c` is its centre from the eye. All slopes if
+    /// the blob reaches beside the eye or lies behind it.
     pub fn slopes(&self, c: DVec3, [side, forward]: [DVec3; 2], reach: f64) -> (f64, f64) {
         let at = DVec2::new(c.dot(side), c.dot(forward));
         if self.aspect == 1.0 {
             return disc_slopes(at, reach * self.sigma);
         }
-        // Of the planes n·x = 0 those touch it that have (n·c)² = nᵀ S n, S its matrix: n = (1,
-        // −slope).
+        // The planes n·x = 0 with (n·c)² = nᵀ S n touch the blob, S its matrix and n = (1, −slope).
         let r = reach * self.sigma;
         let [s, f] = [side, forward].map(|axis| r * axis * self.axes());
         let shape =
@@ -98,7 +99,8 @@ impl Blob {
     }
 }
 
-/// Slopes between which lines through the eye can touch a disc of radius `reach` at (side, depth).
+/// Returns the slopes between which lines through the eye can touch a disc of radius `reach` at
+/// (side, depth).
 fn disc_slopes(at: DVec2, reach: f64) -> (f64, f64) {
     const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
     let sine = reach / at.x.hypot(at.y);
@@ -123,7 +125,7 @@ mod tests {
 
     #[test]
     fn depths_are_the_integrals_along_lines() {
-        // By sums along the line: dense trapezoids of a Gaussian are exact to rounding.
+        // Sums along the line: dense trapezoids of a Gaussian are exact to rounding.
         let integral = |blob: &Blob, c: DVec3, d: DVec3| {
             let unit = d.normalize();
             let step = 0.01;
@@ -159,8 +161,8 @@ mod tests {
             let (blob, c) = (blob(aspect), 40.0 * axes[1] + 7.0 * axes[0] + DVec3::Z);
             let (low, high) = blob.slopes(c, axes, 3.0);
             for (slope, name) in [(low, "low"), (high, "high")] {
-                // Of all lines with that slope, whatever their third one, the nearest passes at 3
-                // σ.
+                // Of all lines with that slope, whatever the third coordinate, the nearest passes
+                // at 3 σ.
                 let ray = |third: f64| axes[1] + slope * axes[0] + third * DVec3::Z;
                 let off = (-40_000..40_000)
                     .map(|k| blob.along(c, ray(2.5e-5 * f64::from(k))).off)
@@ -168,7 +170,7 @@ mod tests {
                 assert!((off - 3.0).abs() < 1e-5, "{aspect} {name} {off}");
             }
         }
-        // A flat one above the eye's height, beside, around and behind it.
+        // A flat blob above the eye's height, beside, around and behind the eye.
         let flat = |c: DVec3| blob(0.1).slopes(c, [DVec3::Y, DVec3::Z], 3.0);
         let (low, high) = flat(DVec3::new(0.0, 1.0, 20.0));
         assert!(low < 1.0 / 20.0 && high > 1.0 / 20.0 && high < 0.2, "{low} {high}");

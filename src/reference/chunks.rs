@@ -1,21 +1,22 @@
-//! chunks, model.md §11 "chunks": thin blobs composed near to far by blending under what is there,
-//! in f64, and a bound on what a device may differ that blends in f32 and shows the result in the
-//! film's format. In: blobs and eye relative to O, an order far to near. Out: as `sprites`, of
-//! which it is the same picture.
+//! Sprites in chunks, model.md §11 "chunks": thin blobs composed near to far by blending each layer
+//! under the picture, in f64, with a bound on what a device may differ that blends in f32.
+//!
+//! In: blobs and eye relative to O, an order far to near. Out: the same picture as `sprites`.
 
 use glam::DVec3;
 
-use super::sprites::OpaquePixel;
+use super::composite::OpaquePixel;
+use super::sprites::Bounded;
 use super::tiles::{Composed, Composition, U, render_by};
 
-/// C ← C + (1 − A) α L, A ← A + (1 − A) α: the device keeps A, so what passes is off by a share of
-/// 1 and not of itself.
+/// Blends a layer: C ← C + (1 − A) α L, A ← A + (1 − A) α. The device stores A, so the error of the
+/// transmittance is a share of 1, not of itself.
 fn under(pixel: &mut Composed, alpha: f64, off: f64, radiance: DVec3) {
     let here = pixel.passed * alpha;
     let inherited = pixel.off_passed * (alpha + off) + pixel.passed * off;
     // Blending need only be faithful, 2 U an operation: 1 − A, the product, the sum.
     let off_here = inherited + 4.0 * U * (here + inherited);
-    // And α L before them, correctly rounded.
+    // α L before them is correctly rounded.
     let off_shine = radiance.abs() * (off_here + U * (here + inherited));
     pixel.off_color += off_shine;
     pixel.color += here * radiance;
@@ -28,10 +29,11 @@ fn under(pixel: &mut Composed, alpha: f64, off: f64, radiance: DVec3) {
         4.0 * U * (here + off_here) + 2.0 * U * (1.0 - pixel.passed + pixel.off_passed);
 }
 
-/// The picture over `behind`, a pixel each, and per channel a bound on what the device may differ.
-pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+/// Returns the picture over `behind`, one a pixel, and per channel a bound on what the device may
+/// differ.
+pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> Bounded {
     let (values, mut bounds) = render_by(of, behind, under);
-    // It is blended over what stands behind in no fewer bits than the film's: source and factor are
+    // The result is blended over the background in at least the film's bits: source and factor are
     // rounded, too.
     let r = &of.rounding;
     for ((bound, value), under) in bounds.iter_mut().zip(&values).zip(behind) {
@@ -50,7 +52,9 @@ mod tests {
     use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
     use crate::reference::Blob;
-    use crate::reference::sprites::{Rounding, View, render_over as far_to_near};
+    use crate::reference::composite::Rounding;
+    use crate::reference::sprites::{Sprites, render_over as far_to_near};
+    use crate::reference::view::View;
 
     const VIEW: View = View {
         width: 1,
@@ -80,15 +84,8 @@ mod tests {
         behind: OpaquePixel,
     ) -> ([f64; 4], [f64; 4]) {
         let order: Vec<u32> = (0..blobs.len() as u32).collect();
-        let of = Composition {
-            view: &VIEW,
-            blobs,
-            radiance: colors,
-            order: &order,
-            factor: None,
-            rounding,
-            saturated: 0.0,
-        };
+        let sprites = Sprites { blobs, radiance: colors, order: &order, factor: None };
+        let of = Composition { view: &VIEW, sprites, rounding, saturated: 0.0 };
         let (values, bounds) = render_over(&of, &[behind]);
         (values[0], bounds[0])
     }
@@ -104,12 +101,16 @@ mod tests {
             assert!((v - by_hand).abs() < 1e-15, "{value:?}");
         }
         assert!(bound.iter().all(|b| *b > 0.0 && *b < 2e-6), "{bound:?}");
-        let (other, _) = far_to_near(&VIEW, &[behind], &blobs, &colors, &[0, 1], &Rounding::NONE);
+        let (other, _) = {
+            let sprites =
+                Sprites { blobs: &blobs, radiance: &colors, order: &[0, 1], factor: None };
+            far_to_near(&VIEW, &[behind], &sprites, &Rounding::NONE)
+        };
         assert!(value.iter().zip(other[0]).all(|(a, b)| (a - b).abs() < 1e-15));
     }
 
-    /// The recurrence in f32, rounded correctly at each step, lies within the bound, and a factor
-    /// of ten below what would be wide.
+    /// Checks that the recurrence in f32, rounded correctly at each step, stays within the bound,
+    /// and that the bound is not wide.
     #[test]
     fn f32_stays_within_the_bound() {
         let n = 4000;
@@ -123,7 +124,7 @@ mod tests {
             (c, a) = (c + (1.0 - a) * alpha, a + (1.0 - a) * alpha);
         }
         let off = (f64::from(c) - value[0]).abs().max((f64::from(a) - value[3]).abs());
-        // Each α is rounded to f32 as well: a share U of all that is opaque.
+        // Each α is rounded to f32 as well: a share U of the whole opacity.
         assert!(off <= bound[3] + U, "{off:e} {bound:?}");
         assert!(bound[3] < 2e-4, "{bound:?}");
     }

@@ -1,40 +1,53 @@
-//! The sums of C (13)–(16) over the tensors: model.md §7 and §11 "contract". In: T1 [light][row],
-//! T2 [light][column][row], the lights' energies, the columns' coefficients. Out: I_d and I_i (W
-//! m⁻²), L1 and L2 (W m⁻² sr⁻¹), RGB a facet.
+//! The sums of C (13)–(16) over the tensors, model.md §7 and §11 "contract".
+//!
+//! In: T1 [light][row], T2 [light][column][row], the lights' energies, the columns' coefficients.
+//! Out: I_d and I_i (W m⁻²), L1 and L2 (W m⁻² sr⁻¹), RGB a facet.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
-/// Both tensors; `n_columns` is 0 without the second reflection.
+/// Both tensors.
 #[derive(Debug, Clone, Copy)]
 pub struct Tensors<'a> {
+    /// T1. *Shape*: [light][row].
     pub t1: &'a [f64],
+    /// T2. *Shape*: [light][column][row].
     pub t2: &'a [f64],
+    /// Number of rows.
     pub n_rows: usize,
+    /// Number of columns; 0 without the second reflection.
     pub n_columns: usize,
 }
 
-/// A facet as a receiver: its row for the diffuse basis, how many rows on the next basis lies, c_0
-/// = K_d times the facet's colour, and c_b of its lobe.
+/// A facet as a receiver.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Receiver {
+    /// Row of the diffuse basis.
     pub row: usize,
+    /// Distance in rows from a basis to the next one.
     pub stride: usize,
+    /// c_0 = K_d times the facet's colour.
     pub albedo: DVec3,
+    /// c_b of the facet's lobe.
     pub lobe: Vec<DVec3>,
 }
 
+/// Light of a facet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reflected {
+    /// I_d.
     pub direct: DVec3,
+    /// I_i.
     pub indirect: DVec3,
+    /// L1 toward the eye.
     pub first: DVec3,
+    /// L2 toward the eye.
     pub second: DVec3,
 }
 
-/// `columns`: C, K_d or one channel of it, then K_s c_b(n_s), of every region. At least as many as
-/// T2 has.
+/// Contracts the tensors for one receiver. `columns` are C, then K_d or one channel of it, then K_s
+/// c_b(n_s), of every region; at least as many as T2 has.
 pub fn contract(
     tensors: &Tensors<'_>,
     energies: &[DVec3],

@@ -1,17 +1,16 @@
-//! How many of a cloud's particles are drawn, C (4)–(6), and what each of them counts for: model.md
-//! §3.
+//! Number of a cloud's particles that are drawn and their weights, C (4)–(6), model.md §3.
 
-/// n/n₀ as C prints it: (r/r₀)³ (1 − α), α = 1 − e^{p/a}, p = −d/d₀; over its value at d₀ and r₀
-/// where `normalised`.
+/// Returns n/n₀ as C prints it: (r/r₀)³ (1 − α), α = 1 − e^{p/a}, p = −d/d₀. If `normalised` it is
+/// divided by its value at d₀ and r₀.
 pub fn printed(d_over_d0: f64, r_over_r0: f64, a: f64, normalised: bool) -> f64 {
     let kept = |d: f64| 1.0 + libm::expm1(-d / a);
     let share = r_over_r0 * r_over_r0 * r_over_r0 * kept(d_over_d0);
     if normalised { share / kept(1.0) } else { share }
 }
 
-/// Factor on the κ of each of a group's `n` particles where n/n₀ = `share`: 1 for whole ones, the
-/// rest for the last, 0 for those that are not drawn; all over the share where `conserve`, and none
-/// more than n.
+/// Returns the factor on κ of each of a group's `n` particles where n/n₀ = `share`: 1 for whole
+/// particles, the remainder for the last, 0 for those not drawn. With `conserve` all are divided by
+/// the share, by at most n.
 pub fn weights(n: u32, share: f64, conserve: bool) -> Vec<f64> {
     let share = share.min(1.0);
     let x = f64::from(n) * share;
@@ -30,7 +29,7 @@ mod tests {
         assert!((printed(1.0, 1.0, 280.0, false) - 0.996_434_941).abs() < 1e-9);
         assert_eq!(printed(1.0, 1.0, 280.0, true), 1.0);
         assert_eq!(printed(0.0, 1.0, 280.0, false), 1.0);
-        // At 280 ln 2 half are left; of a cloud twice as large eight times as many.
+        // At 280 ln 2 half are left; a cloud twice as large has eight times as many.
         let half = 280.0 * std::f64::consts::LN_2;
         assert!((printed(half, 1.0, 280.0, false) - 0.5).abs() < 1e-15);
         assert!((printed(half, 2.0, 280.0, false) - 4.0).abs() < 1e-14);
@@ -41,7 +40,7 @@ mod tests {
         assert_eq!(weights(4, 0.625, false), [1.0, 1.0, 0.5, 0.0]);
         assert_eq!(weights(4, 0.625, true), [1.6, 1.6, 0.8, 0.0]);
         assert_eq!(weights(4, 0.5, false), [1.0, 1.0, 0.0, 0.0]);
-        // Half a particle: half of all four.
+        // Half a particle stands for half of all four.
         assert_eq!(weights(4, 0.125, true), [2.0, 0.0, 0.0, 0.0]);
         assert_eq!((weights(3, 7.0, true), weights(0, 0.5, true)), (vec![1.0; 3], vec![]));
     }

@@ -1,39 +1,42 @@
-//! Which particles can show in a pixel at all, model.md §11 "cull".
-//! In: blobs and eye relative to O. Out: of each whether it is kept.
+//! Culling of particles that no pixel shows, model.md §11 "cull". In: blobs and eye relative to O.
+//! Out: whether each is kept.
 
 use glam::DVec3;
 
 use super::Blob;
-use super::sprites::View;
+use super::view::View;
 
-/// What a GPU may do with a particle.
+/// Permitted treatment of a particle by a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CullOutcome {
+    /// It must keep the particle.
     Kept,
+    /// It must leave the particle out.
     Culled,
-    /// So near to a decision that rounding, or what is kept for its sake, makes it.
+    /// It may do either: rounding or its tolerance decides.
     Uncertain,
 }
 
-/// How far a decision may be off.
+/// Tolerances of a device's decisions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CullTolerance {
-    /// Of a view depth, as a share of the distance.
+    /// Error of a view depth, as a share of the distance.
     pub depth: f64,
-    /// Of ln(τ₀/t).
+    /// Error of ln(τ₀/t).
     pub log: f64,
-    /// How much of its reach a silhouette may be taken to be larger, and by how many pixels its
-    /// rectangle.
+    /// Enlargement of the silhouette, as a share of its reach.
     pub growth: f64,
+    /// Enlargement of the rectangle, pixels.
     pub pixels: f64,
 }
 
 impl CullTolerance {
+    /// Exact decisions.
     pub const NONE: CullTolerance =
         CullTolerance { depth: 0.0, log: 0.0, growth: 0.0, pixels: 0.0 };
 }
 
-/// What may become of `blob`, κ with its weights.
+/// Returns what a device may do with `blob`, whose κ includes its weight.
 pub fn outcome(view: &View, blob: &Blob, slack: &CullTolerance) -> CullOutcome {
     // The silhouette is never taken to be smaller.
     let certain = CullTolerance { depth: -slack.depth, log: -slack.log, growth: 0.0, pixels: 0.0 };
@@ -44,8 +47,8 @@ pub fn outcome(view: &View, blob: &Blob, slack: &CullTolerance) -> CullOutcome {
     }
 }
 
-/// Whether `blob` can show where every decision is moved by `slack` toward "yes". A comparison with
-/// what is no number is "no".
+/// Returns whether `blob` can show if every decision is moved by `slack` toward showing.
+/// Comparisons with NaN do not show it.
 fn shows(view: &View, blob: &Blob, slack: &CullTolerance) -> bool {
     let c = blob.position - view.pose.position;
     let (depth, off) = (c.dot(view.pose.forward), slack.depth * c.length());
@@ -62,13 +65,13 @@ fn shows(view: &View, blob: &Blob, slack: &CullTolerance) -> bool {
     let (half_x, half_y) = view.half_slopes();
     let holds = |side: DVec3, half: f64, n: u32| {
         let (low, high) = blob.slopes(c, [side, view.pose.forward], reach);
-        // In pixels from the first one's edge; centres lie at i + ½.
+        // Pixels from the first one's edge; centres lie at i + ½.
         let at = |s: f64| 0.5 * (s / half + 1.0) * f64::from(n);
         let first = (at(low) - slack.pixels - 0.5).ceil().max(0.0);
         let last = (at(high) + slack.pixels - 0.5).floor().min(f64::from(n) - 1.0);
         first <= last
     };
-    // A row and its mirror image are alike but for their number.
+    // A row and its mirror image differ only in their number.
     holds(view.pose.right, half_x, view.width) && holds(-view.pose.up, half_y, view.height)
 }
 
@@ -100,13 +103,13 @@ mod tests {
     }
 
     #[test]
-    fn silhouettes_that_hold_a_centre_are_kept() {
+    fn blobs_over_a_pixel_centre_are_kept() {
         // Between four centres, and around one of them: at depth 10 a slope of ¼ is 2.5.
         assert_eq!(
             (of(0.0, 0.0, 10.0, 0.1), of(2.5, -2.5, 10.0, 0.1)),
             (CullOutcome::Culled, CullOutcome::Kept)
         );
-        // Reaches from 0 to the centres at ±¼: asin(3σ/10) = atan ¼, 3σ = 10/√17.
+        // The silhouette reaches from 0 to the centres at ±¼: asin(3σ/10) = atan ¼, 3σ = 10/√17.
         let sigma = 10.0 / 17f64.sqrt() / 3.0;
         assert_eq!(
             (of(0.0, 0.0, 10.0, 0.999 * sigma), of(0.0, 0.0, 10.0, 1.001 * sigma)),
@@ -126,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_thin_or_too_small_is_left_and_near_decisions_are_open() {
+    fn thin_and_small_blobs_are_culled_and_near_decisions_are_uncertain() {
         let blob =
             Blob { aspect: 1.0, position: DVec3::new(2.5, 2.5, -10.0), sigma: 1.0, kappa: 1.0 };
         let of = |view: View, slack: f64| {
@@ -146,7 +149,7 @@ mod tests {
             (of(thin(0.999), 0.01), of(thin(1.001), 0.01)),
             (CullOutcome::Uncertain, CullOutcome::Uncertain)
         );
-        // A pixel at depth 10 is 5 wide, σ a fifth of that.
+        // A pixel at depth 10 is 5 wide; σ is a fifth of that.
         let small = |smallest: f64| View { smallest, ..VIEW };
         assert_eq!(
             (of(small(0.199), 0.0), of(small(0.201), 0.0)),

@@ -1,42 +1,48 @@
-//! Facets of cloud particles, model.md §5 and §11 "facets": one a particle, or one a run of
-//! particles in Morton order taken as one blob; on the blob's shell, its normal from the density
-//! around it where that has a direction, else away from the cloud's centre. In: the density grid
-//! and the placed blobs. Out: positions relative to O, unit normals, areas in scene units².
+//! Facets of cloud particles, model.md §5 and §11 "facets". A facet lies on its blob's shell. Its
+//! normal follows the density's gradient if that has a direction, and otherwise points away from
+//! the cloud's centre.
+//!
+//! In: the density grid and the placed blobs. Out: positions relative to O, unit normals, areas in
+//! scene units².
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
 use super::Blob;
-use super::area::mean::each;
 use super::grid::{density, sample};
-use crate::model::cloud::{MIN_ASPECT, SIGMA_PER_RADIUS, SQRT_TAU};
+use super::parallel::parallel_map;
+use crate::model::cloud::{SIGMA_PER_RADIUS, SQRT_TAU};
 use crate::model::grid::GridSpec;
 
-/// Radius of the quadrature's sphere, in σ: points at √5 s integrate a Gaussian of standard
-/// deviation s = 2σ to degree 5.
+/// Radius of the quadrature's sphere, σ: points at √5 s integrate a Gaussian of standard deviation
+/// s = 2σ to degree 5.
 pub const GRADIENT_RADIUS_SIGMA: f64 = 4.472_135_954_999_58;
-/// A facet's distance from its blob's centre, in σ.
+/// Distance of a facet from its blob's centre, σ.
 pub const SHELL_SIGMA: f64 = 1.5;
-/// Conditioning q below which only the cloud's centre decides, and above which only the gradient
-/// does.
+/// Range of the conditioning q: below, only the cloud's centre decides the normal; above, only the
+/// gradient.
 pub const CONDITIONING: (f64, f64) = (0.02, 0.10);
 /// Weights of the 14-point quadrature of degree 5 on the sphere: 6/15 + 8·3/40 = 1.
 const AXIS_WEIGHT: f64 = 1.0 / 15.0;
 const CORNER_WEIGHT: f64 = 3.0 / 40.0;
 
+/// A facet that receives and reflects light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facet {
+    /// Centre.
     pub position: DVec3,
+    /// Unit normal.
     pub normal: DVec3,
+    /// Area, scene units².
     pub area: f64,
-    /// Number of the cloud.
+    /// Index of the region; of the cloud in this module.
     pub region: u32,
-    /// q = |G|/S: 0 where the density around has no direction, at most 1.
+    /// q = |G|/S, from 0, where the density has no direction, to 1.
     pub conditioning: f64,
 }
 
-/// The 14 directions and their weights.
+/// Returns the quadrature's 14 directions with their weights.
 pub fn directions() -> [(DVec3, f64); 14] {
     let corner = 1.0 / 3f64.sqrt();
     std::array::from_fn(|i| {
@@ -49,14 +55,14 @@ pub fn directions() -> [(DVec3, f64); 14] {
     })
 }
 
-/// G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of ρ smoothed by a Gaussian of 2σ, and S
-/// = Σ w ρ(p + 2√5 σ A d); A = diag(1, a, 1) makes of the sphere the blob's own shape, and the
-/// gradient is one in the space where that is a ball (§14).
+/// Returns G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of ρ smoothed by a Gaussian of
+/// 2σ, and S = Σ w ρ(p + 2√5 σ A d). A = diag(1, a, 1) gives the sphere the blob's shape, so that
+/// the gradient is one in the space where the blob is a ball (§14).
 pub fn gradient(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
     gradient_of(|x| sample(spec, cells, x), p, sigma, aspect)
 }
 
-/// The same of any density ρ.
+/// Returns G and S of any density ρ.
 fn gradient_of(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
     let axes = DVec3::new(1.0, aspect, 1.0);
     directions().iter().fold((DVec3::ZERO, 0.0), |(g, s), &(d, w)| {
@@ -65,7 +71,8 @@ fn gradient_of(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64, aspect: f64
     })
 }
 
-/// Unit normal and conditioning q of a blob at `p` in a cloud about `center`.
+/// Returns the unit normal and the conditioning q of a blob of shape (σ, aspect) at `p` in a cloud
+/// about `center`.
 pub fn normal(
     spec: &GridSpec,
     cells: &[f64],
@@ -73,11 +80,11 @@ pub fn normal(
     [sigma, aspect]: [f64; 2],
     center: DVec3,
 ) -> (DVec3, f64) {
-    toward_less(gradient(spec, cells, p, sigma, aspect), aspect, p, center)
+    blended_normal(gradient(spec, cells, p, sigma, aspect), aspect, p, center)
 }
 
-/// The unit normal down the gradient G beside S, and q.
-fn toward_less((g, s): (DVec3, f64), aspect: f64, p: DVec3, center: DVec3) -> (DVec3, f64) {
+/// Returns the unit normal from the gradient G and the sum S, and q.
+fn blended_normal((g, s): (DVec3, f64), aspect: f64, p: DVec3, center: DVec3) -> (DVec3, f64) {
     let away = (p - center).try_normalize().unwrap_or(DVec3::Y);
     let q = if s > 0.0 { g.length() / s } else { 0.0 };
     let t = smoothstep(CONDITIONING, q);
@@ -86,15 +93,17 @@ fn toward_less((g, s): (DVec3, f64), aspect: f64, p: DVec3, center: DVec3) -> (D
     ((t * down + (1.0 - t) * away).try_normalize().unwrap_or(away), q)
 }
 
-/// GLSL's smoothstep: the cubic with zero slope at both ends.
+/// Returns the cubic step with zero slope at both ends, as GLSL's smoothstep.
 pub fn smoothstep(ends: (f64, f64), x: f64) -> f64 {
     let t = ((x - ends.0) / (ends.1 - ends.0)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// π R² w (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ a/w, w the mean of an ellipsoid's areas, seen from
-/// all directions, over that of a ball of R: by Thomsen's formula ((1 + 2 a^p)/3)^{1/p}, p =
-/// 1.6075, within 1.1 % of a quarter of its surface.
+/// Returns the area of a facet: π R² w (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ a/w.
+///
+/// w is an ellipsoid's projected area, averaged over all directions, over that of a ball of R. It
+/// is taken from Thomsen's formula ((1 + 2 a^p)/3)^{1/p}, p = 1.6075, which is within 1.1 % of a
+/// quarter of the surface.
 pub fn area(blob: &Blob) -> f64 {
     const P: f64 = 1.6075;
     let radius = blob.sigma / SIGMA_PER_RADIUS;
@@ -103,162 +112,68 @@ pub fn area(blob: &Blob) -> f64 {
     -PI * radius * radius * wider * libm::expm1(-depth)
 }
 
-/// Where the shell of 1.5 σ of a blob about `p` has the normal `n`.
+/// Returns the point of a blob's shell of 1.5 σ where the normal is `n`.
 fn shell(p: DVec3, [sigma, aspect]: [f64; 2], n: DVec3) -> DVec3 {
     let to = DVec3::new(n.x, aspect * aspect * n.y, n.z);
     p + SHELL_SIGMA * sigma / n.dot(to).sqrt() * to
 }
 
-/// One facet a blob. `sigma_means[j]` is the mean σ of blob j's group, which bounds the scale of
-/// its facet from below; `regions[j]` its cloud; `cloud_centers` are relative to O.
+/// The particles that facets are made of. *Shape*: all by particle.
+#[derive(Debug, Clone, Copy)]
+pub struct FacetSources<'a> {
+    /// Placed blobs.
+    pub blobs: &'a [Blob],
+    /// Mean σ of each particle's group, which bounds the scale of its facet from below.
+    pub sigma_means: &'a [f64],
+    /// Index of each particle's cloud.
+    pub regions: &'a [u32],
+    /// Colours, linear RGB.
+    pub colors: &'a [DVec3],
+}
+
+/// Returns one facet a blob, with normals from the density grid. `cloud_centers` are relative to
+/// the lighting origin.
 pub fn facets(
     spec: &GridSpec,
     cells: &[f64],
-    blobs: &[Blob],
-    sigma_means: &[f64],
-    regions: &[u32],
+    sources: &FacetSources<'_>,
     cloud_centers: &[DVec3],
 ) -> Vec<Facet> {
-    let of = |p: DVec3, [sigma, aspect]: [f64; 2]| gradient(spec, cells, p, sigma, aspect);
-    let facet = |(i, blob): (usize, &Blob)| {
-        let center = cloud_centers[regions[i] as usize];
-        facet_of(blob, blob.sigma.max(sigma_means[i]), regions[i], center, of)
-    };
-    blobs.iter().enumerate().map(facet).collect()
+    let facet = |i| facet_of(sources, i, cloud_centers, |x| sample(spec, cells, x));
+    (0..sources.blobs.len()).map(facet).collect()
 }
 
-/// One facet a blob, its normal from the blobs' own density Σ κ e^{−|x − p|²/2σ²} in place of a
-/// grid's.
-pub fn closed(
-    blobs: &[Blob],
-    sigma_means: &[f64],
-    regions: &[u32],
-    cloud_centers: &[DVec3],
-) -> Vec<Facet> {
-    let of =
-        |p: DVec3, [sigma, aspect]: [f64; 2]| gradient_of(|x| density(blobs, x), p, sigma, aspect);
-    each(blobs.len(), |i| {
-        let (blob, center) = (&blobs[i], cloud_centers[regions[i] as usize]);
-        facet_of(blob, blob.sigma.max(sigma_means[i]), regions[i], center, of)
+/// Returns one facet a blob, with normals from the blobs' own density instead of a grid's.
+pub fn from_density(sources: &FacetSources<'_>, cloud_centers: &[DVec3]) -> Vec<Facet> {
+    parallel_map(sources.blobs.len(), |i| {
+        facet_of(sources, i, cloud_centers, |x| density(sources.blobs, x))
     })
 }
 
 fn facet_of(
-    blob: &Blob,
-    scale: f64,
+    sources: &FacetSources<'_>,
+    i: usize,
+    cloud_centers: &[DVec3],
+    density: impl Fn(DVec3) -> f64,
+) -> Facet {
+    let (blob, region) = (&sources.blobs[i], sources.regions[i]);
+    let shape = [blob.sigma.max(sources.sigma_means[i]), blob.aspect];
+    let center = cloud_centers[region as usize];
+    on_shell(blob.position, shape, area(blob), region, center, density)
+}
+
+/// Returns the facet on the shell of a blob of shape (σ, aspect) at `p`.
+pub(super) fn on_shell(
+    p: DVec3,
+    shape: [f64; 2],
+    area: f64,
     region: u32,
     center: DVec3,
-    gradient: impl Fn(DVec3, [f64; 2]) -> (DVec3, f64),
+    density: impl Fn(DVec3) -> f64,
 ) -> Facet {
-    let shape = [scale, blob.aspect];
-    let (normal, conditioning) =
-        toward_less(gradient(blob.position, shape), blob.aspect, blob.position, center);
-    Facet {
-        position: shell(blob.position, shape, normal),
-        normal,
-        area: area(blob),
-        region,
-        conditioning,
-    }
-}
-
-/// What facets of several particles are made of, by particle; `regions` and `cloud_centers` as for
-/// [`facets`].
-#[derive(Debug, Clone, Copy)]
-pub struct FacetSources<'a> {
-    pub blobs: &'a [Blob],
-    pub sigma_means: &'a [f64],
-    pub regions: &'a [u32],
-    pub colors: &'a [DVec3],
-}
-
-/// What a run of particles is as one blob.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MergedBlob {
-    /// p̄ = Σ m p/Σ m, m = κσ³a.
-    pub position: DVec3,
-    /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m); where some blobs are ellipsoids √(Σ m (σ² + (x² +
-    /// z²)/2)/Σ m) of p − p̄.
-    pub sigma: f64,
-    /// √(Σ m (a²σ² + y²)/Σ m) over that, or 1.
-    pub aspect: f64,
-    /// Mean σ̄ of the members' groups, by mass.
-    pub sigma_mean: f64,
-    pub area: f64,
-    /// Mean by area.
-    pub color: DVec3,
-}
-
-/// Weights that are all 0 count alike.
-fn weights(of: impl Iterator<Item = f64>) -> Vec<f64> {
-    let weights: Vec<f64> = of.collect();
-    let sum: f64 = weights.iter().sum();
-    let equal = 1.0 / weights.len() as f64;
-    weights.into_iter().map(|w| if sum > 0.0 { w / sum } else { equal }).collect()
-}
-
-/// The particles `run` as one; `ellipsoids`: some of the scene's blobs are no balls.
-pub fn bunch(m: &FacetSources<'_>, run: &[u32], ellipsoids: bool) -> MergedBlob {
-    let at = |i: &u32| m.blobs[*i as usize];
-    let by_mass = weights(run.iter().map(|i| at(i).mass()));
-    let areas: Vec<f64> = run.iter().map(|i| area(&at(i))).collect();
-    let by_area = weights(areas.iter().copied());
-    let position: DVec3 = run.iter().zip(&by_mass).map(|(i, w)| *w * at(i).position).sum();
-    let spread = |of: &dyn Fn(Blob, DVec3) -> f64| {
-        run.iter()
-            .zip(&by_mass)
-            .map(|(i, w)| w * of(at(i), at(i).position - position))
-            .sum::<f64>()
-            .sqrt()
-    };
-    let (sigma, aspect) = match (run, ellipsoids) {
-        ([one], _) => (at(one).sigma, at(one).aspect),
-        (_, false) => (spread(&|b, d| b.sigma.powi(2) + d.length_squared() / 3.0), 1.0),
-        (_, true) => {
-            let wide = spread(&|b, d| b.sigma.powi(2) + 0.5 * (d.x * d.x + d.z * d.z));
-            let high = spread(&|b, d| (b.aspect * b.sigma).powi(2) + d.y * d.y);
-            (wide, if wide > 0.0 { (high / wide).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT) } else { 1.0 })
-        }
-    };
-    MergedBlob {
-        position,
-        sigma,
-        aspect,
-        sigma_mean: run.iter().zip(&by_mass).map(|(i, w)| w * m.sigma_means[*i as usize]).sum(),
-        area: areas.iter().sum(),
-        color: run.iter().zip(&by_area).map(|(i, w)| *w * m.colors[*i as usize]).sum(),
-    }
-}
-
-/// One facet a run of `order`, and its colour. A run is [first, end), of one cloud's particles.
-pub fn grouped(
-    spec: &GridSpec,
-    cells: &[f64],
-    members: &FacetSources<'_>,
-    cloud_centers: &[DVec3],
-    order: &[u32],
-    runs: &[(u64, u64)],
-) -> Vec<(Facet, DVec3)> {
-    let ellipsoids = members.blobs.iter().any(|b| b.aspect != 1.0);
-    let of = |&(first, end): &(u64, u64)| {
-        let run = &order[first as usize..end as usize];
-        let b = bunch(members, run, ellipsoids);
-        let (shape, region) =
-            ([b.sigma.max(b.sigma_mean), b.aspect], members.regions[run[0] as usize]);
-        let (normal, conditioning) =
-            normal(spec, cells, b.position, shape, cloud_centers[region as usize]);
-        (
-            Facet {
-                position: shell(b.position, shape, normal),
-                normal,
-                area: b.area,
-                region,
-                conditioning,
-            },
-            b.color,
-        )
-    };
-    runs.iter().map(of).collect()
+    let gradient = gradient_of(density, p, shape[0], shape[1]);
+    let (normal, conditioning) = blended_normal(gradient, shape[1], p, center);
+    Facet { position: shell(p, shape, normal), normal, area, region, conditioning }
 }
 
 #[cfg(test)]
@@ -269,6 +184,14 @@ mod tests {
 
     const SPEC: GridSpec =
         GridSpec { aspect: 1.0, n_cells: UVec3::splat(50), cell: 0.2, low: DVec3::splat(-5.0) };
+
+    fn sources<'a>(
+        blobs: &'a [Blob],
+        sigma_means: &'a [f64],
+        regions: &'a [u32],
+    ) -> FacetSources<'a> {
+        FacetSources { blobs, sigma_means, regions, colors: &[] }
+    }
 
     fn ball() -> Vec<f64> {
         deposit(&SPEC, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 }])
@@ -311,9 +234,8 @@ mod tests {
         for p in [DVec3::new(1.0, 0.5, 0.3), DVec3::new(-0.7, 0.2, 1.5), DVec3::new(0.0, -2.0, 0.0)]
         {
             let (n, q) = normal(&SPEC, &cells, p, [0.4, 1.0], DVec3::new(3.0, 3.0, -3.0));
-            // q ≈ (2σ/3)|p|/1.2² > 0.1, so the gradient alone decides. Its direction is off by what
-            // the deposit's cut at 3σ makes of a ball (a cube: 0.27 %) and by cells of 0.2: below
-            // one degree.
+            // q ≈ (2σ/3)|p|/1.2² > 0.1, so the gradient alone decides. Its direction errs by the
+            // deposit's cut at 3σ (a cube: 0.27 %) and by cells of 0.2: below one degree.
             assert!(
                 q > CONDITIONING.1 && n.dot(p.normalize()) > 1f64.to_radians().cos(),
                 "{p} {n} {q}"
@@ -323,24 +245,26 @@ mod tests {
 
     #[test]
     fn in_closed_form_a_ball_has_the_gradient_of_its_gaussian() {
-        // Of one blob the quadrature's points lie at p + r d: along −∇ρ up to its degree, and
-        // exactly so by symmetry on an axis. Far from all blobs only the cloud's centre is left.
+        // For one blob the quadrature's points lie at p + r d: along −∇ρ up to its degree, and
+        // exactly so by symmetry on an axis. Far from all blobs only the cloud's centre counts.
         let blobs = [
             Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 },
             Blob { aspect: 1.0, sigma: 0.4, position: DVec3::X, kappa: 0.0 },
         ];
-        let facets = closed(&blobs, &[0.4, 0.4], &[0, 0], &[DVec3::new(0.0, 9.0, 0.0)]);
+        let facets =
+            from_density(&sources(&blobs, &[0.4, 0.4], &[0, 0]), &[DVec3::new(0.0, 9.0, 0.0)]);
         assert!(
             (facets[1].normal - DVec3::X).length() < 1e-12
                 && facets[1].conditioning > CONDITIONING.1
         );
         assert!((facets[1].position - DVec3::X * 1.6).length() < 1e-12);
-        // At its own centre nothing points anywhere: away from the cloud's.
+        // At its own centre the gradient vanishes: the normal points away from the cloud's.
         assert!((facets[0].normal + DVec3::Y).length() < 1e-12);
-        // A fine grid says the same.
+        // A fine grid gives the same.
         let off = [blobs[0], Blob { position: DVec3::new(0.9, -0.5, 0.3), ..blobs[1] }];
-        let by_grid = super::facets(&SPEC, &ball(), &off, &[0.4; 2], &[0; 2], &[DVec3::ZERO])[1];
-        let found = closed(&off, &[0.4; 2], &[0; 2], &[DVec3::ZERO])[1];
+        let by_grid =
+            super::facets(&SPEC, &ball(), &sources(&off, &[0.4; 2], &[0; 2]), &[DVec3::ZERO])[1];
+        let found = from_density(&sources(&off, &[0.4; 2], &[0; 2]), &[DVec3::ZERO])[1];
         assert!(found.normal.dot(by_grid.normal) > 1f64.to_radians().cos());
     }
 
@@ -369,9 +293,7 @@ mod tests {
         let facets = facets(
             &SPEC,
             &empty,
-            &[blob, blob],
-            &[0.0; 2],
-            &[1, 0],
+            &sources(&[blob, blob], &[0.0; 2], &[1, 0]),
             &[DVec3::new(1.0, 1.0, 4.0), DVec3::ONE],
         );
         assert_eq!(
@@ -382,65 +304,5 @@ mod tests {
         assert_eq!((facets[1].normal, facets[1].position.z), (DVec3::NEG_Z, 0.25));
         // τ₀ = √(2π); π·1.5²·(1 − e^{−2.5066…}) = 6.49216….
         assert!((facets[0].area - 2.25 * PI * (1.0 - (-2.506_628_274_631f64).exp())).abs() < 1e-11);
-    }
-
-    #[test]
-    fn a_run_is_one_blob_of_its_members() {
-        let blob =
-            |x: f64, sigma, kappa| Blob { aspect: 1.0, position: DVec3::X * x, sigma, kappa };
-        // Masses 2·1³ and 1·2³, 1 to 4: p̄ = 4, σ_g² = ((1 + 16/3) + 4 (4 + 1/3))/5 = 71/15.
-        let blobs =
-            [blob(0.0, 1.0, 2.0), blob(5.0, 2.0, 1.0), blob(1.0, 0.0, 1.0), blob(3.0, 1.0, 0.0)];
-        let colors = [DVec3::X, DVec3::Y, DVec3::ZERO, DVec3::ONE];
-        let members = FacetSources {
-            blobs: &blobs,
-            sigma_means: &[1.0, 6.0, 2.0, 4.0],
-            regions: &[0; 4],
-            colors: &colors,
-        };
-        let b = bunch(&members, &[0, 1], false);
-        assert!(
-            (b.position - DVec3::X * 4.0).length() < 1e-14 && (b.sigma_mean - 5.0).abs() < 1e-14
-        );
-        assert!((b.sigma.powi(2) - 71.0 / 15.0).abs() < 1e-14);
-        let (a0, a1) = (area(&blobs[0]), area(&blobs[1]));
-        assert!((b.area - a0 - a1).abs() < 1e-13);
-        assert!((b.color - DVec3::new(a0, a1, 0.0) / (a0 + a1)).length() < 1e-15);
-        // Neither of the last two has mass or area: they count alike.
-        let b = bunch(&members, &[2, 3], false);
-        assert_eq!(
-            (b.position, b.sigma_mean, b.area, b.color),
-            (DVec3::X * 2.0, 3.0, 0.0, DVec3::splat(0.5))
-        );
-        // (0 + 1)/2 + 1/3.
-        assert!((b.sigma.powi(2) - 5.0 / 6.0).abs() < 1e-15);
-    }
-
-    #[test]
-    fn runs_of_one_are_the_particles_facets() {
-        let cells = ball();
-        let blob = |x: f64| Blob {
-            aspect: 1.0,
-            position: DVec3::new(x, 0.4, -0.3),
-            sigma: 0.3 + 0.1 * x,
-            kappa: 1.0,
-        };
-        let (blobs, means, regions) =
-            ([blob(0.5), blob(-1.0), blob(2.0)], [0.1, 0.4, 0.2], [0, 1, 1]);
-        let centers = [DVec3::Y, DVec3::Z];
-        let colors = [DVec3::X; 3];
-        let members =
-            FacetSources { blobs: &blobs, sigma_means: &means, regions: &regions, colors: &colors };
-        let single = facets(&SPEC, &cells, &blobs, &means, &regions, &centers);
-        let of_runs =
-            grouped(&SPEC, &cells, &members, &centers, &[0, 2, 1], &[(0, 1), (1, 2), (2, 3)]);
-        for ((facet, color), i) in of_runs.into_iter().zip([0, 2, 1]) {
-            // √σ² is σ to an ulp.
-            assert!((facet.position - single[i].position).length() < 1e-14 && color == DVec3::X);
-            assert!(
-                (facet.normal - single[i].normal).length() < 1e-13 && facet.area == single[i].area
-            );
-            assert_eq!(facet.region, single[i].region);
-        }
     }
 }

@@ -1,6 +1,7 @@
-//! The first reflection, C (15) and §2.5 (2), diffuse basis only: model.md §7 and §11 "first". In:
-//! positions and normals, transmittance [facet × light], lights relative to O. Out: irradiance (W
-//! m⁻²) and radiance L1 (W m⁻² sr⁻¹), RGB a facet.
+//! The first reflection, C (15) and §2.5 (2), diffuse basis only: model.md §7 and §11 "first".
+//!
+//! In: positions and normals, transmittance [facet][light], lights relative to O. Out: irradiance
+//! (W m⁻²) and radiance L1 (W m⁻² sr⁻¹), RGB a facet.
 
 use std::f64::consts::PI;
 
@@ -9,7 +10,7 @@ use glam::DVec3;
 use crate::model::basis;
 use crate::model::light::Light;
 
-/// I_d,j = Σ_l E_l f_l(n_j, V(j, l)).
+/// Returns I_d,j = Σ_l E_l f_l(n_j, V(j, l)).
 pub fn irradiance(
     positions: &[DVec3],
     normals: &[DVec3],
@@ -27,7 +28,8 @@ pub fn irradiance(
     positions.iter().zip(normals).enumerate().map(at).collect()
 }
 
-/// L1_j = K_d c_j I_d,j/π: `kd` by region, `colors` by facet (1 for boxes and surfaces).
+/// Returns L1_j = K_d c_j I_d,j/π, with `kd` by region and `colors` by facet (1 for boxes and
+/// surfaces).
 pub fn radiance(
     irradiance: &[DVec3],
     regions: &[u32],
@@ -39,9 +41,11 @@ pub fn radiance(
     irradiance.iter().zip(regions).zip(colors).map(of).collect()
 }
 
-/// One row after the other of T1 for a facet: g/π, then g v_b(γ) for every vector of the basis
-/// ([`basis::evaluate`]'s tables), γ between the normal and the half vector of `toward` the light
-/// and `outgoing`; 0 for the sky, and where the eye is behind the facet (model.md §11 "contract").
+/// Returns the rows of T1 of a facet: g/π, then g v_b(γ) for every vector of the basis
+/// ([`basis::evaluate`]'s tables).
+///
+/// γ lies between the normal and the half vector of `toward` the light and `outgoing`. Lobes are 0
+/// for the sky, and where the eye is behind the facet (model.md §11 "contract").
 pub fn responses(
     light: &Light,
     g: f64,
@@ -100,7 +104,7 @@ mod tests {
         assert!((l[0] - DVec3::new(1.5, 0.375, 0.0)).length() < 1e-15 && l[1] == DVec3::ZERO);
     }
     #[test]
-    fn a_point_light_is_as_near_as_the_facet_has_it() {
+    fn a_point_light_falls_off_with_the_facets_distance() {
         let light = Light::Point {
             position: DVec3::new(0.0, 3.0, 0.0),
             intensity: DVec3::splat(PI),
@@ -116,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn responses_are_the_bases_at_their_angle_and_nothing_from_the_sky_or_to_behind() {
+    fn lobes_respond_at_their_angle_but_not_to_the_sky_or_behind() {
         // v_1 = t over its nodes. Light straight above, eye at 60° from it: the half vector lies at
         // γ = 30°.
         let ramp: Vec<f64> = (0..basis::N_NODES).map(basis::node_t).collect();

@@ -1,43 +1,52 @@
-//! Particles from boxes: P (1)–(11) and Fig. 1, both forms, as model.md §1 and §11 "generate" spell
-//! them out. In: a box, its number within its cloud, the cloud's seed. Out: positions relative to
-//! the box's centre (scene units), radii before `radius_scale`, σ and κ after it. `rounding.rs`
-//! bounds what an f32 evaluation may differ.
+//! Particles from boxes: P (1)–(11) and Fig. 1 in both forms, as in model.md §1 and §11 "generate".
+//!
+//! In: a box, its index within its cloud, the cloud's seed. Out: positions relative to the box's
+//! centre (scene units), radii before `radius_scale`, σ and κ after it. `rounding.rs` bounds what
+//! an f32 evaluation may differ.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
 
 use crate::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, radius_factor, radius_shape};
-use crate::model::cloud::{Cloud, CloudSource, Group, Particle, SIGMA_PER_RADIUS, box_kappa};
+use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
 use crate::model::philox::{philox4x32_10, uniform};
 
+/// A particle relative to its group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Generated {
-    /// Relative to the group's origin: the box's centre, or the centre of a particle list's bounds.
+    /// Position relative to the group's origin: the box's centre, or the centre of a particle
+    /// list's bounds.
     pub position: DVec3,
     /// R of P (11), before `radius_scale`.
     pub radius: f64,
+    /// σ along x and z.
     pub sigma: f64,
+    /// σ along y over σ along x and z.
     pub aspect: f64,
+    /// Peak extinction per unit length.
     pub kappa: f64,
-    /// Attempts made, the kept one included; 0 where a particle was given and not generated.
+    /// Number of attempts, the accepted one included; 0 for a particle that was given.
     pub n_attempts: u32,
+    /// Whether all attempts failed and the last was folded into the box.
     pub folded: bool,
-    /// How far the closest of the particle's accept/reject decisions was from turning out the other
-    /// way: over the attempts the least [`decision_margin`]. Infinite where nothing was decided.
+    /// Least [`decision_margin`] over the attempts; infinite without attempts.
     pub margin: f64,
 }
 
-/// Sums over some particles: the results that model.md §1 asks for.
+/// Acceptance counts over some particles, model.md §1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Acceptance {
+    /// Number of attempts.
     pub n_attempts: u64,
-    /// Particles whose last attempt lay inside; the others were folded.
+    /// Number of particles whose last attempt lay inside the box.
     pub n_accepted: u64,
+    /// Number of particles that were folded.
     pub n_folded: u64,
 }
 
 impl Acceptance {
+    /// Counts the attempts of `particles`.
     pub fn of(particles: &[Generated]) -> Acceptance {
         let n_attempts = particles.iter().map(|p| u64::from(p.n_attempts)).sum();
         let n_folded = particles.iter().filter(|p| p.folded).count() as u64;
@@ -45,19 +54,20 @@ impl Acceptance {
         Acceptance { n_attempts, n_accepted: n_made - n_folded, n_folded }
     }
 
-    /// Accepted over made attempts; `None` without attempts.
+    /// Returns accepted over all attempts; `None` without attempts.
     pub fn rate(&self) -> Option<f64> {
         (self.n_attempts > 0).then(|| self.n_accepted as f64 / self.n_attempts as f64)
     }
 }
 
-/// u₁…u₄ of one attempt: the words of Philox(key = (seed, box), counter = (particle, attempt, 0,
-/// 0)).
+/// Returns u₁…u₄ of one attempt: the words of Philox(key = (seed, box), counter = (particle,
+/// attempt, 0, 0)).
 pub fn uniforms(seed: u32, i_box: u32, i_particle: u32, attempt: u32) -> [f64; 4] {
     philox4x32_10([seed, i_box], [i_particle, attempt, 0, 0]).map(uniform)
 }
 
-/// Offset from the box's centre that one attempt proposes, P (1)–(7); scene units.
+/// Returns the offset from the box's centre that one attempt proposes, scene units. *Source*: P
+/// (1)–(7).
 pub fn offset(extent: DVec3, form: Form, u: [f64; 3]) -> DVec3 {
     // P (1)–(3).
     let spread = |u: f64, length: f64| match form {
@@ -80,17 +90,17 @@ pub fn offset(extent: DVec3, form: Form, u: [f64; 3]) -> DVec3 {
     }
 }
 
-/// Fig. 1: inside the box, faces included.
+/// Returns whether `v` lies inside the box, faces included. *Source*: P, Fig. 1.
 pub fn is_inside(v: DVec3, half: DVec3) -> bool {
     v.abs().cmple(half).all()
 }
 
-/// How far the decision on offset `v` is from its opposite: inside, the distance to the nearest
-/// face; outside, the farthest that any axis sticks out, because all those that do would have to
-/// move in.
+/// Returns how far the decision on offset `v` is from its opposite. Inside it is the distance to
+/// the nearest face; outside it is the greatest excess of an axis, since all axes that exceed would
+/// have to move in.
 pub fn decision_margin(v: DVec3, half: DVec3) -> f64 {
     let out = v.abs() - half;
-    // The same expression serves both: inside, every entry is negative and the largest is the
+    // The same expression serves both: inside, every entry is negative and the greatest is the
     // nearest face.
     out.max_element().abs()
 }
@@ -104,12 +114,12 @@ pub fn fold(v: f64, half: f64) -> f64 {
     if w <= 2.0 * half { w - half } else { 3.0 * half - w }
 }
 
-/// P (8)–(11): radius of a particle from its u₄, before `radius_scale`.
+/// Returns the radius of a particle from its u₄, before `radius_scale`. *Source*: P (8)–(11).
 pub fn radius(form: Form, radius_max: f64, u: f64) -> f64 {
     radius_factor(form, radius_max) * radius_shape(u * radius_max)
 }
 
-/// Particle `i_particle` of box `i_box`, its number within its cloud.
+/// Generates particle `i_particle` of box `i_box`, the box's index within its cloud.
 pub fn generate_particle(
     b: &CloudBox,
     i_box: u32,
@@ -151,7 +161,7 @@ pub fn generate_particle(
     }
 }
 
-/// All particles of a box.
+/// Generates all particles of a box.
 pub fn generate_box(
     b: &CloudBox,
     i_box: u32,
@@ -165,25 +175,7 @@ pub fn generate_box(
         .collect()
 }
 
-/// All particles of a cloud in the order of its groups; of a disc those of time 0.
-pub fn cloud(cloud: &Cloud) -> Vec<Generated> {
-    match &cloud.source {
-        CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
-            .iter()
-            .zip(0u32..)
-            .flat_map(|(b, i_box)| {
-                generate_box(b, i_box, cloud.seed, *form, *optical_depth, *radius_scale)
-            })
-            .collect(),
-        CloudSource::Particles(list) => {
-            let groups = cloud.groups(0, 0);
-            list.iter().map(|p| given(p, groups.first())).collect()
-        }
-        CloudSource::Disc(_) | CloudSource::Animated(_) => super::live::cloud(cloud, 0.0),
-    }
-}
-
-/// A particle of a list: nothing is drawn by lot, only its origin changes.
+/// Returns a particle of a list relative to its group's origin.
 pub(super) fn given(p: &Particle, group: Option<&Group>) -> Generated {
     Generated {
         position: p.position - group.map_or(DVec3::ZERO, |g| g.center),

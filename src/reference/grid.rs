@@ -1,7 +1,8 @@
 //! The density grid, model.md §8 and §11 "grid", "sample": blobs' mass deposited conservatively
-//! into cells, sampled trilinearly; and the closed form of the optical depth that the grid
-//! approximates. Densities are extinction per unit length; cell (x, y, z) is at index x + n_x (y +
-//! n_y z).
+//! into cells and sampled trilinearly, and the closed form of the optical depth that the grid
+//! approximates.
+//!
+//! Densities are extinction per unit length. Cell (x, y, z) is at index x + n_x (y + n_y z).
 
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::ops::RangeInclusive;
@@ -12,7 +13,7 @@ use libm::{erf, erfc};
 use super::Blob;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 
-/// Density of every cell. A blob none of whose cells exist, or with σ = 0 or κ = 0, deposits
+/// Returns the density of every cell. A blob outside the grid, or with σ = 0 or κ = 0, deposits
 /// nothing.
 pub fn deposit(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
     let n = spec.n_cells.as_usizevec3();
@@ -35,7 +36,7 @@ pub fn deposit(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
     cells
 }
 
-/// Cells that [`deposit`] adds to, over all blobs: what depositing them takes.
+/// Returns the number of cell updates of [`deposit`], over all blobs.
 pub fn n_deposited(spec: &GridSpec, blobs: &[Blob]) -> f64 {
     let n = spec.n_cells.as_usizevec3();
     let of_blob = |blob: &Blob| {
@@ -49,7 +50,7 @@ pub fn n_deposited(spec: &GridSpec, blobs: &[Blob]) -> f64 {
     blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
 }
 
-/// First to last cell of one axis within the cut; `None` where there is none.
+/// Returns the first to last cell of one axis within the cut; `None` if there is none.
 fn reached(p: f64, sigma: f64, low: f64, cell: f64, n: usize) -> Option<RangeInclusive<usize>> {
     let reach = DEPOSIT_CUT_SIGMA * sigma;
     let first = ((p - reach - low) / cell).floor().max(0.0);
@@ -57,12 +58,12 @@ fn reached(p: f64, sigma: f64, low: f64, cell: f64, n: usize) -> Option<RangeInc
     (p.is_finite() && first <= last).then_some(first as usize..=last as usize)
 }
 
-/// erf(3/√2): the share of a Gaussian within the cut, by which the weights are normalised.
+/// erf(3/√2): the share of a Gaussian within the cut, which normalises the weights.
 const WITHIN_CUT: f64 = 0.997_300_203_936_739_8;
 
-/// First cell and weights of one axis: the share of every existing cell in the Gaussian cut at ±3σ
-/// and normalised. They sum to 1, less what lies outside the grid, and change continuously with
-/// `p`. Empty where no cell exists within the cut, or `p` is not a number.
+/// Returns the first cell and the weights of one axis: each cell's share of the Gaussian cut at ±3σ
+/// and normalised. They sum to 1, less the part outside the grid, and change continuously with `p`.
+/// Empty if no cell lies within the cut, or `p` is NaN.
 pub fn axis_weights(p: f64, sigma: f64, low: f64, cell: f64, n: usize) -> (usize, Vec<f64>) {
     let Some(cells) = reached(p, sigma, low, cell, n) else { return (0, Vec::new()) };
     let edge = |i: usize| (low + cell * i as f64 - p) / sigma;
@@ -71,8 +72,8 @@ pub fn axis_weights(p: f64, sigma: f64, low: f64, cell: f64, n: usize) -> (usize
     (*cells.start(), cells.map(weight).collect())
 }
 
-/// Share of the unit normal distribution in [a, b]: ½[erf(b/√2) − erf(a/√2)], in its tails through
-/// erfc.
+/// Returns the share of the unit normal distribution in [a, b]: ½[erf(b/√2) − erf(a/√2)], by erfc
+/// in the tails.
 fn normal_share(a: f64, b: f64) -> f64 {
     let (s, t) = (a * FRAC_1_SQRT_2, b * FRAC_1_SQRT_2);
     let twice = if a > 0.0 {
@@ -85,7 +86,8 @@ fn normal_share(a: f64, b: f64) -> f64 {
     0.5 * twice
 }
 
-/// Density at `p`: trilinear between cell centres, 0 outside the hull of the outermost ones.
+/// Returns the density at `p`: trilinear between cell centres, 0 outside the hull of the outermost
+/// ones.
 pub fn sample(spec: &GridSpec, cells: &[f64], p: DVec3) -> f64 {
     let n = spec.n_cells.as_usizevec3();
     let at = (p - spec.low) / spec.edges() - DVec3::splat(0.5);
@@ -105,7 +107,7 @@ pub fn sample(spec: &GridSpec, cells: &[f64], p: DVec3) -> f64 {
     lerp(along_y(i0.z), along_y(i1.z), f.z)
 }
 
-/// ρ = Σ κ e^{−|x − p|²/2σ²} itself, closed form.
+/// Returns ρ = Σ κ e^{−|x − p|²/2σ²} in closed form.
 pub fn density(blobs: &[Blob], x: DVec3) -> f64 {
     let of_blob = |blob: &Blob| {
         let r2 = blob.whiten(x - blob.position).length_squared() / (blob.sigma * blob.sigma);
@@ -114,13 +116,15 @@ pub fn density(blobs: &[Blob], x: DVec3) -> f64 {
     blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
 }
 
-/// (Distance/σ)² from which a blob does not count: e^{−50} of its peak are left, which the sum of
-/// 10⁶ such does not show beside a rounding of 2⁻⁵³.
+/// (Distance/σ)² beyond which a blob is skipped: e^{−50} of its peak, which even summed over 10⁶
+/// blobs is below the rounding of 2⁻⁵³.
 const UNSEEN: f64 = 100.0;
 
-/// Optical depth through all blobs along p + s d, s in [0, `length`], d unit; `length` may be
-/// infinite. Closed form (model.md §8): κσ√(π/2) e^{−b²/2σ²} [erf((length − s₀)/√2σ) +
-/// erf(s₀/√2σ)], s₀ the foot of the centre on the line and b its distance.
+/// Returns the optical depth through all blobs along p + s d, s in [0, `length`], d unit; `length`
+/// may be infinite.
+///
+/// Closed form (model.md §8): κσ√(π/2) e^{−b²/2σ²} [erf((length − s₀)/√2σ) + erf(s₀/√2σ)], s₀ the
+/// foot of the centre on the line and b its distance.
 pub fn optical_depth_exact(blobs: &[Blob], p: DVec3, d: DVec3, length: f64) -> f64 {
     let of_blob = |blob: &Blob| {
         let c = blob.position - p;
@@ -129,7 +133,7 @@ pub fn optical_depth_exact(blobs: &[Blob], p: DVec3, d: DVec3, length: f64) -> f
             return 0.0;
         }
         let white = blob.whiten(d);
-        // The foot of the centre, and σ, along the line.
+        // Foot of the centre, and σ, along the line.
         let (foot, sigma) =
             (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
         line.tau() * normal_share(-foot / sigma, (length - foot) / sigma)
@@ -168,7 +172,7 @@ mod tests {
         let counts = blobs.map(|blob| n_deposited(&spec, &[blob]));
         assert_eq!(counts, [343.0, 27.0, 0.0, 0.0]);
         assert_eq!(n_deposited(&spec, &blobs), 370.0);
-        // Without mass nothing is left.
+        // Blobs without mass update no cell.
         assert_eq!(n_deposited(&spec, &[at(0.1, 0.0, 1.0), at(0.1, 0.5, 0.0)]), 0.0);
         // Twice as high, twice as many along y: ±3 is 4 to 16.
         assert_eq!(n_deposited(&spec, &[Blob { aspect: 2.0, ..blobs[0] }]), 7.0 * 13.0 * 7.0);
@@ -179,8 +183,7 @@ mod tests {
     #[test]
     fn deposit_keeps_mass_and_superposes() {
         let spec = spec(20, 0.5, -5.0);
-        // Small, large, cut by the grid's border, without size, without extinction, outside, not a
-        // number.
+        // Small, large, cut by the grid's border, without size, without extinction, outside, NaN.
         let blobs = [
             blob(0.1, 0.02, 3.0),
             blob(-1.0, 1.3, 0.7),
@@ -192,7 +195,7 @@ mod tests {
         ];
         let all = deposit(&spec, &blobs);
         let total = all.iter().sum::<f64>() * spec.cell_volume();
-        // Of the third the grid keeps what lies below x = 5, an eighth of σ beyond its centre: Φ
+        // The grid keeps the part of the third below x = 5, an eighth of σ beyond its centre: Φ
         // within the cut.
         let inside = 0.5 + 0.5 * erf(0.125 * FRAC_1_SQRT_2) / erf(3.0 * FRAC_1_SQRT_2);
         let expected = blobs[0].mass() + blobs[1].mass() + inside * blobs[2].mass();
@@ -248,8 +251,8 @@ mod tests {
     #[test]
     fn weights_sum_to_one_and_change_continuously() {
         assert!((WITHIN_CUT - erf(3.0 * FRAC_1_SQRT_2)).abs() < 1e-15);
-        // Through a whole cell in steps of 1e-4: a weight's slope is at most the density's maximum
-        // over σ, twice.
+        // Steps of 1e-4 through a whole cell: a weight's slope is at most twice the density's
+        // maximum over σ.
         let all = |k: i32| {
             let (first, weights) = axis_weights(9.5 + 1e-4 * f64::from(k), 0.9, 0.0, 1.0, 20);
             let mut cells = vec![0.0; 20];
@@ -319,10 +322,10 @@ mod tests {
             let cells = deposit(&spec, &[blob]);
             let start = DVec3::X * spec.low.x;
             let tau = transmit::optical_depth(&spec, &cells, start, DVec3::X, f64::INFINITY, 0.5);
-            // What the cut gives to the rest is no error of h: model.md's 0.54 %, on the two axes
+            // The mass that the cut moves is not an error of h: model.md's 0.54 %, on the two axes
             // across the line.
             let kept = erf(3.0 / 2f64.sqrt());
-            // The whole line: what its own axis cuts off is within the grid too.
+            // The whole line is meant: the part that its own axis cuts off is within the grid, too.
             let exact =
                 optical_depth_exact(&[blob], 10.0 * start, DVec3::X, f64::INFINITY) / (kept * kept);
             tau / exact - 1.0
@@ -345,7 +348,7 @@ mod tests {
         let density = cells.iter().sum::<f64>() * spec.cell.powi(3);
         assert!((density / SQRT_TAU.powi(3) - 1.0).abs() < 1e-12);
         assert_eq!(sample(&spec, &cells, DVec3::splat(9.0)), 0.0);
-        // Along the grid's diagonal density falls from the centre: no facet of it turns inward.
+        // Along the grid's diagonal density falls from the centre, so that no facet turns inward.
         let q = facets::gradient(&spec, &cells, DVec3::ONE, 0.5, 1.0).0;
         assert!(q.x < 0.0 && (q.x - q.y).abs() < 1e-12);
     }

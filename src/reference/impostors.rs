@@ -1,36 +1,41 @@
-//! A shell's picture seen from elsewhere, model.md §11 "impostors": where it shows a point,
-//! resampling, and which of the sorted particles are in it. In: pictures as [C_r, C_g, C_b, A],
-//! rows from the top; sorted entries. Out: the same.
+//! An impostor's picture seen from another view, model.md §11 "impostors": the mapping of points,
+//! resampling, and the partition of the sorted particles.
+//!
+//! In: pictures as [C_r, C_g, C_b, A], rows from the top; sorted entries. Out: the same.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::model::impostor::{Shell, View};
 
-/// Slopes at which `view` sees a point.
+/// Returns the slopes at which `view` sees a point.
 pub fn seen(view: &View, point: DVec3) -> DVec2 {
     let c = point - view.eye;
     DVec2::new(c.dot(view.right), c.dot(view.up)) / c.dot(view.forward)
 }
 
-/// Slopes at which `shell`'s picture shows a point to `now`: by the ray from where it was made to
-/// the plane.
+/// Returns the slopes at which `shell`'s picture shows a point to `now`: the ray from its own eye,
+/// ended at the plane.
 pub fn shown(shell: &Shell, now: &View, point: DVec3) -> DVec2 {
     let on_plane =
         shell.view.eye + shell.view.ray(seen(&shell.view, point)) / shell.inverse_depth();
     seen(now, on_plane)
 }
 
-/// A picture, its texels and how far its slopes go.
+/// A picture with the slopes of its edges.
 #[derive(Debug, Clone, Copy)]
 pub struct Picture<'a> {
+    /// Columns.
     pub width: u32,
+    /// Rows.
     pub height: u32,
+    /// Slopes of the right and upper edge.
     pub tangents: DVec2,
+    /// Texels, row 0 at the top.
     pub texels: &'a [[f64; 4]],
 }
 
-/// Weights of the four texels around a place a share `t` beyond the second of them: Catmull and
-/// Rom's cubic.
+/// Returns the weights of the four texels around a place `t` beyond the second one: Catmull–Rom's
+/// cubic.
 pub fn weights(t: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [
@@ -41,9 +46,9 @@ pub fn weights(t: f64) -> [f64; 4] {
     ]
 }
 
-/// What a place of the picture holds, and what it may be off by where the place is off by `place`
-/// texels and each sum by a share `rounding` of its terms. Texels are counted from the first one's
-/// centre; places beyond the edges are taken as at them.
+/// Resamples a picture at a place, and bounds the error where the place errs by `place` texels and
+/// each sum by a share `rounding` of its terms. Texels count from the first one's centre; places
+/// beyond the edges are clamped.
 pub fn sample(picture: &Picture<'_>, at: DVec2, place: f64, rounding: f64) -> ([f64; 4], [f64; 4]) {
     let last = DVec2::new(f64::from(picture.width), f64::from(picture.height)) - 1.0;
     let at = at.clamp(DVec2::ZERO, last);
@@ -53,7 +58,7 @@ pub fn sample(picture: &Picture<'_>, at: DVec2, place: f64, rounding: f64) -> ([
         |v: f64, k: usize, n: u32| (v + k as f64 - 1.0).clamp(0.0, f64::from(n) - 1.0) as usize;
     let (mut sum, mut size) = ([0.0; 4], [0f64; 4]);
     let (mut least, mut most) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
-    // One texel more on every side: which four are met may be decided by rounding.
+    // One texel more on every side, since rounding may decide which four are used.
     for j in 0..6 {
         for i in 0..6 {
             let [x, y] =
@@ -76,14 +81,14 @@ pub fn sample(picture: &Picture<'_>, at: DVec2, place: f64, rounding: f64) -> ([
     (clamped, bound)
 }
 
-/// What the cubic changes along one axis over a texel, at most, per difference of the greatest and
-/// the least of the texels it meets: half of Σ|w'|, where the weights' slopes sum to nothing. Σ|w'|
-/// is 1 at the texels and 3 between two of them; times 1.25, the most that Σ|w| of the other axis
-/// comes to.
+/// Bound on the cubic's change along one axis over a texel, per difference of the greatest and
+/// least texel used. It is half of Σ|w'|, as the weights' slopes sum to 0. Σ|w'| is 1 at the texels
+/// and at most 3 between them; 1.25 bounds Σ|w| of the other axis.
 const STEEPEST: f64 = 0.5 * 3.0 * 1.25;
 
-/// From pixel centres of a picture of `size` with `tangents` to places in `shell`'s picture, in
-/// texels from the first one's centre, by the homography of slopes.
+/// Returns the place in `shell`'s picture of a pixel's centre, by the homography of slopes. Pixels
+/// are those of a picture of `size` with `tangents`; places count in texels from the first one's
+/// centre.
 pub fn place_of(
     to_shell: &DMat3,
     size: [u32; 2],
@@ -97,9 +102,9 @@ pub fn place_of(
     0.5 * DVec2::new((x + 1.0) * f64::from(shell.width), (y + 1.0) * f64::from(shell.height)) - 0.5
 }
 
-/// Of the sorted entries [key, particle] those that are far, and those that are near: in the places
-/// of the others stands no particle. `members`: by particle whether it is in the shell; made anew
-/// from the keys where `cut` says the last that is.
+/// Divides the sorted entries [key, particle] into far and near ones; in each list an invalid
+/// particle stands in the place of the others. `members` holds 1 for every
+/// particle in the impostor. With `cut`, the last key of the impostor, it is computed first.
 pub fn part(entries: &[[u32; 2]], members: &mut [u32], cut: Option<u32>) -> [Vec<[u32; 2]>; 2] {
     if let Some(cut) = cut {
         members.fill(0);
@@ -134,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_far_is_a_prefix_and_stays_it() {
+    fn far_particles_are_a_prefix_and_stay_members() {
         let entries = [[3, 2], [5, 0], [5, 3], [9, 1]];
         let mut members = [7; 4];
         let [far, near] = part(&entries, &mut members, Some(5));

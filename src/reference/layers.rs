@@ -1,9 +1,10 @@
-//! How many blobs lie over each pixel: what of a picture takes time, before any of it is drawn.
+//! Number of blobs over each pixel, a measure of a picture's cost before anything is drawn.
 
 use super::Blob;
-use super::sprites::View;
+use super::view::View;
 
-/// In how many blobs' rectangles each pixel lies, out to `reach` σ: about how many layers it has.
+/// Returns the number of blobs in whose rectangles, out to `reach` σ, each pixel lies: about its
+/// number of layers.
 pub fn n_layers(view: &View, blobs: &[Blob], reach: f64) -> Vec<u32> {
     let (width, height) = (view.width as usize, view.height as usize);
     // Differences along rows and columns, with a place beyond either end.

@@ -1,5 +1,7 @@
-//! Particles of discs and their life, model.md §2, in f64: written from the page. In: a cloud and a
-//! time. Out: its particles relative to their group's centre.
+//! Particles of clouds at a time, model.md §1 and §2, in f64. Discs have a life and animations have
+//! keys; boxes and lists do not depend on the time.
+//!
+//! In: a cloud and a time. Out: its particles relative to their group's centre.
 
 use glam::DVec3;
 
@@ -8,49 +10,53 @@ use crate::model::cloud::{Cloud, CloudSource, SIGMA_PER_RADIUS};
 use crate::model::disc::{Dilution, Disc};
 use crate::model::philox::{philox4x32_10, uniform};
 
-/// "disc".
+/// Philox stream of discs.
 const STREAM: u32 = u32::from_be_bytes(*b"disc");
 
-/// What a time comes to in a slot: which of its particles lives, and the share of the period since
-/// its birth.
+/// Age of the particle in a slot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Age {
+    /// Number of the particle in its slot.
     pub generation: u32,
+    /// Share of the period since its birth.
     pub share: f64,
 }
 
-/// Of slot `i`: t/L in units of 2⁻³², whole periods apart, with the slot's own phase added.
+/// Returns the age in slot `i`: t/L in units of 2⁻³² with the slot's own phase added, whole periods
+/// apart.
 pub fn age(period_s: f64, time_s: f64, i: u32) -> Age {
-    // With the remainder from the division itself, which is exact, in integers wide enough for
-    // both.
+    // The remainder of the division is exact; i128 holds both parts.
     let rest = time_s.rem_euclid(period_s);
     let whole = ((time_s - rest) / period_s).round() as i128;
     let ticks = (whole << 32) + (rest / period_s * 2f64.powi(32)).floor() as i128;
-    // Bits of i behind the point, in reverse.
+    // Bits of i in reverse, behind the point.
     let phase: u64 = (0..32).filter(|b| i >> b & 1 == 1).map(|b| 1 << (31 - b)).sum();
     let sum = ticks + i128::from(phase);
     Age { generation: (sum >> 32) as u32, share: (sum & 0xFFFF_FFFF) as f64 / 2f64.powi(32) }
 }
 
-/// A particle of a disc, with what it was born with: for the laws that tests hold it to.
+/// A particle of a disc with its birth values, for the laws that tests check.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LiveParticle {
+    /// Age.
     pub age: Age,
-    /// u₁ … u₇.
+    /// Random numbers u₁ … u₇.
     pub u: [f64; 7],
-    /// Relative to the disc's centre.
+    /// Position at birth, relative to the disc's centre.
     pub birth: DVec3,
+    /// Position, relative to the disc's centre.
     pub position: DVec3,
-    /// At birth, and now.
+    /// σ at birth and now.
     pub sigmas: [f64; 2],
-    /// What is left of its warmth, K.
+    /// Remaining excess temperature, K.
     pub warmth: f64,
-    /// Share of its own lifetime that it has lived.
+    /// Share of its own lifetime that has passed.
     pub lived: f64,
+    /// Peak extinction per unit length.
     pub kappa: f64,
 }
 
-/// Slot `i` of a disc whose cloud has `seed` and `wind`.
+/// Returns the particle in slot `i` of a disc whose cloud has `seed` and `wind`.
 pub fn alive(disc: &Disc, seed: u32, wind: DVec3, i: u32, time_s: f64) -> LiveParticle {
     let age = age(disc.period_s, time_s, i);
     let words = |k| philox4x32_10([seed, STREAM], [i, age.generation, k, STREAM]).map(uniform);
@@ -104,17 +110,26 @@ fn smoothstep(v: f64) -> f64 {
     }
 }
 
-/// All particles of a cloud in the order of its groups, at `time_s`, which is that of discs and of
-/// what is moved alone. What cannot be read has no particles: whoever asks has read it before.
+/// Returns all particles of a cloud at `time_s`, in the order of its groups. Only discs and
+/// animations depend on the time. An animation that cannot be read has no particles; callers read
+/// it before.
 pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
     let groups = cloud.groups(0, 0);
     let disc = match &cloud.source {
         CloudSource::Disc(disc) => disc,
         CloudSource::Animated(m) => {
-            let particles = m.mover.at(time_s).unwrap_or_default();
+            let particles = m.animation.at(time_s).unwrap_or_default();
             return particles.iter().map(|p| generate::given(p, groups.first())).collect();
         }
-        CloudSource::Boxes { .. } | CloudSource::Particles(_) => return generate::cloud(cloud),
+        CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => {
+            let of = |(b, i): (_, u32)| {
+                generate::generate_box(b, i, cloud.seed, *form, *optical_depth, *radius_scale)
+            };
+            return boxes.iter().zip(0..).flat_map(of).collect();
+        }
+        CloudSource::Particles(list) => {
+            return list.iter().map(|p| generate::given(p, groups.first())).collect();
+        }
     };
     let center = groups.first().map_or(DVec3::ZERO, |g| g.center);
     let of = |i| {

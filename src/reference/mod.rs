@@ -1,15 +1,20 @@
-//! The f64 twin of every GPU pass, one room a pass, written from the mathematics (model.md), never
-//! from a shader.
+//! The f64 reference of every GPU pass, one module a pass, written from the mathematics (model.md)
+//! and not from a shader. The exception is [`emulation`], which says so.
 //!
-//! Each room is plain functions over slices and takes its stage's inputs as arguments, so that a
-//! test can feed it exactly what the GPU had and so measure one stage alone.
+//! Every module consists of functions over slices that take their stage's inputs as arguments. A
+//! test can pass exactly what the GPU had, and so measure one stage alone. [`picture`] puts the
+//! stages together.
 
 pub mod area;
 pub mod blob;
+mod bounded;
 pub mod chunks;
+pub mod composite;
 pub mod contract;
 pub mod count;
 pub mod cull;
+pub mod emulation;
+pub mod facet_runs;
 pub mod facets;
 pub mod first;
 pub mod generate;
@@ -19,11 +24,11 @@ pub mod layers;
 pub mod live;
 pub mod morton;
 pub mod occlude;
+pub mod parallel;
 pub mod picture;
 pub mod place;
 pub mod present;
 pub mod rounding;
-pub mod second;
 pub mod sort;
 pub mod sprites;
 pub mod surfaces;
@@ -34,6 +39,7 @@ pub mod tiles;
 pub mod transmit;
 pub mod upsample;
 pub mod upsample_bound;
+pub mod view;
 pub mod volume;
 
 pub use blob::Blob;

@@ -1,40 +1,41 @@
-//! Keys of a Morton order region by region, model.md §7 and §11 "morton".
+//! Keys of a Morton order within each region, model.md §7 and §11 "morton".
 
 use glam::DVec3;
 
 use super::sort;
 
-/// Bits of the region and of each axis in a key of 32 bits: what numbers `n_regions` regions, and a
-/// third of the rest, at most 10.
+/// Returns the bits of the region and of each axis in a 32-bit key: enough for `n_regions` regions,
+/// and a third of the rest, at most 10.
 pub fn key_bits(n_regions: u32) -> (u32, u32) {
     let region = (0..32).find(|b| 1u64 << b >= u64::from(n_regions)).unwrap_or(32);
     (region, ((32 - region) / 3).min(10))
 }
 
-/// Coordinates of `p` in cells of a region's bounds; an axis without extent has one cell.
+/// Returns the coordinates of `p` in cells of a region's bounds; an axis without extent has one
+/// cell.
 pub fn coordinates(p: DVec3, (low, high): (DVec3, DVec3), axis_bits: u32) -> [f64; 3] {
     let n = f64::from(1u32 << axis_bits);
     [0, 1, 2].map(|k| if high[k] > low[k] { (p[k] - low[k]) / (high[k] - low[k]) * n } else { 0.0 })
 }
 
-/// The cell of a coordinate: cut to the bounds, NaN in cell 0.
+/// Returns the cell of a coordinate, clamped to the bounds; NaN is in cell 0.
 pub fn cell(x: f64, axis_bits: u32) -> u32 {
-    // `as` saturates, and sends NaN to 0.
+    // `as` saturates, and converts NaN to 0.
     (x as u32).min((1 << axis_bits) - 1)
 }
 
-/// Morton code: bit b of x, y, z is bit 3b, 3b + 1, 3b + 2.
+/// Returns the Morton code: bit b of x, y, z is bit 3b, 3b + 1, 3b + 2.
 pub fn code(cells: [u32; 3]) -> u32 {
     let bit = |b: u32, k: usize| (cells[k] >> b & 1) << (3 * b + k as u32);
     (0..10).flat_map(|b| (0..3).map(move |k| bit(b, k))).sum()
 }
 
-/// The region above, the Morton code below.
+/// Returns the key: region above, Morton code below.
 pub fn key(region: u32, cells: [u32; 3], region_bits: u32) -> u32 {
     ((u64::from(region) << (32 - region_bits)) as u32) | code(cells)
 }
 
-/// The index at each place: `positions` ordered by key, ties by index. `bounds` by region.
+/// Returns the index at each place: `positions` ordered by key, ties by index. `bounds` by region.
 pub fn order(positions: &[DVec3], regions: &[u32], bounds: &[(DVec3, DVec3)]) -> Vec<u32> {
     let (region_bits, axis_bits) = key_bits(bounds.len() as u32);
     let key_of = |(p, &region): (&DVec3, &u32)| {
@@ -84,7 +85,7 @@ mod tests {
         let bounds = [(DVec3::ZERO, DVec3::splat(2.0)), (DVec3::ZERO, DVec3::ONE)];
         let corner =
             |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
-        // The eight octants' corners backwards, then one of the next region that no octant may
+        // The eight octants' corners backwards, then one of the next region, which no octant may
         // follow.
         let positions: Vec<DVec3> = (0..8).rev().map(corner).chain([DVec3::ZERO]).collect();
         let regions = [0, 0, 0, 0, 0, 0, 0, 0, 1];

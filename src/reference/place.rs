@@ -1,5 +1,6 @@
-//! From group-relative positions to positions relative to the lighting origin O: model.md §11
-//! "Frames of reference", §12, §13. All in f64; the GPU rounds the offset once and the sum once.
+//! Placement: from group-relative positions to positions relative to the lighting origin O,
+//! model.md §11 "Frames of reference", §12, §13. All in f64; the GPU rounds the offset once and the
+//! sum once.
 
 use glam::DVec3;
 
@@ -7,12 +8,13 @@ use super::Blob;
 use super::generate::Generated;
 use crate::model::cloud::{Cloud, Group};
 
-/// s(t) of model.md §13.
+/// Returns the scale s(t) of model.md §13.
 pub fn scale(cloud: &Cloud, time_s: f64) -> f64 {
     1.0 + (cloud.growth.to - 1.0) * (1.0 - (-time_s.max(0.0) / cloud.growth.time_s).exp())
 }
 
-/// Centre of every group relative to its cloud's origin, as the cloud has grown: c + s (x − c).
+/// Returns the centre of every group relative to its cloud's origin, as the cloud has grown: c + s
+/// (x − c).
 fn grown_centers(groups: &[Group], clouds: &[Cloud], time_s: f64) -> Vec<DVec3> {
     let centers: Vec<DVec3> = clouds.iter().map(Cloud::center).collect();
     let of = |g: &Group| {
@@ -22,7 +24,7 @@ fn grown_centers(groups: &[Group], clouds: &[Cloud], time_s: f64) -> Vec<DVec3> 
     groups.iter().map(of).collect()
 }
 
-/// What is relative to the groups, as the clouds have grown: positions and σ times s.
+/// Scales group-relative positions and σ by s, as the clouds have grown.
 pub fn grown(
     generated: &[Generated],
     groups: &[Group],
@@ -38,7 +40,7 @@ pub fn grown(
     generated.iter().zip(scales).map(of).collect()
 }
 
-/// Mean σ of each particle's group, as the cloud has grown.
+/// Returns the mean σ of each particle's group, as the cloud has grown.
 pub fn sigma_means(groups: &[Group], clouds: &[Cloud], time_s: f64) -> Vec<f64> {
     by_particle(groups, |g| g.sigma_mean * scale(&clouds[g.i_cloud], time_s)).collect()
 }
@@ -47,7 +49,7 @@ fn by_particle<T: Clone>(groups: &[Group], of: impl Fn(&Group) -> T) -> impl Ite
     groups.iter().flat_map(move |g| std::iter::repeat_n(of(g), g.n_particles as usize))
 }
 
-/// Offset of every group's particles: cloud origin(t) + group centre, as it has grown, − O.
+/// Returns the offset of every group's particles: cloud origin(t) + grown group centre − O.
 pub fn offsets(groups: &[Group], clouds: &[Cloud], time_s: f64, origin: DVec3) -> Vec<DVec3> {
     let centers = grown_centers(groups, clouds, time_s);
     groups
@@ -57,14 +59,13 @@ pub fn offsets(groups: &[Group], clouds: &[Cloud], time_s: f64, origin: DVec3) -
         .collect()
 }
 
-/// Centre of every cloud relative to O at `time_s`: what the facets' fallback normal points away
-/// from.
+/// Returns the point that the facets of every cloud face away from, relative to O at `time_s`.
 pub fn cloud_centers(clouds: &[Cloud], time_s: f64, origin: DVec3) -> Vec<DVec3> {
     clouds.iter().map(|c| c.origin_at(time_s) + c.facing_from() - origin).collect()
 }
 
-/// Placed positions (of grown ones): particle k of group g at positions[g.i_first + k] +
-/// offsets[g].
+/// Returns placed positions: particle k of group g at positions[g.i_first + k] + offsets[g].
+/// `positions` have grown.
 pub fn place(positions: &[DVec3], groups: &[Group], offsets: &[DVec3]) -> Vec<DVec3> {
     let mut placed = positions.to_vec();
     for (group, offset) in groups.iter().zip(offsets) {
@@ -76,9 +77,8 @@ pub fn place(positions: &[DVec3], groups: &[Group], offsets: &[DVec3]) -> Vec<DV
     placed
 }
 
-/// Adds the gusts of model.md §12 to placed positions: d(x, t) = Σ a sin(k·x + ω t + φ), x the
-/// particle at rest relative to its cloud's origin, as the cloud has grown. `rest` are the
-/// group-relative positions, grown.
+/// Adds the gusts to placed positions: d(x, t) = Σ a sin(k·x + ω t + φ), model.md §12. x is the
+/// particle at rest relative to its cloud's origin; `rest` are the grown group-relative positions.
 pub fn add_gusts(
     placed: &mut [DVec3],
     rest: &[DVec3],
@@ -99,20 +99,20 @@ pub fn add_gusts(
     }
 }
 
-/// Bound, axis by axis, on |f32 − f64| of a placed position: the position's own error, the offset
-/// rounded to f32 once (u|offset|), and the sum rounded once. That last rounding is of the
-/// *computed* sum, which lies within the two first errors of `placed`.
+/// Returns a bound, axis by axis, on |f32 − f64| of a placed position: the position's own error,
+/// the rounding of the offset (u|offset|), and the rounding of the sum. The sum that is rounded is
+/// the computed one, which lies within the first two errors of `placed`.
 pub fn placed_bound(position_bound: DVec3, offset: DVec3, placed: DVec3, u: f64) -> DVec3 {
     let inherited = position_bound + u * offset.abs();
     inherited + u * (placed.abs() + inherited)
 }
 
-/// Number of the cloud (the region) that each particle belongs to.
+/// Returns the index of the cloud (the region) of each particle.
 pub fn regions(groups: &[Group]) -> Vec<u32> {
     by_particle(groups, |g| g.i_cloud as u32).collect()
 }
 
-/// Generated particles at their placed positions.
+/// Returns generated particles at their placed positions.
 pub fn blobs(generated: &[Generated], placed: &[DVec3]) -> Vec<Blob> {
     generated
         .iter()
@@ -128,6 +128,7 @@ mod tests {
     use crate::model::growth::Growth;
     use crate::model::gust::Gust;
     use crate::model::texture::Texture;
+    use crate::reference::live;
 
     #[test]
     fn groups_are_placed_by_wind_centre_and_origin() {
@@ -163,8 +164,7 @@ mod tests {
         let offsets = offsets(&groups, &clouds, 10.0, origin);
         // Bounds of the first list: x from 2 to 6, centre 4; 10 s of wind along z.
         assert_eq!(offsets, [DVec3::new(3.0, 0.0, 9.0), DVec3::new(1e9 - 1.0, -1.0, -1.0)]);
-        let generated: Vec<Generated> =
-            clouds.iter().flat_map(super::super::generate::cloud).collect();
+        let generated: Vec<Generated> = clouds.iter().flat_map(|c| live::cloud(c, 0.0)).collect();
         let relative: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
         assert_eq!(relative, [DVec3::X * -2.0, DVec3::X * 2.0, DVec3::ZERO]);
         let placed = place(&relative, &groups, &offsets);
@@ -201,10 +201,10 @@ mod tests {
             seed: 0,
         };
         let (groups, clouds) = (cloud.groups(0, 0), [cloud.clone()]);
-        // After 1 s half the way from 1 to 3 is grown; about x = 2 the list lies from −2 to 10
+        // After 1 s half of the growth from 1 to 3 is done; about x = 2 the list lies from −2 to 10
         // then.
         assert!((scale(&cloud, 1.0) - 2.0).abs() < 1e-15 && scale(&cloud, -1.0) == 1.0);
-        let given = super::super::generate::cloud(&cloud);
+        let given = live::cloud(&cloud, 0.0);
         let grown = grown(&given, &groups, &clouds, 1.0);
         let positions: Vec<DVec3> = grown.iter().map(|g| g.position).collect();
         let placed = place(&positions, &groups, &offsets(&groups, &clouds, 1.0, DVec3::ZERO));
@@ -213,7 +213,7 @@ mod tests {
         }
         assert!((grown[0].sigma - 1.0).abs() < 1e-15 && grown[0].kappa == 1.0);
         assert!((sigma_means(&groups, &clouds, 1.0)[2] - 1.0).abs() < 1e-15);
-        // Its centre stays where it is.
+        // The cloud's centre stays where it is.
         assert_eq!(cloud_centers(&clouds, 1.0, DVec3::ZERO)[0], DVec3::new(2.0, 1.0, 1.0));
     }
 }

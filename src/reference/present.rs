@@ -1,6 +1,7 @@
-//! A picture as a display shows it, model.md §11 "present". In: premultiplied linear RGBA. Out:
-//! sRGB code values before they are rounded down: 255 times what `Film::display` gives, plus the
-//! dither. Of two pictures: either, a line between them, or how far they are apart.
+//! A picture as a display shows it, model.md §11 "present".
+//!
+//! In: premultiplied linear RGBA. Out: sRGB code values before they are rounded down: 255 times
+//! `Film::display`, plus the dither. Two pictures are shown side by side, or as their difference.
 
 use std::cmp::Ordering;
 
@@ -8,23 +9,24 @@ use glam::{DVec3, DVec4};
 
 use crate::model::film::{Film, dither, srgb_encode};
 
-/// What is shown of two pictures, A and B.
+/// View of two pictures, A and B.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Compared {
     /// A left of this column, B right of it.
     Split(i64),
-    /// How far they are apart, times this.
+    /// Their difference times this factor.
     Difference(f64),
     /// B alone.
     Second,
 }
 
-/// Of the pixel in column `x` and row `y`.
-pub fn code_values(film: &Film, x: usize, y: usize, pixel: DVec4) -> DVec3 {
+/// Returns the code values of the pixel in column `x` and row `y`.
+fn code_values(film: &Film, x: usize, y: usize, pixel: DVec4) -> DVec3 {
     255.0 * film.display(pixel.truncate(), pixel.w) + DVec3::splat(dither(x, y))
 }
 
-/// Of the two pixels `[a, b]` in column `x` and row `y`, `compared`; A alone where nothing is.
+/// Returns the code values of the pixels `[a, b]` in column `x` and row `y`, as `compared` says; A
+/// alone without it.
 pub fn compared_values(
     film: &Film,
     compared: Option<Compared>,
@@ -35,7 +37,9 @@ pub fn compared_values(
     match compared {
         None => code_values(film, x, y, a),
         Some(Compared::Second) => code_values(film, x, y, b),
-        Some(Compared::Difference(gain)) => apart(film, gain, [a, b]) + DVec3::splat(dither(x, y)),
+        Some(Compared::Difference(gain)) => {
+            scaled_difference(film, gain, [a, b]) + DVec3::splat(dither(x, y))
+        }
         Some(Compared::Split(column)) => match (x as i64).cmp(&column) {
             Ordering::Less => code_values(film, x, y, a),
             Ordering::Greater => code_values(film, x, y, b),
@@ -44,8 +48,8 @@ pub fn compared_values(
     }
 }
 
-/// gain |difference of the two over the background|, encoded, of 255.
-fn apart(film: &Film, gain: f64, [a, b]: [DVec4; 2]) -> DVec3 {
+/// Returns 255 times the encoded gain |difference of the two over the background|.
+fn scaled_difference(film: &Film, gain: f64, [a, b]: [DVec4; 2]) -> DVec3 {
     let over = |p: DVec4| film.exposure * (p.truncate() + (1.0 - p.w) * film.background);
     let far = gain * (over(a) - over(b)).abs();
     DVec3::from(far.to_array().map(|d| 255.0 * srgb_encode(if d.is_nan() { 1.0 } else { d })))
@@ -70,7 +74,7 @@ mod tests {
         // first threshold is 1/128.
         let value = code_values(&film, 0, 0, DVec4::new(0.05, 0.05, 0.05, 0.9));
         assert!((value - DVec3::splat(123.5549 + 0.0078)).length() < 1e-3, "{value}");
-        // Black under nothing, and what is too bright.
+        // Black without background, and a value above 1.
         assert_eq!(code_values(&film, 0, 0, DVec4::W), DVec3::splat(0.5 / 64.0));
         assert!(code_values(&film, 5, 3, DVec4::ONE).x > 255.0);
     }
@@ -87,13 +91,13 @@ mod tests {
         };
         let (a, b) = (DVec4::new(0.05, 0.05, 0.05, 0.9), DVec4::new(0.02, 0.3, 0.05, 0.8));
         let value = |compared, x, y| compared_values(&film, compared, x, y, [a, b]);
-        // Over the background 0.10 and (0.12, 0.4, 0.15); twice, and times 2: 0.08, 1.2 (cut at 1),
-        // 0.2.
+        // Over the background 0.10 and (0.12, 0.4, 0.15); with exposure 2 and gain 2: 0.08, 1.2
+        // (clamped to 1), 0.2.
         let far = value(Some(Compared::Difference(2.0)), 0, 0);
         // sRGB of 0.08: 1.055 · 0.08^{1/2.4} − 0.055 = 0.313304, of 0.2: 0.484529.
         let expected = DVec3::new(79.8926, 255.0, 123.5549) + DVec3::splat(0.5 / 64.0);
         assert!((far - expected).length() < 1e-3, "{far}");
-        // The other way round they are as far apart.
+        // The difference is symmetric.
         assert_eq!(compared_values(&film, Some(Compared::Difference(2.0)), 0, 0, [b, a]), far);
         let bad = compared_values(&film, Some(Compared::Difference(2.0)), 0, 0, [a, DVec4::NAN]);
         assert!((bad - DVec3::splat(255.0 + 0.5 / 64.0)).length() < 1e-9, "{bad}");

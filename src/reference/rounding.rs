@@ -1,16 +1,18 @@
-//! What an f32 evaluation of P (1)–(11) may differ from the f64 one: a running error analysis, each
-//! particle at its own values. The assumptions on the f32 side, which the shader must keep: +, −, ×
-//! are correctly rounded (unit round-off u = 2⁻²⁴; a fused multiply-add only rounds less),
-//! multiplying by a power of two is exact, constants and extents are rounded to f32 once, the
-//! uniforms are exact (24 bits), and a sine's absolute error is at most [`SINE_ERROR`] at an
-//! argument that reduction has moved by at most [`REDUCTION_ERROR`]·u·|argument|. A division errs
-//! by at most [`DIVISION_ERROR`]·u. Underflow is left out: what is divided is only floored, so it
-//! costs less than 2⁻¹²⁰.
+//! Bounds on how far an f32 evaluation of P (1)–(11) may differ from the f64 one: a running error
+//! analysis, each particle at its own values.
+//!
+//! The shader must keep these assumptions. +, −, × are correctly rounded (unit round-off u = 2⁻²⁴;
+//! a fused multiply-add only rounds less). Multiplication by a power of two is exact. Constants and
+//! extents are rounded to f32 once, and the uniforms are exact (24 bits). A sine's absolute error
+//! is at most [`SINE_ERROR`] at an argument that reduction has moved by at most
+//! [`REDUCTION_ERROR`]·u·|argument|. A division errs by at most [`DIVISION_ERROR`]·u. Underflow is
+//! neglected: quotients are only floored, so it costs less than 2⁻¹²⁰.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
 
+use super::bounded::Bounded;
 use super::generate::{is_inside, offset, uniforms};
 use crate::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, radius_factor};
 use crate::model::sums::{Precision, Summation, Sums};
@@ -18,22 +20,23 @@ use crate::model::sums::{Precision, Summation, Sums};
 /// Unit round-off of f32.
 pub const U_F32: f64 = 1.0 / 16_777_216.0;
 
-/// And of f64.
-pub const U_F64: f64 = U_F32 / 536_870_912.0;
+/// Unit round-off of f64.
+const U_F64: f64 = U_F32 / 536_870_912.0;
 
 /// Greatest absolute error of the f32 sine at its reduced argument: 4 units of round-off at 1.
 pub const SINE_ERROR: f64 = 4.0 * U_F32;
 
-/// Argument reduction: the absolute error of the reduced argument, in u·|argument|.
+/// Absolute error of a reduced argument, in u·|argument|.
 pub const REDUCTION_ERROR: f64 = 2.0;
 
 /// Greatest relative error of an f32 division, in u: Vulkan's 2.5 ulp, an ulp being at most 2u.
 pub const DIVISION_ERROR: f64 = 5.0;
 
-/// |formula − erf| of Abramowitz and Stegun 7.1.28, and on top of it what f32 makes of the formula at `x`: a running
-/// bound over Horner's scheme, four squarings (which double a relative error), a division of 2.5
-/// ulp = 5 u, and a
-/// subtraction.
+/// Returns a bound on the error of erf at `x` by the formula 7.1.28 of Abramowitz and Stegun in
+/// f32.
+///
+/// It adds the formula's own error and a running bound over Horner's scheme, four squarings (each
+/// doubles a relative error), a division of 2.5 ulp = 5 u, and a subtraction.
 pub fn erf_bound(x: f64) -> f64 {
     const FORMULA: f64 = 3e-7;
     const COEFFICIENTS: [f64; 6] =
@@ -57,56 +60,17 @@ pub fn erf_bound(x: f64) -> f64 {
     FORMULA + quotient + u * (1.0 - q + quotient)
 }
 
-/// A number and a bound on how far its f32 evaluation may lie from it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Rounded {
-    value: f64,
-    error: f64,
+/// Returns the sine: |sin(a + e) − sin a| ≤ |cos a||e| + e²/2, e the argument's own error and that
+/// of its reduction.
+fn sine(a: Bounded, u: f64) -> Bounded {
+    let e = a.error + REDUCTION_ERROR * u * (a.value.abs() + a.error);
+    // The sine of a small argument errs by 3.5 ulp of itself.
+    let own = SINE_ERROR.min(7.0 * u * (a.value.sin().abs() + e));
+    Bounded { value: a.value.sin(), error: a.value.cos().abs() * e + 0.5 * e * e + own }
 }
 
-impl Rounded {
-    fn exact(value: f64) -> Rounded {
-        Rounded { value, error: 0.0 }
-    }
-
-    /// An input or constant that was rounded to f32 once.
-    fn once(value: f64, u: f64) -> Rounded {
-        Rounded { value, error: u * value.abs() }
-    }
-
-    /// An operation's result `value`, its inputs' errors giving `inherited`: the rounding is of the
-    /// *computed* number, whose magnitude is at most |value| + inherited.
-    fn operation(value: f64, inherited: f64, u: f64) -> Rounded {
-        Rounded { value, error: inherited + u * (value.abs() + inherited) }
-    }
-
-    fn plus(self, b: Rounded, u: f64) -> Rounded {
-        Rounded::operation(self.value + b.value, self.error + b.error, u)
-    }
-
-    /// |ab − a'b'| ≤ |a|δb + |b|δa + δaδb.
-    fn times(self, b: Rounded, u: f64) -> Rounded {
-        let inherited =
-            self.value.abs() * b.error + b.value.abs() * self.error + self.error * b.error;
-        Rounded::operation(self.value * b.value, inherited, u)
-    }
-
-    fn halved(self) -> Rounded {
-        Rounded { value: 0.5 * self.value, error: 0.5 * self.error }
-    }
-
-    /// |sin(a + e) − sin a| ≤ |cos a||e| + e²/2, e the argument's own error and that of its reduction.
-    fn sine(self, u: f64) -> Rounded {
-        let e = self.error + REDUCTION_ERROR * u * (self.value.abs() + self.error);
-        // Of small arguments it is their own, to 3.5 ulp.
-        let own = SINE_ERROR.min(7.0 * u * (self.value.sin().abs() + e));
-        let error = self.value.cos().abs() * e + 0.5 * e * e + own;
-        Rounded { value: self.value.sin(), error }
-    }
-}
-
-/// Bound, axis by axis, on |f32 − f64| of the offset P (1)–(7) that the uniforms `u123` propose;
-/// `u` is the unit round-off ([`U_F32`]).
+/// Returns a bound, axis by axis, on |f32 − f64| of the offset P (1)–(7) proposed by the uniforms
+/// `u123`. `u` is the unit round-off ([`U_F32`]).
 pub fn position_bound(extent: DVec3, form: Form, u123: [f64; 3], u: f64) -> DVec3 {
     // P (1)–(3). 2u₁ − 1 is a multiple of 2⁻²³ in [−1, 1): exact. L carries its own rounding, the
     // product one more: δX = 2u|X|.
@@ -115,43 +79,45 @@ pub fn position_bound(extent: DVec3, form: Form, u123: [f64; 3], u: f64) -> DVec
             Form::Printed => v,
             Form::Centred => 2.0 * v - 1.0,
         };
-        Rounded::exact(share).times(Rounded::once(length, u), u)
+        Bounded::exact(share).times(Bounded::once(length, u)).rounded(u)
     };
     let (x, y, z) =
         (spread(u123[0], extent.x), spread(u123[1], extent.y), spread(u123[2], extent.z));
-    let (pi, half_pi) = (Rounded::once(PI, u), Rounded::once(FRAC_PI_2, u));
+    let (pi, half_pi) = (Bounded::once(PI, u), Bounded::once(FRAC_PI_2, u));
     // P (4): δP = π/2 δsin + 2u|P|, δsin = |cos(Y/2)|(δY/2 + 2u|Y/2|) + SINE_ERROR.
-    let phase = |v: Rounded| half_pi.times(v.halved().sine(u), u);
+    let phase = |v: Bounded| half_pi.times(sine(v.scaled(0.5), u)).rounded(u);
     let (p_x, p_y, p_z) = (phase(y), phase(x), phase(z));
     // P (5): the argument t = P_x Z/2 has δt = |Z/2|δP_x + |P_x/2|δZ + u|t|, and P_x' = P_x + π sin
     // t has δP_x' = δP_x + πδsin t + 2u|π sin t| + u|P_x'|. The second line starts from δP_x'.
-    let swirl = |p: Rounded| pi.times(p.times(z, u).halved().sine(u), u);
-    let p_x = p_x.plus(swirl(p_x), u);
-    let p_y = p_y.plus(swirl(p_x), u);
+    let swirl = |p: Bounded| pi.times(sine(p.times(z).rounded(u).scaled(0.5), u)).rounded(u);
+    let p_x = p_x.plus(swirl(p_x)).rounded(u);
+    let p_y = p_y.plus(swirl(p_x)).rounded(u);
     // P (6)–(7): one rounded sum, one exact halving.
-    let v = [x.plus(p_x, u), y.plus(p_y, u), z.plus(p_z, u)].map(|v| v.halved().error);
+    let v = [x.plus(p_x), y.plus(p_y), z.plus(p_z)].map(|v| v.rounded(u).scaled(0.5).error);
     match form {
         Form::Printed => DVec3::new(v[0], v[2], v[2]),
         Form::Centred => DVec3::from_array(v),
     }
 }
 
-/// Bound on |f32 − f64| of the radius P (8)–(11) at `u4`; the factor of the centred form is rounded
-/// to f32 once.
+/// Returns a bound on |f32 − f64| of the radius P (8)–(11) at `u4`. The factor of the centred form
+/// is rounded to f32 once.
 pub fn radius_bound(form: Form, radius_max: f64, u4: f64, u: f64) -> f64 {
     // δR = 2u|R| as for X above; R' = R + π/2 sin R; factor·R'.
-    let r = Rounded::exact(u4).times(Rounded::once(radius_max, u), u);
-    let r = r.plus(Rounded::once(FRAC_PI_2, u).times(r.sine(u), u), u);
+    let r = Bounded::exact(u4).times(Bounded::once(radius_max, u)).rounded(u);
+    let r = r.plus(Bounded::once(FRAC_PI_2, u).times(sine(r, u)).rounded(u)).rounded(u);
     match form {
-        // No factor, no rounding.
+        // Without a factor there is no rounding.
         Form::Printed => r.error,
-        Form::Centred => Rounded::once(radius_factor(form, radius_max), u).times(r, u).error,
+        Form::Centred => {
+            Bounded::once(radius_factor(form, radius_max), u).times(r).rounded(u).error
+        }
     }
 }
 
-/// Bound on the folded offset of an offset `v` that is itself off by `error`, for w evaluated as
-/// a − 4h·floor(a/4h), a = v + h, and the result cut to [−h, h].
-pub fn fold_bound(v: f64, half: f64, error: f64, u: f64) -> f64 {
+/// Returns a bound on the folded offset of an offset `v` with error `error`. w is evaluated as a −
+/// 4h·floor(a/4h), a = v + h, and the result is clamped to [−h, h].
+fn fold_bound(v: f64, half: f64, error: f64, u: f64) -> f64 {
     if half <= 0.0 {
         return 0.0;
     }
@@ -160,25 +126,26 @@ pub fn fold_bound(v: f64, half: f64, error: f64, u: f64) -> f64 {
     // a; the product 4hk; the difference, below 4h; the last one, below 2h.
     let roundings = (v.abs() + half) + 4.0 * half * k + 4.0 * half + 2.0 * half;
     // A quotient off by DIVISION_ERROR errs in its floor only that near to a multiple of 4h. There
-    // w leaves [0, 4h) by as much, the result is cut to the face, and the true one lies as far
+    // w leaves [0, 4h) by as much and the result is clamped to the face; the true one lies as far
     // inside.
     let roundings = roundings + DIVISION_ERROR * (k + 1.0) * 4.0 * half;
     // The computed a and k may lie one error further out: (1 + 4u) on every term covers it.
     (error + u * ((2.0 + 4.0 * k) * half + roundings)) * (1.0 + 4.0 * u)
 }
 
-/// What an f32 evaluation of one particle may differ.
+/// Bounds on an f32 evaluation of one particle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParticleBound {
+    /// Bound on the position.
     pub position: DVec3,
-    /// Of the radius before `radius_scale`.
+    /// Bound on the radius before `radius_scale`.
     pub radius: f64,
-    /// Whether the f32 evaluation must accept and reject the very attempts that the f64 one does.
-    /// Where it is false the attempts may differ, and position and radius then bound nothing.
+    /// Whether the f32 evaluation must accept and reject the same attempts. If false, the attempts
+    /// may differ and the other bounds do not hold.
     pub decided: bool,
 }
 
-/// The bounds of particle `i_particle` as `generate::generate_particle` makes it.
+/// Returns the bounds of particle `i_particle` as `generate::generate_particle` makes it.
 pub fn particle_bound(
     b: &CloudBox,
     i_box: u32,
@@ -193,14 +160,14 @@ pub fn particle_bound(
         let [u1, u2, u3, u4] = uniforms(seed, i_box, i_particle, attempt);
         let v = offset(b.extent, form, [u1, u2, u3]);
         let error = position_bound(b.extent, form, [u1, u2, u3], u);
-        // The face is rounded too; the comparison itself is exact.
+        // The face is rounded, too; the comparison is exact.
         let reach = error + u * half;
         let radius = radius_bound(form, b.radius_max, u4, u);
         if is_inside(v, half) {
             decided &= is_inside(v.abs() + reach, half);
             return ParticleBound { position: error, radius, decided };
         }
-        // One axis that surely sticks out is enough.
+        // One axis that surely exceeds its face suffices.
         decided &= !is_inside(v.abs() - reach, half);
         if attempt + 1 == MAX_ATTEMPTS {
             let fold = |i: usize| fold_bound(v[i], half[i], error[i], u);
@@ -214,20 +181,20 @@ pub fn particle_bound(
     unreachable!("MAX_ATTEMPTS is not 0")
 }
 
-/// Terms of a block of a pairwise sum, and partial sums of its counter, of which the last takes all
-/// beyond.
+/// Terms of a block of a pairwise sum, and number of the last partial sum, which takes all further
+/// blocks.
 const BLOCK: u64 = 8;
 const LAST_PART: u32 = 11;
 
-/// Bound on what a sum of `n` f32 numbers, formed as `sums` says and rounded to f32, may be off by,
-/// as a share of the sum of their magnitudes (model.md §11 "sums").
+/// Returns a bound on the error of a sum of `n` f32 numbers, formed as `sums` says and rounded to
+/// f32, as a share of the sum of their magnitudes (model.md §11 "sums").
 pub fn sum_error(sums: Sums, n: u64) -> f64 {
     let of = |u: f64| match sums.summation {
         Summation::Plain => roundings(n.saturating_sub(1), u),
         Summation::Kahan => {
-            // y_k = (x_k + c_{k-1})(1 + η_k), and s_k + c_k = s_{k-1} + y_k exactly. With |c_k| ≤
-            // uM, M the greatest
-            // |s_k + c_k|: M ≤ (1 + u) S + n u² M, and s_n is off by |c_n| + Σ|η_k|(|x_k| + |c_{k-1}|) ≤ uM + uS + n u² M.
+            // y_k = (x_k + c_{k-1})(1 + η_k), and s_k + c_k = s_{k-1} + y_k exactly. With
+            // |c_k| ≤ uM, M the greatest |s_k + c_k|: M ≤ (1 + u) S + n u² M. So s_n is off by
+            // |c_n| + Σ|η_k|(|x_k| + |c_{k-1}|) ≤ uM + uS + n u² M.
             let lost = n as f64 * u * u;
             u + (u + lost) * (1.0 + u) / (1.0 - lost)
         }
@@ -235,26 +202,26 @@ pub fn sum_error(sums: Sums, n: u64) -> f64 {
     };
     match sums.precision {
         Precision::F32 => of(U_F32),
-        // And what is summed is rounded once.
+        // The f64 sum is rounded to f32 once.
         Precision::F64 => U_F32 + (1.0 + U_F32) * of(U_F64),
     }
 }
 
-/// What `n` roundings change, one after the other, as a share.
+/// Returns the relative change by `n` successive roundings.
 fn roundings(n: u64, u: f64) -> f64 {
     let nu = n as f64 * u;
     if nu < 1.0 { nu / (1.0 - nu) } else { f64::INFINITY }
 }
 
-/// Additions that round and that a term of a pairwise sum passes, at most.
+/// Returns the greatest number of rounded additions that a term of a pairwise sum passes.
 fn pairwise_depth(n: u64) -> u64 {
-    // A block's first term is added to nothing. Then as many as the number of blocks has bits: k to
-    // get into part k, and the others when all parts are added up, the least first.
+    // A block's first term is added to 0. Then follow as many additions as the number of blocks has
+    // bits: k to get into part k, and the rest when all parts are summed, the least first.
     let n_blocks = n / BLOCK;
     let n_last = n_blocks >> LAST_PART;
     let n_bits = u64::from(u64::BITS - n_blocks.leading_zeros());
     let depth = BLOCK - 1 + if n_last == 0 { n_bits } else { u64::from(LAST_PART) + n_last };
-    // No tree of n terms is deeper.
+    // A tree of n terms is not deeper.
     depth.min(n.saturating_sub(1))
 }
 

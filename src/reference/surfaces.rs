@@ -1,26 +1,30 @@
 //! Drawing of surfaces, model.md §9 and §11 "surfaces": opaque rectangles, the nearest in every
-//! pixel, in f64. In: rectangles and eye relative to O, radiance of every facet (W m⁻² sr⁻¹, RGB).
-//! Out: [width × height] of colour and view depth, row 0 at the top.
+//! pixel, in f64.
+//!
+//! In: rectangles and eye relative to O, radiance of every facet (W m⁻² sr⁻¹, RGB). Out:
+//! [row][column] of colour and view depth, row 0 at the top.
 
 use glam::DVec3;
 
-use super::sprites::{OpaquePixel, View};
+use super::composite::OpaquePixel;
+use super::view::View;
 use crate::model::surface::Surface;
 
-/// Where a ray meets a rectangle.
+/// Intersection of a ray with a rectangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// View depth, as a ray's own is 1.
+    /// View depth; that of the ray itself is 1.
     pub depth: f64,
-    /// p = centre + s u + t v, both in [−1, 1].
+    /// s in [−1, 1]: the point is centre + s u + t v.
     pub s: f64,
+    /// t in [−1, 1].
     pub t: f64,
     /// Whether the front side is seen.
     pub is_front: bool,
 }
 
-/// Where the line eye + z·ray meets the plane of `surface`, whatever s and t; nowhere on a line
-/// along the plane.
+/// Returns where the line eye + z·ray meets the plane of `surface`, whatever s and t; `None` if the
+/// line runs along the plane.
 pub fn meet(surface: &Surface, eye: DVec3, ray: DVec3) -> Option<Hit> {
     let normal = surface.normal();
     let (from_eye, slope) = (surface.center - eye, normal.dot(ray));
@@ -29,21 +33,20 @@ pub fn meet(surface: &Surface, eye: DVec3, ray: DVec3) -> Option<Hit> {
         return None;
     }
     let p = depth * ray - from_eye;
-    // Axes typed with a few digits are not quite perpendicular: s and t solve s u + t v = p all the
-    // same.
+    // Axes typed with a few digits are not quite perpendicular, so s and t solve s u + t v = p.
     let (s, t) = (p.cross(surface.v).dot(normal), surface.u.cross(p).dot(normal));
     let area = surface.u.cross(surface.v).dot(normal);
     Some(Hit { depth, s: s / area, t: t / area, is_front: slope < 0.0 })
 }
 
-/// Where the ray through a pixel meets `surface` itself, from the near plane on.
+/// Returns where the ray through a pixel meets `surface` itself, from the near plane on.
 pub fn hit(surface: &Surface, view: &View, ray: DVec3) -> Option<Hit> {
     let hit = meet(surface, view.pose.position, ray)?;
     (hit.depth >= view.near && hit.s.abs() <= 1.0 && hit.t.abs() <= 1.0).then_some(hit)
 }
 
-/// Radiance at `hit` of a surface whose facets have `facets`: bilinear between their centres,
-/// constant beyond the outermost; black behind.
+/// Returns the radiance at `hit` of a surface whose facets have `facets`: bilinear between their
+/// centres, constant beyond the outermost, and black on the back.
 pub fn radiance(surface: &Surface, facets: &[DVec3], hit: &Hit) -> DVec3 {
     if !hit.is_front {
         return DVec3::ZERO;
@@ -60,13 +63,14 @@ pub fn radiance(surface: &Surface, facets: &[DVec3], hit: &Hit) -> DVec3 {
     row(j0).lerp(row(j1), b)
 }
 
-/// Picture of `surfaces`; `facets`: the radiance of all their facets, surface after surface.
+/// Returns the picture of `surfaces`. `facets` is the radiance of all their facets, surface after
+/// surface.
 pub fn render(view: &View, surfaces: &[Surface], facets: &[DVec3]) -> Vec<OpaquePixel> {
     let rows = (0..view.height).flat_map(|j| (0..view.width).map(move |i| [i, j]));
     render_at(view, surfaces, facets, rows)
 }
 
-/// The same at some pixels, [column, row].
+/// Returns the picture at some pixels, [column, row].
 pub fn render_at(
     view: &View,
     surfaces: &[Surface],
@@ -76,8 +80,8 @@ pub fn render_at(
     at.map(|[i, j]| pixel(view, surfaces, facets, view.ray(i, j))).collect()
 }
 
-/// Which surface is seen along `ray`, and where: the nearest hit, and of equally near ones the
-/// last.
+/// Returns the surface seen along `ray` and the place: the nearest hit, and the last of equally
+/// near ones.
 pub fn seen(view: &View, surfaces: &[Surface], ray: DVec3) -> Option<(usize, Hit)> {
     let hits =
         surfaces.iter().enumerate().filter_map(|(i, s)| hit(s, view, ray).map(|hit| (i, hit)));
@@ -194,7 +198,7 @@ mod tests {
         assert!(middle[4] == red && middle.iter().filter(|p| **p == [0.0; 4]).count() == 8);
         let depths: Vec<f64> = render(&VIEW, &[far], &colors).iter().map(|p| p.depth).collect();
         assert!(depths[4] == 2.0 && depths[0] == f64::INFINITY);
-        // From behind: black, and it hides.
+        // The back is black, and it hides.
         let back = Surface { u: DVec3::NEG_X, ..near };
         assert_eq!(see(&[far, back]), [[0.0, 0.0, 0.0, 1.0]; 9]);
     }

@@ -1,16 +1,19 @@
-//! Ground, model.md §16: its facets, and its picture: opaque triangles between its points, the
-//! nearest in every pixel, in f64. In: points and eye relative to O, radiance of every point (W m⁻²
-//! sr⁻¹, RGB). Out: colour and view depth where it is seen.
+//! Ground, model.md §16: its facets, and its picture as opaque triangles between its points, the
+//! nearest in every pixel, in f64.
+//!
+//! In: points and eye relative to O, radiance of every point (W m⁻² sr⁻¹, RGB). Out: colour and
+//! view depth where it is seen.
 
 use glam::{DVec2, DVec3};
 
+use super::composite::OpaquePixel;
 use super::facets::Facet;
-use super::sprites::{OpaquePixel, View};
 use super::surfaces::{Hit, meet};
+use super::view::View;
 use crate::model::surface::Surface;
 use crate::model::terrain::{HALVES, Terrain};
 
-/// Facets of `terrain`, relative to `origin`.
+/// Returns the facets of `terrain`, relative to `origin`.
 pub fn facets(terrain: &Terrain, origin: DVec3, region: u32) -> Vec<Facet> {
     let at = terrain.origin - origin;
     let of = |f: crate::model::terrain::TerrainFacet| Facet {
@@ -23,16 +26,17 @@ pub fn facets(terrain: &Terrain, origin: DVec3, region: u32) -> Vec<Facet> {
     terrain.facets().map(of).collect()
 }
 
-/// Half of a cell: corner + s u + t v, where s, t ≥ 0 and s + t ≤ 1.
+/// Half of a cell: the points corner + s u + t v with s, t ≥ 0 and s + t ≤ 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangle {
-    /// Its plane: the corner, u and v.
+    /// The plane, by corner, u and v.
     plane: Surface,
-    /// At the corner, at the end of u, at the end of v.
+    /// Radiance at the corner, at the end of u and at the end of v.
     radiance: [DVec3; 3],
 }
 
 impl Triangle {
+    /// Returns the triangle of a corner, the end of u and the end of v, with their radiance.
     pub fn new(points: [DVec3; 3], radiance: [DVec3; 3]) -> Triangle {
         let [center, along, across] = points;
         let plane = Surface {
@@ -45,8 +49,8 @@ impl Triangle {
         Triangle { plane, radiance }
     }
 
-    /// Those of `terrain`, whose points are where `terrain.origin` puts them; `radiance` by its
-    /// points.
+    /// Returns the triangles of `terrain`, with points relative to `terrain.origin` and `radiance`
+    /// by point.
     pub fn of<'a>(
         terrain: &'a Terrain,
         radiance: &'a [DVec3],
@@ -64,25 +68,26 @@ impl Triangle {
         (0..terrain.n_cells()).flat_map(of_cell)
     }
 
-    /// The corner, the end of u and the end of v.
+    /// Returns the corner, the end of u and the end of v.
     pub fn points(&self) -> [DVec3; 3] {
         let Surface { center, u, v, .. } = self.plane;
         [center, center + u, center + v]
     }
 
-    /// Where the line eye + z·ray meets its plane, whatever s and t; nowhere on a line along it.
+    /// Returns where the line eye + z·ray meets the plane, whatever s and t; `None` if the line
+    /// runs along it.
     pub fn meet(&self, eye: DVec3, ray: DVec3) -> Option<Hit> {
         meet(&self.plane, eye, ray)
     }
 
-    /// Where the ray through a pixel meets it, from the near plane on.
+    /// Returns where the ray through a pixel meets the triangle, from the near plane on.
     pub fn hit(&self, view: &View, ray: DVec3) -> Option<Hit> {
         let hit = self.meet(view.pose.position, ray)?;
         (hit.depth >= view.near && hit.s >= 0.0 && hit.t >= 0.0 && hit.s + hit.t <= 1.0)
             .then_some(hit)
     }
 
-    /// Radiance at `hit`: linear between the points; black from below.
+    /// Returns the radiance at `hit`: linear between the points, black from below.
     pub fn radiance(&self, hit: &Hit) -> DVec3 {
         if !hit.is_front {
             return DVec3::ZERO;
@@ -91,13 +96,13 @@ impl Triangle {
         corner * (1.0 - hit.s - hit.t) + along * hit.s + across * hit.t
     }
 
-    /// What the ray through a pixel sees of it.
+    /// Returns the pixel that the ray sees of the triangle.
     pub fn seen(&self, view: &View, ray: DVec3) -> Option<OpaquePixel> {
         self.hit(view, ray).map(|hit| self.shown(&hit))
     }
 
-    /// What is seen in a pixel that a rasteriser counts among its own though the ray may pass by
-    /// it: where the ray meets its plane, no farther out than it reaches.
+    /// Returns the place shown in a pixel that the rasteriser gives to the triangle although the
+    /// ray may pass it: where the ray meets the plane, clamped to the triangle's extent.
     pub fn given(&self, view: &View, ray: DVec3) -> Option<Hit> {
         let hit = self.meet(view.pose.position, ray)?;
         let depths =
@@ -108,14 +113,14 @@ impl Triangle {
         Some(Hit { depth, s, t: hit.t.clamp(0.0, 1.0 - s), ..hit })
     }
 
-    /// What is seen where a ray meets it so.
+    /// Returns the pixel that shows the triangle at `hit`.
     pub fn shown(&self, hit: &Hit) -> OpaquePixel {
         let color = self.radiance(hit).extend(1.0).to_array();
         OpaquePixel { color, depth: hit.depth, ..OpaquePixel::EMPTY }
     }
 
-    /// Columns and rows of pixels that may see it: (first, end) of each, `margin` pixels more on
-    /// every side.
+    /// Returns the columns and rows (first, end) of pixels that may see the triangle, enlarged by
+    /// `margin` pixels on every side.
     pub fn pixels(&self, view: &View, margin: f64) -> [(u32, u32); 2] {
         let size = [view.width, view.height];
         let mut low = DVec2::INFINITY;
@@ -124,7 +129,7 @@ impl Triangle {
             let from_eye = p - view.pose.position;
             let z = from_eye.dot(view.pose.forward);
             if z < view.near {
-                // What the near plane cuts may be anywhere.
+                // A triangle that the near plane cuts may be anywhere.
                 return size.map(|n| (0, n));
             }
             let half = DVec2::new(
@@ -146,11 +151,11 @@ impl Triangle {
     }
 }
 
-/// Columns and rows of a picture: (first, end) of each.
+/// Columns and rows (first, end) of a part of a picture.
 pub type Window = [(u32, u32); 2];
 
-/// Lays over `picture`, the pixels of `window` row by row, what is nearer of `terrain`, whose
-/// points are where its origin puts them; `radiance` by its points.
+/// Draws `terrain` over `picture`, the pixels of `window` row by row, where it is nearer.
+/// `radiance` is by point.
 pub fn render_over(
     (picture, window): (&mut [OpaquePixel], Window),
     view: &View,
@@ -158,7 +163,7 @@ pub fn render_over(
     radiance: &[DVec3],
 ) {
     let [(first_column, end_column), (first_row, end_row)] = window;
-    /// Rounding of a corner's place in pixels must not leave a pixel out; the hit decides.
+    /// The rounding of a corner's place must not leave a pixel out; the hit decides.
     const MARGIN: f64 = 1e-6;
     for half in Triangle::of(terrain, radiance) {
         let [(left, right), (top, bottom)] = half.pixels(view, MARGIN);
@@ -258,7 +263,7 @@ mod tests {
         );
         // At x = 1 half of the middle's radiance.
         assert!((seen[4].color[0] - 4.0).abs() < 1e-13 && (seen[5].color[0] - 2.0).abs() < 1e-13);
-        // What was nearer stays, what was farther goes.
+        // A nearer background stays, a farther one is covered.
         let before = |depth: f64| OpaquePixel { color: [9.0; 4], depth, ..OpaquePixel::EMPTY };
         let mut over = vec![before(1.25); 9];
         render_over((&mut over, [(0, 3), (0, 3)]), &from_above(), &hill, &radiance);
@@ -266,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn from_below_it_is_black_and_the_near_plane_cuts() {
+    fn the_underside_is_black_and_the_near_plane_cuts() {
         let flat = terrain([0.0; 9]);
         let bright = vec![DVec3::ONE; 9];
         let mut below = from_above();

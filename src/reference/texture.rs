@@ -1,6 +1,7 @@
-//! The pool of textures and what a splat shows of it: model.md §9, §11 "texture". The fields by
-//! their sums of waves, term by term, not by a fast transform. In: a seed; a particle. Out: n at
-//! every texel of every level; ln of the factor on τ.
+//! The pool of textures and the part of it that a splat shows: model.md §9, §11 "texture". The
+//! fields are sums of waves term by term, not fast transforms.
+//!
+//! In: a seed; a particle. Out: n at every texel of every level; ln of the factor on τ.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
@@ -10,47 +11,49 @@ use glam::DVec2;
 use crate::model::philox::{philox4x32_10, uniform};
 use crate::model::texture::N_FIELDS;
 
-/// Philox stream: "text".
+/// Philox stream "text".
 const STREAM: u32 = 0x7465_7874;
-/// |F| ∝ |k|^−SLOPE.
+/// Exponent of the spectrum: |F| ∝ |k|^−SLOPE.
 const SLOPE: f64 = 1.7;
 /// Least |k| of a wave.
 const LEAST_WAVE: i32 = 2;
-/// Side of level 0.
+/// Side of level 0, texels.
 pub const SIDE: usize = 256;
+/// Number of levels.
 pub const N_LEVELS: usize = 6;
-/// A period of the field in σ.
+/// Period of the field, σ.
 pub const PERIOD_SIGMA: f64 = 6.0;
-/// The pool has n in units of this.
+/// Quantum of n in the pool.
 pub const QUANTUM: f64 = 1.0 / 4096.0;
 /// Greatest number of quanta.
 const MOST_QUANTA: f64 = 32767.0;
 
-/// One level of one field, n at the texels' corners; row j, column i at i + side·j.
+/// A level of a field, with n at the texels' corners. *Shape*: row j, column i at i + side·j.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
+    /// Side, texels.
     pub side: usize,
     /// n_l.
     pub own: Vec<f64>,
-    /// n_{l+1} at the same places, as it is interpolated.
+    /// n_{l+1} interpolated at the same places.
     pub above: Vec<f64>,
 }
 
-/// Fields, and of each its levels.
+/// Levels of every field. *Shape*: [field][level].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pool(pub Vec<Vec<Level>>);
 
-/// Side of level `l`.
+/// Returns the side of level `l`.
 pub fn side(l: usize) -> usize {
     SIDE >> l
 }
 
-/// Greatest |k| in level `l`.
+/// Returns the greatest |k| in level `l`.
 fn most(l: usize) -> i32 {
     (side(l) / 4) as i32
 }
 
-/// All waves of |k| from 2 to `most`.
+/// Returns all waves of |k| from 2 to `most`.
 fn waves(most: i32) -> impl Iterator<Item = (i32, i32)> {
     let range = move || -most..=most;
     range().flat_map(move |x| range().map(move |y| (x, y))).filter(move |k| is_wave(*k, most))
@@ -60,17 +63,17 @@ fn is_wave((x, y): (i32, i32), most: i32) -> bool {
     (LEAST_WAVE.pow(2)..=most.pow(2)).contains(&(x * x + y * y))
 }
 
-/// |F| of a wave without the factor that makes the field's mean square 1.
+/// Returns |F| of a wave without the normalising factor.
 fn shape((x, y): (i32, i32)) -> f64 {
     f64::from(x * x + y * y).powf(-0.5 * SLOPE)
 }
 
-/// That factor: by Parseval Σ|F|² = 1.
+/// Returns the factor that makes the field's mean square 1: by Parseval Σ|F|² = 1.
 pub fn amplitude() -> f64 {
     waves(most(0)).map(|k| shape(k).powi(2)).sum::<f64>().powf(-0.5)
 }
 
-/// Σ|F| over all waves.
+/// Returns Σ|F| over all waves.
 pub fn sum_of_amplitudes() -> f64 {
     amplitude() * waves(most(0)).map(shape).sum::<f64>()
 }
@@ -79,8 +82,9 @@ pub fn sum_of_amplitudes() -> f64 {
 static MEAN_SQUARES: LazyLock<[[f64; 3]; N_LEVELS]> =
     LazyLock::new(|| std::array::from_fn(mean_squares));
 
-/// By level the mean squares ⟨n_l²⟩, ⟨n_l n_{l+1}⟩ and ⟨n_{l+1}²⟩ over all places, as bilinear
-/// interpolation has them: the closed form for a wave e^{iθj} between nodes j, by axis.
+/// Returns the mean squares ⟨n_l²⟩, ⟨n_l n_{l+1}⟩ and ⟨n_{l+1}²⟩ of a level over all places, as
+/// bilinear interpolation has them. It is the closed form for a wave e^{iθj} between nodes j, by
+/// axis.
 pub fn mean_squares(l: usize) -> [f64; 3] {
     let amplitude = amplitude();
     let mut sums = [0.0; 3];
@@ -90,7 +94,7 @@ pub fn mean_squares(l: usize) -> [f64; 3] {
         let over = |f: &dyn Fn(f64) -> f64| energy * f(cosines[0]) * f(cosines[1]);
         sums[0] += over(&|c| (2.0 + c) / 3.0);
         if l + 1 < N_LEVELS && is_wave(k, most(l + 1)) {
-            // Every other node of n_{l+1} lies midway between its neighbours: there the wave is cos
+            // Every other node of n_{l+1} lies midway between its neighbours, where the wave is cos
             // θ times as high.
             sums[1] += over(&|c| (1.0 + c) * (2.0 + c) / 6.0);
             sums[2] += over(&|c| (1.0 + 2.0 * c * c) / 3.0);
@@ -99,7 +103,8 @@ pub fn mean_squares(l: usize) -> [f64; 3] {
     sums
 }
 
-/// Phases of wave `k` of fields 2·`pair` and 2·`pair` + 1; F(−k) is the conjugate of F(k).
+/// Returns the phases of wave `k` of fields 2·`pair` and 2·`pair` + 1. F(−k) is the conjugate of
+/// F(k).
 fn phases(seed: u32, (x, y): (i32, i32), pair: u32) -> [f64; 2] {
     let drawn = x > 0 || (x == 0 && y > 0);
     let side = if drawn { 1 } else { -1 };
@@ -108,6 +113,7 @@ fn phases(seed: u32, (x, y): (i32, i32), pair: u32) -> [f64; 2] {
 }
 
 impl Pool {
+    /// Computes the pool of a seed.
     pub fn new(seed: u32) -> Pool {
         let mut fields = Vec::new();
         for pair in 0..N_FIELDS / 2 {
@@ -127,8 +133,8 @@ impl Pool {
         Pool(fields)
     }
 
-    /// As shaders read it: by field, level and texel the texel's four corners, n_l in the first two
-    /// words, n_{l+1} in the others, each in 16 bits.
+    /// Returns the pool as shaders read it: for every field, level and texel the four corners, n_l
+    /// in the first two words, n_{l+1} in the others, each in 16 bits.
     pub fn words(&self) -> Vec<[u32; 4]> {
         let quanta = |n: f64| (n / QUANTUM).clamp(-MOST_QUANTA, MOST_QUANTA).round() as i16 as u16;
         let both = |a: f64, b: f64| u32::from(quanta(a)) | u32::from(quanta(b)) << 16;
@@ -149,7 +155,7 @@ impl Pool {
         self.0.iter().flatten().flat_map(of_level).collect()
     }
 
-    /// With every n rounded as in [`Pool::words`].
+    /// Returns the pool with every n rounded as in [`Pool::words`].
     pub fn rounded(&self) -> Pool {
         let round = |n: &f64| QUANTUM * (n / QUANTUM).clamp(-MOST_QUANTA, MOST_QUANTA).round();
         let all = |n: &[f64]| -> Vec<f64> { n.iter().map(round).collect() };
@@ -158,14 +164,14 @@ impl Pool {
     }
 }
 
-/// Level `l` of the two fields: n(i, j) = Σ_k F(k) e^{2πi(k_x i + k_y j)/side}, first over k_x,
-/// then over k_y.
+/// Computes level `l` of two fields: n(i, j) = Σ_k F(k) e^{2πi(k_x i + k_y j)/side}, first over
+/// k_x, then over k_y.
 fn pair_of_fields(seed: u32, pair: u32, l: usize) -> [Vec<f64>; 2] {
     let (n, most, amplitude) = (side(l), most(l), amplitude());
     let roots: Vec<(f64, f64)> = (0..n).map(|j| (TAU * j as f64 / n as f64).sin_cos()).collect();
     let root = |k: i32, x: usize| roots[(k * x as i32).rem_euclid(n as i32) as usize];
     let n_waves = (2 * most + 1) as usize;
-    // Of each k_y the sums over k_x at every column.
+    // Sums over k_x at every column, for each k_y.
     let mut rows = vec![vec![[(0.0, 0.0); 2]; n]; n_waves];
     for (row, y) in rows.iter_mut().zip(-most..) {
         for x in (-most..=most).filter(|x| is_wave((*x, y), most)) {
@@ -196,14 +202,14 @@ fn pair_of_fields(seed: u32, pair: u32, l: usize) -> [Vec<f64>; 2] {
     fields
 }
 
-/// `n` of the given side at twice as many nodes along each axis, bilinear.
+/// Interpolates `n` bilinearly to twice as many nodes along each axis.
 fn doubled(n: &[f64], side: usize) -> Vec<f64> {
     let at = |i: usize, j: usize| 0.5 * DVec2::new(i as f64, j as f64);
     (0..2 * side).flat_map(|j| (0..2 * side).map(move |i| bilinear(n, side, at(i, j)))).collect()
 }
 
-/// Periodic, bilinear between nodes.
-pub fn bilinear(n: &[f64], side: usize, at: DVec2) -> f64 {
+/// Interpolates bilinearly between the nodes of a periodic field.
+fn bilinear(n: &[f64], side: usize, at: DVec2) -> f64 {
     let low = at.floor();
     let share = at - low;
     let node = |dx: f64, dy: f64| {
@@ -215,32 +221,41 @@ pub fn bilinear(n: &[f64], side: usize, at: DVec2) -> f64 {
     near + share.y * (far - near)
 }
 
-/// What a cloud's or box's particles are textured with.
+/// Texture of the particles of a box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Textured {
+    /// Index of the field.
     pub i_field: u32,
+    /// s.
     pub strength: f64,
+    /// Seed of the cloud.
     pub seed: u32,
+    /// Index of the box within its cloud.
     pub i_box: u32,
 }
 
-/// What one splat shows of the pool.
+/// The part of the pool that a splat shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SplatTexture {
+    /// Index of the field.
     pub i_field: usize,
+    /// s.
     pub strength: f64,
-    /// Level l, and the share of n_{l+1}.
+    /// Level l.
     pub level: usize,
+    /// Share of n_{l+1}.
     pub fade: f64,
+    /// Rotation of the field.
     pub angle: f64,
-    /// In periods.
+    /// Shift of the field, periods.
     pub shift: DVec2,
     /// View depth over σ.
     pub z_in_sigma: f64,
 }
 
 impl SplatTexture {
-    /// Of particle `i` of its box; `pixel` is the difference of slopes from a pixel to the next.
+    /// Returns the texture of particle `i` of its box. `pixel` is the difference of slopes between
+    /// neighbouring pixels.
     pub fn new(of: &Textured, i: u32, z_in_sigma: f64, pixel: f64) -> SplatTexture {
         let words = philox4x32_10([of.seed, of.i_box], [i, 0, 0, STREAM]);
         let [u, v, w, _] = words.map(uniform);
@@ -261,26 +276,27 @@ impl SplatTexture {
         }
     }
 
-    /// In texels of the level, where the slopes are `delta` from the centre's.
+    /// Returns the place in texels of the level, where the slopes differ by `delta` from the
+    /// centre's.
     pub fn place(&self, delta: DVec2) -> DVec2 {
         let periods = DVec2::from_angle(self.angle).rotate(delta * self.z_in_sigma / PERIOD_SIGMA)
             + self.shift;
         periods * side(self.level) as f64
     }
 
-    /// s² ⟨n²⟩/2.
+    /// Returns s² ⟨n²⟩/2.
     pub fn half_square(&self) -> f64 {
         let ([own, both, above], f) = (MEAN_SQUARES[self.level], self.fade);
         let square = (1.0 - f).powi(2) * own + 2.0 * f * (1.0 - f) * both + f * f * above;
         0.5 * self.strength.powi(2) * square
     }
 
-    /// exp(s n − s² ⟨n²⟩/2) at `delta`.
+    /// Returns the factor exp(s n − s² ⟨n²⟩/2) at `delta`.
     pub fn factor(&self, pool: &Pool, delta: DVec2) -> f64 {
         (self.strength * self.n(pool, delta) - self.half_square()).exp()
     }
 
-    /// n at `delta`.
+    /// Returns n at `delta`.
     pub fn n(&self, pool: &Pool, delta: DVec2) -> f64 {
         let (level, at) = (&pool.0[self.i_field][self.level], self.place(delta));
         let of = |n: &[f64]| bilinear(n, level.side, at);
@@ -330,7 +346,7 @@ mod tests {
         assert_eq!([at(1000.0), at(256.0), at(128.0)], [(0, 0.0), (0, 0.0), (1, 0.0)]);
         assert_eq!([at(170.0 + 2.0 / 3.0), at(8.0), at(6.4)], [(0, 0.5), (5, 0.0), (5, 0.25)]);
         assert_eq!([at(4.0), at(0.01)], [(5, 1.0), (5, 1.0)]);
-        // Nothing is left at the end, and nothing subtracted for it.
+        // At the end nothing is left, and nothing is subtracted.
         assert_eq!(SplatTexture::new(&of, 0, 60.0, 0.1).half_square(), 0.0);
         let sheet = SplatTexture {
             angle: std::f64::consts::FRAC_PI_2,

@@ -1,39 +1,42 @@
-//! What a threshold and a smallest size leave out of a picture, model.md §11 "threshold" and
-//! "cull", in f64. In: blobs and eye relative to O. Out: of every pixel the layers that are cut,
-//! and their optical depth.
+//! Layers that a threshold and a smallest size omit from a picture, model.md §11 "threshold" and
+//! "cull", in f64. In: blobs and eye relative to O. Out: number and optical depth of the omitted
+//! layers of every pixel.
 
 use super::Blob;
-use super::sprites::{Factor, OpaquePixel, View};
+use super::composite::OpaquePixel;
+use super::sprites::Factor;
+use super::view::View;
 
-/// What is cut of a pixel.
+/// Omitted layers of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Omitted {
-    /// Sprites that would be drawn there without the threshold and whatever their size.
+    /// Number of sprites that would be drawn without threshold and smallest size.
     pub n_layers: u32,
     /// Their optical depth together.
     pub tau: f64,
 }
 
 impl Omitted {
-    /// A pixel's channel changes by at most this share of the greatest difference between two
-    /// radiances that it can meet.
+    /// Returns the greatest change of a channel, as a share of the greatest difference between two
+    /// radiances there.
     pub fn share(&self) -> f64 {
         -libm::expm1(-self.tau)
     }
 
-    /// The same of the number of layers alone, where no texture makes a layer denser.
+    /// Returns the same bound from the number of layers alone, for blobs without texture.
     pub fn share_of_layers(&self, threshold: f64) -> f64 {
         -libm::expm1(-f64::from(self.n_layers) * threshold)
     }
 
-    /// No pixel of either has more layers or a greater depth.
+    /// Returns the greater number of layers and the greater optical depth of two pixels.
     pub fn most(self, other: Omitted) -> Omitted {
         Omitted { n_layers: self.n_layers.max(other.n_layers), tau: self.tau.max(other.tau) }
     }
 }
 
-/// The picture's pixels before `behind`. `factor` on each blob's τ, as its texture has it.
-pub fn cut(
+/// Returns the omitted layers of every pixel before `behind`, with `factor` on each blob's τ as its
+/// texture has it.
+pub fn omitted(
     view: &View,
     behind: &[OpaquePixel],
     blobs: &[Blob],
@@ -56,7 +59,7 @@ pub fn cut(
                 let ray = view.ray(column, row);
                 let line = blob.along(c, ray);
                 let e = 0.5 * line.off.powi(2);
-                // Nothing is left of what is too small.
+                // Blobs that are too small are omitted entirely.
                 let from = if is_large { view.cut(line.depth) } else { 0.0 };
                 if (e > from || from <= 0.0) && e <= to && depth <= behind[i].depth {
                     let delta = view.slopes_of(ray) - view.slopes_of(c);
@@ -78,7 +81,7 @@ mod tests {
     use glam::{DVec2, DVec3};
 
     #[test]
-    fn what_lies_between_the_threshold_and_the_cutoff_is_counted() {
+    fn layers_between_threshold_and_cutoff_are_counted() {
         let pose =
             Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
         // Three pixels at slopes −1, 0 and 1.
@@ -103,7 +106,7 @@ mod tests {
             kappa: tau / SQRT_TAU,
         };
         let of = |blobs: &[Blob], depth: f64| {
-            cut(&view, &[OpaquePixel { depth, ..OpaquePixel::EMPTY }; 3], blobs, None)
+            omitted(&view, &[OpaquePixel { depth, ..OpaquePixel::EMPTY }; 3], blobs, None)
         };
         let nothing = Omitted::default();
         // τ = 0.2/e there: below the threshold. 0.3/e: not. 0.09: nowhere above it.
@@ -122,7 +125,7 @@ mod tests {
         // Pixels are one slope wide, σ = 1 at depth 2 half of one.
         let of = |smallest: f64| {
             let view = View { threshold: 0.0, smallest, ..view };
-            cut(&view, &[OpaquePixel::EMPTY; 3], &[blob(0.2)], None)
+            omitted(&view, &[OpaquePixel::EMPTY; 3], &[blob(0.2)], None)
                 .iter()
                 .map(|c| c.n_layers)
                 .sum::<u32>()

@@ -1,29 +1,35 @@
-//! tiles, model.md §11 "tiles": thin blobs composed near to far, in f64, and a bound on what f32 in
-//! that order may differ. In: blobs and eye relative to O, an order far to near. Out: as `sprites`,
-//! of which it is the same picture.
+//! Sprites in tiles, model.md §11 "tiles": thin blobs composed near to far, in f64, with a bound on
+//! what f32 in that order may differ.
+//!
+//! In: blobs and eye relative to O, an order far to near. Out: the same picture as `sprites`.
 
 use glam::DVec3;
 
-use super::Blob;
-use super::sprites::{Factor, OpaquePixel, Rounding, View, alpha};
+use super::composite::{OpaquePixel, Rounding};
+use super::sprites::{Bounded, Seen, Sprites};
+use super::view::View;
 
 /// Unit round-off of f32.
 pub(super) const U: f64 = 1.0 / 16_777_216.0;
 
-/// One pixel while it is composed: true numbers, and what the device's may differ from them.
+/// A pixel while it is composed: exact values, and bounds on the device's differences.
 pub(super) struct Composed {
+    /// Composed colour.
     pub color: DVec3,
+    /// Transmittance.
     pub passed: f64,
+    /// Bound on the colour's difference.
     pub off_color: DVec3,
+    /// Bound on the transmittance's difference.
     pub off_passed: f64,
 }
 
-/// Puts a layer of true opacity, on the device within the second number of the device's, under what
-/// is composed.
-pub(super) type Layer = fn(&mut Composed, f64, f64, DVec3);
+/// Adds a layer of an exact opacity under the composed ones; the device's opacity is within the
+/// second number.
+pub(super) type AddLayer = fn(&mut Composed, f64, f64, DVec3);
 
 impl Composed {
-    /// A layer of true opacity `alpha`, on the device within `off` of `device_alpha`.
+    /// Adds a layer of opacity `alpha`, which the device has within `off`.
     fn under(&mut self, alpha: f64, off: f64, radiance: DVec3) {
         let (passed, here) = (self.passed, self.passed * alpha);
         // T = 1 - A is rounded; (T + dT)(a + da) - T a, rounded once.
@@ -36,7 +42,7 @@ impl Composed {
         self.off_color +=
             U * (here + off_here) * radiance.abs() + U * (self.color.abs() + self.off_color);
         self.passed -= here;
-        // A + T a: what A is off by goes on times 1 - a; the sum is rounded as what it is.
+        // A + T a: the error of A is multiplied by 1 − a, and the sum is rounded.
         self.off_passed = self.off_passed * ((1.0 - alpha).abs() + off)
             + passed * off
             + off_one_minus * (alpha + off)
@@ -44,7 +50,7 @@ impl Composed {
             + U * (1.0 - self.passed + self.off_passed);
     }
 
-    /// Over what stands behind: the pixel, and its bound. `most`: the brightest radiance there is.
+    /// Returns the pixel over its background, and its bound. `most` is the brightest radiance.
     fn over(
         &self,
         under: &OpaquePixel,
@@ -52,7 +58,7 @@ impl Composed {
         saturated: f64,
         most: f64,
     ) -> ([f64; 4], [f64; 4]) {
-        // What is left out behind a tile none of whose pixels lets `saturated` through.
+        // Layers behind a tile all of whose pixels let less than `saturated` through are left out.
         let skipped = if self.passed - self.off_passed < saturated { saturated } else { 0.0 };
         let channel = |k: usize| {
             let (front, off, most) = match k {
@@ -67,7 +73,8 @@ impl Composed {
                 + skipped * most;
             let inherited = inherited + 2.0 * U * (value.abs() + inherited);
             if r.step > 0.0 {
-                // Cut to its range at the end alone, to one of the two steps beside it.
+                // The result is clamped once at the end, and rounded to one of the two neighbouring
+                // steps.
                 return (value.clamp(0.0, 1.0), inherited + r.step);
             }
             (value, inherited + 2.0 * r.unit * (value.abs() + inherited).max(r.least_normal))
@@ -77,34 +84,30 @@ impl Composed {
     }
 }
 
-/// What is composed.
+/// A composition of sprites on a device.
 #[derive(Clone, Copy)]
 pub struct Composition<'a> {
+    /// The view.
     pub view: &'a View,
-    pub blobs: &'a [Blob],
-    pub radiance: &'a [DVec3],
-    pub order: &'a [u32],
-    pub factor: Option<Factor<'a>>,
+    /// The sprites.
+    pub sprites: Sprites<'a>,
     /// How the device may depart: opacities by `alpha` of themselves, edges by `edge`, the target
     /// by `unit`.
     pub rounding: Rounding,
-    /// What lies behind less than this may be left out.
+    /// Transmittance below which the layers behind may be left out.
     pub saturated: f64,
 }
 
-/// The picture over `behind`, a pixel each, and per channel a bound on what the device may differ.
-pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+/// Returns the picture over `behind`, one a pixel, and per channel a bound on what the device may
+/// differ.
+pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> Bounded {
     render_by(of, behind, Composed::under)
 }
 
-/// The same where a device composes by another form of the law, with errors of its own.
-pub(super) fn render_by(
-    of: &Composition<'_>,
-    behind: &[OpaquePixel],
-    layer: Layer,
-) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+/// Composes as a device that uses another form of the law, with errors of its own.
+pub(super) fn render_by(of: &Composition<'_>, behind: &[OpaquePixel], layer: AddLayer) -> Bounded {
     let (view, most) =
-        (of.view, of.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max));
+        (of.view, of.sprites.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max));
     let pixel = |(i_pixel, under): (usize, &OpaquePixel)| {
         let (i, j) = (i_pixel as u32 % view.width, i_pixel as u32 / view.width);
         compose(of, view.ray(i, j), under, layer).over(under, &of.rounding, of.saturated, most)
@@ -112,37 +115,21 @@ pub(super) fn render_by(
     behind.iter().enumerate().map(pixel).unzip()
 }
 
-fn compose(of: &Composition<'_>, ray: DVec3, under: &OpaquePixel, layer: Layer) -> Composed {
-    let Composition { view, blobs, radiance, order, factor, rounding: r, .. } = of;
+fn compose(of: &Composition<'_>, ray: DVec3, under: &OpaquePixel, layer: AddLayer) -> Composed {
+    let Composition { view, sprites, rounding, .. } = of;
     let mut pixel =
         Composed { color: DVec3::ZERO, passed: 1.0, off_color: DVec3::ZERO, off_passed: 0.0 };
-    for &k in order.iter().rev() {
-        let (blob, k) = (&blobs[k as usize], k as usize);
-        let c = blob.position - view.pose.position;
-        let depth = c.dot(view.pose.forward);
-        if !(depth >= view.near && blob.sigma > 0.0 && blob.kappa > 0.0) {
+    for &j in sprites.order.iter().rev() {
+        let j = j as usize;
+        let Some(seen) =
+            Seen::new(view, &sprites.blobs[j], rounding).filter(|_| sprites.blobs[j].kappa > 0.0)
+        else {
             continue;
+        };
+        let opaque = (under.depth, under.depth_bound);
+        if let Some(found) = seen.layer(view, sprites, j, ray, opaque, rounding) {
+            layer(&mut pixel, found.alpha, found.off, sprites.radiance[j]);
         }
-        let (above, off_size) = view.above_smallest(blob, c, r.depth);
-        if above < -off_size {
-            continue;
-        }
-        let of_size = above.abs() < off_size;
-        let line = blob.along(c, ray);
-        let cut = view.cut(line.depth);
-        let beyond = 0.5 * line.off.powi(2) - cut;
-        let (is_in, on_edge) = (beyond <= 0.0 && cut > 0.0, beyond.abs() <= r.slack(cut));
-        let at_behind = (depth - under.depth).abs() < under.depth_bound;
-        if (!is_in && !on_edge) || (depth > under.depth && !at_behind) {
-            continue;
-        }
-        let delta = view.slopes_of(ray) - view.slopes_of(c);
-        let factor = factor.map_or(1.0, |f| f(k, delta));
-        let alpha = alpha(factor * line.tau());
-        let off =
-            if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
-        let drawn = if is_in && depth <= under.depth && above >= 0.0 { alpha } else { 0.0 };
-        layer(&mut pixel, drawn, off, radiance[k]);
     }
     pixel
 }
@@ -152,7 +139,7 @@ mod tests {
     use super::*;
     use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
-    use crate::reference::sprites;
+    use crate::reference::{Blob, sprites};
 
     #[test]
     fn near_to_far_is_the_picture_of_far_to_near() {
@@ -181,18 +168,11 @@ mod tests {
         for under in [OpaquePixel::EMPTY, OpaquePixel { depth: 9.0, ..under }, under] {
             let behind = [under; 6];
             let none = Rounding::NONE;
-            let of = Composition {
-                view: &view,
-                blobs: &blobs,
-                radiance: &colors,
-                order: &[1, 0],
-                factor: None,
-                rounding: none,
-                saturated: 0.0,
-            };
+            let sprites =
+                Sprites { blobs: &blobs, radiance: &colors, order: &[1, 0], factor: None };
+            let of = Composition { view: &view, sprites, rounding: none, saturated: 0.0 };
             let (near_first, bound) = render_over(&of, &behind);
-            let (far_first, _) =
-                sprites::render_over(&view, &behind, &blobs, &colors, &[1, 0], &none);
+            let (far_first, _) = sprites::render_over(&view, &behind, &sprites, &none);
             for (a, b) in near_first.concat().iter().zip(far_first.concat()) {
                 assert!((a - b).abs() < 1e-15, "{a} {b}");
             }

@@ -1,40 +1,41 @@
-//! How much of every light arrives at every facet: past the surfaces and through the density grid,
-//! model.md §8 and §11 "transmit". In: grid, rectangles, facets and lights, all relative to O. Out:
-//! [facet × light], light fastest; dimensionless.
+//! Transmittance from every facet to every light: past the surfaces and through the density grid,
+//! model.md §8 and §11 "transmit".
+//!
+//! In: grid, rectangles, facets and lights, all relative to O. Out: [facet][light], dimensionless.
 
 use glam::DVec3;
 
 use super::grid::sample;
 use super::occlude::{Rectangle, is_clear};
-use crate::model::grid::GridSpec;
+use crate::model::grid::{GridSpec, MAX_MARCH_STEPS};
 use crate::model::light::Light;
 
-/// Greatest number of march steps, 8 a cell along the longest axis of the largest grid: no `step`
-/// knob hangs a GPU. A march that would need more ends after this many.
-pub const MAX_STEPS: u32 = 4096;
-
-/// What light can meet on its way, and how it is marched through.
+/// Everything that attenuates light, and how it is marched through.
 #[derive(Debug, Clone, Copy)]
 pub struct Obstacles<'a> {
+    /// Place of the density grid.
     pub spec: &'a GridSpec,
+    /// Densities of its cells.
     pub cells: &'a [f64],
-    /// Of the surfaces, which are the first regions.
+    /// Rectangles of the surfaces, which are the first regions.
     pub rectangles: &'a [Rectangle],
-    /// In cells.
+    /// March step, cells.
     pub step: f64,
     /// g.
     pub forward: f64,
 }
 
-/// Where light arrives: a facet's centre, and its region.
+/// A point where light arrives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Receiver {
+    /// Centre of the facet.
     pub position: DVec3,
+    /// Index of its region.
     pub i_region: u32,
 }
 
-/// From where to where the way from `p` along unit `d`, `distance` long, leads through the grid's
-/// box, faces included; `None` where it misses the box.
+/// Returns the range of the way from `p` along unit `d`, `distance` long, that leads through the
+/// grid's box, faces included; `None` if it misses the box.
 pub fn crossing(spec: &GridSpec, p: DVec3, d: DVec3, distance: f64) -> Option<(f64, f64)> {
     let (low, high) = (spec.low, spec.high());
     let (mut enter, mut leave) = (0f64, distance);
@@ -46,19 +47,19 @@ pub fn crossing(spec: &GridSpec, p: DVec3, d: DVec3, distance: f64) -> Option<(f
             return None;
         }
     }
-    // Without a direction there is no way to go.
+    // Without a direction the range is unbounded.
     (enter <= leave && leave.is_finite()).then_some((enter, leave))
 }
 
-/// Number of march steps of `step` over `length`, the last one shorter.
+/// Returns the number of march steps of `step` over `length`; the last one is shorter.
 pub fn n_steps(length: f64, step: f64) -> u32 {
     // `as` saturates; NaN (0/0) becomes 0 and then 1.
-    ((length / step).ceil() as u32).clamp(1, MAX_STEPS)
+    ((length / step).ceil() as u32).clamp(1, MAX_MARCH_STEPS)
 }
 
-/// τ = Σ ρ(x_k) s_k from `p` along unit `d` over `distance`: steps of `step` cells from where the
-/// way enters the grid's box, the last one shorter, so that τ is continuous in the length; x_k is
-/// the middle of step k.
+/// Returns τ = Σ ρ(x_k) s_k from `p` along unit `d` over `distance`. Steps of `step` cells begin
+/// where the way enters the grid's box; the last one is shorter, so that τ is continuous in the
+/// length. x_k is the middle of step k.
 pub fn optical_depth(
     spec: &GridSpec,
     cells: &[f64],
@@ -77,15 +78,15 @@ pub fn optical_depth(
     (0..n_steps(length, step)).map(of_step).sum()
 }
 
-/// Samples of the grid that [`optical_depth`] takes.
+/// Returns the number of samples of the grid that [`optical_depth`] takes.
 pub fn n_samples(spec: &GridSpec, p: DVec3, d: DVec3, distance: f64, step: f64) -> u32 {
     crossing(spec, p, d, distance)
         .map_or(0, |(enter, leave)| n_steps(leave - enter, step / spec.cells_along(d)))
 }
 
 impl Obstacles<'_> {
-    /// e^{−(1−g)τ} on the way from `p` to the light.
-    pub fn through_the_cloud(&self, p: DVec3, light: &Light) -> f64 {
+    /// Returns e^{−(1−g)τ} on the way from `p` to the light.
+    fn through_the_cloud(&self, p: DVec3, light: &Light) -> f64 {
         let way = light.arrival(p);
         let tau = optical_depth(self.spec, self.cells, p, way.toward, way.distance, self.step);
         (-(1.0 - self.forward) * tau).exp()
@@ -95,8 +96,8 @@ impl Obstacles<'_> {
         is_clear(self.rectangles, receiver.i_region, p, light)
     }
 
-    /// V = [nothing hides the way] e^{−(1−g)τ} of every facet toward every light; 0 toward lights
-    /// without energy.
+    /// Returns V of every facet toward every light: 0 if a surface hides the light, else
+    /// e^{−(1−g)τ}; 0 for lights without energy. *Shape*: [facet][light].
     pub fn transmittance(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
         let one = |r: &Receiver, light: &Light| {
             let is_lit = light.energy() != DVec3::ZERO && self.is_clear(r, r.position, light);
@@ -105,7 +106,8 @@ impl Obstacles<'_> {
         receivers.iter().flat_map(|r| lights.iter().map(move |l| one(r, l))).collect()
     }
 
-    /// What clouds alone let through, [receiver × light]; 0 of a light without energy.
+    /// Returns the transmittance of the clouds alone; 0 for lights without energy. *Shape*:
+    /// [receiver][light].
     pub fn through(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
         let one = |r: &Receiver, light: &Light| {
             if light.energy() == DVec3::ZERO {
@@ -222,7 +224,7 @@ mod tests {
         let receivers = [at(0.0, -1.0, 0), at(0.75, 1.0, 2), at(1.25, 1.0, 2), at(-1.0, 5.0, 1)];
         let through = (-0.5f64 * 0.75).exp();
         assert_eq!(all.transmittance(&receivers, &[sky]), [0.0, 0.0, through, 1.0]);
-        // The way from the floor passes the cloud's hull by; the lid does not count.
+        // The way from the floor passes outside the cloud's hull; the lid does not count.
         assert_eq!(all.through(&receivers, &[sky]), [1.0, through, through, 1.0]);
         assert_eq!(all.transmittance(&receivers, &[dark]), [0.0; 4]);
         assert_eq!(all.through(&receivers, &[dark]), [0.0; 4]);
@@ -242,7 +244,7 @@ mod tests {
         let leave = crossing(&SPEC, p[0], DVec3::new(-0.6, 0.8, 0.0), f64::INFINITY);
         assert_eq!(leave, Some((0.0, 0.25 / 0.6)));
         assert_eq!([n_steps(3.75, 0.25), n_steps(3.76, 0.25), n_steps(0.0, 0.25)], [15, 16, 1]);
-        assert_eq!(n_steps(3.75, 1e-9), MAX_STEPS);
+        assert_eq!(n_steps(3.75, 1e-9), MAX_MARCH_STEPS);
     }
 
     #[test]
@@ -265,7 +267,7 @@ mod tests {
             optical_depth(&SPEC, &margin, DVec3::new(x, 1.0, 1.0), DVec3::X, f64::INFINITY, 1.0)
         };
         assert!(tau(2.5) > 0.0 && (tau(2.5 - 1e-9) - tau(2.5 + 1e-9)).abs() < 1e-7);
-        // In a grid the march ends after MAX_STEPS.
+        // In a grid the march ends after MAX_MARCH_STEPS.
         let short = optical_depth(&SPEC, &[1.0; 128], DVec3::ONE, DVec3::X, f64::INFINITY, 1e-4);
         assert!((short - 4096.0 * 0.5e-4).abs() < 1e-12);
     }

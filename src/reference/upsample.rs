@@ -1,24 +1,28 @@
-//! The blobs' smaller picture put over the full one, model.md §11 "upsample", in f64. In: the small
-//! picture, of blobs alone; where there are surfaces their picture, and near/z of what small and
-//! full pixels see. Out: [width × height] of [C_r, C_g, C_b, A], row 0 at the top, and what the
-//! terms of each sum to in magnitude.
+//! Composition of the blobs' low-resolution picture over the full one, model.md §11 "upsample", in
+//! f64.
+//!
+//! In: the small picture, of blobs alone; with surfaces their picture, and near/z of small and full
+//! pixels. Out: [row][column] of [C_r, C_g, C_b, A], row 0 at the top, and the sum of the
+//! magnitudes of each value's terms.
 
 use crate::model::resolution::{ALIKE, LowResLayout};
 
 /// Surfaces under the blobs.
 #[derive(Debug, Clone, Copy)]
 pub struct OpaqueLayer<'a> {
+    /// Picture of the surfaces.
     pub picture: &'a [[f64; 4]],
-    /// near/z of the full pixels, and of the small ones; 0: nothing.
+    /// near/z of the full pixels; 0 where nothing is seen.
     pub depths: &'a [f64],
+    /// near/z of the small pixels; 0 where nothing is seen.
     pub small_depths: &'a [f64],
 }
 
-/// A number and Σ |terms| of it, which its rounding is a share of.
+/// A value and the sum of its terms' magnitudes, which bounds its rounding.
 pub type Summed = ([f64; 4], [f64; 4]);
 
-/// Lagrange's weights of the n taps from −(n/2 − 1) on at t in [0, 1).
-pub fn lagrange(n: i32, t: f64) -> Vec<f64> {
+/// Returns Lagrange's weights of the n taps from −(n/2 − 1) on, at t in [0, 1).
+fn lagrange(n: i32, t: f64) -> Vec<f64> {
     let taps = || 1 - n / 2..=n / 2;
     let weight = |k: i32| {
         let others = taps().filter(|m| *m != k);
@@ -27,13 +31,14 @@ pub fn lagrange(n: i32, t: f64) -> Vec<f64> {
     taps().map(weight).collect()
 }
 
-/// 0 of one surface's depths, else the share by which they differ; `alike` as the law has it.
+/// Returns the relative difference of two depths; 0 if it is at most `alike`, so that they are of
+/// one surface.
 pub fn apart(a: f64, b: f64, alike: f64) -> f64 {
     let (nearer, by) = (a.max(b), (a - b).abs());
     if by <= alike * nearer { 0.0 } else { by / nearer }
 }
 
-/// The whole picture.
+/// Composes the whole picture.
 pub fn render(
     small: &LowResLayout,
     blobs: &[[f64; 4]],
@@ -42,7 +47,7 @@ pub fn render(
     render_alike(small, blobs, under, ALIKE)
 }
 
-/// The same where depths are of one surface up to another share.
+/// Composes with another tolerance of depths of one surface.
 pub fn render_alike(
     small: &LowResLayout,
     blobs: &[[f64; 4]],
@@ -68,7 +73,7 @@ pub fn render_alike(
     .collect()
 }
 
-/// The small picture at a full pixel.
+/// Interpolates the small picture at a full pixel.
 fn interpolated(
     small: &LowResLayout,
     blobs: &[[f64; 4]],
@@ -169,8 +174,8 @@ mod tests {
 
     #[test]
     fn edges_of_depth_part_what_is_interpolated() {
-        // Columns 0 to 3 stand at near/z = 0.5, the others at 0.2; so do the pixels: each has its
-        // own side's value.
+        // Columns 0 to 3 have near/z = 0.5, the others 0.2, and so do the pixels: each gets its own
+        // side's value.
         let step = |low: f64, high: f64| move |x: u32| if x < 4 { low } else { high };
         let got = by_hand([0.5, 0.2], &step(0.5, 0.2), &step(0.9, 0.1));
         assert!((got[0] - 0.9).abs() < 1e-15 && (got[1] - 0.1).abs() < 1e-15, "{got:?}");
@@ -178,12 +183,12 @@ mod tests {
         let far = |x: u32| if x < 6 { 0.5 } else { 0.1 };
         let got = by_hand([0.5, 0.5], &far, &|x| 0.1 * f64::from(x));
         assert!((got[0] - 0.325).abs() < 1e-15 && (got[1] - 0.375).abs() < 1e-15, "{got:?}");
-        // Nothing of 3 and 4 is alike: the nearest that is, column 2 of the first pixel and column
-        // 5 of the second.
+        // Neither 3 nor 4 is alike: the nearest that are, column 2 of the first pixel and column 5
+        // of the second.
         let gap = |x: u32| if x == 3 || x == 4 { 0.9 } else { 0.3 };
         let got = by_hand([0.3, 0.3], &gap, &|x| 0.1 * f64::from(x));
         assert!((got[0] - 0.2).abs() < 1e-15 && (got[1] - 0.5).abs() < 1e-15, "{got:?}");
-        // Nothing at all is: the nearest in depth.
+        // No tap is alike: the nearest in depth counts.
         let got = by_hand([0.25, 0.6], &gap, &|x| 0.1 * f64::from(x));
         assert!((got[0] - 0.2).abs() < 1e-15 && (got[1] - 0.4).abs() < 1e-15, "{got:?}");
     }

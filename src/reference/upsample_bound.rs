@@ -1,8 +1,8 @@
-//! What a pixel may change where blobs are drawn into a smaller picture, model.md §11 "upsample":
-//! Lagrange's remainder with the sixth derivatives bounded by majorant power series, and the steps
-//! where blobs end.
+//! Bound on the change of a pixel by a low-resolution picture, model.md §11 "upsample": Lagrange's
+//! remainder, with the sixth derivatives bounded by majorant power series, and the steps at the
+//! blobs' edges.
 
-/// Of the interpolation along one axis: the greatest |Π (t − k)| of its six taps, and Σ |w| of its
+/// The greatest |Π (t − k)| of the interpolation's six taps along one axis, and Σ |w| of its
 /// weights, both at t = ½.
 const PRODUCT: f64 = 225.0 / 64.0;
 const LEBESGUE: f64 = 356.0 / 256.0;
@@ -10,18 +10,19 @@ const LEBESGUE: f64 = 356.0 / 256.0;
 const GAUSSIAN: [f64; 6] =
     [0.606_531, 0.5, 1.380_2 / 6.0, 3.0 / 24.0, 5.783_5 / 120.0, 15.0 / 720.0];
 
-/// A blob as a pixel's taps see it: its greatest optical depth, and σ in small pixels.
+/// A blob as a pixel's taps see it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seen {
+    /// Greatest optical depth.
     pub tau: f64,
+    /// σ, small pixels.
     pub sigma: f64,
-    /// Some of the taps and the pixel lie within its edge and some beyond it.
+    /// Whether the pixel and its taps lie partly inside and partly outside the blob's edge.
     pub crosses: bool,
 }
 
-/// The most that a channel of radiances up to `brightest` (1 for alpha) may differ from the full
-/// picture, where `seen` are the blobs that the pixel or one of its taps is covered by; `edge` is
-/// e^{−cutoff²/2}.
+/// Returns a bound on the change of a channel of radiances up to `brightest` (1 for alpha). `seen`
+/// are the blobs that cover the pixel or one of its taps; `edge` is e^{−cutoff²/2}.
 pub fn bound(seen: &[Seen], edge: f64, brightest: f64) -> f64 {
     let mut q = [0.0; 7];
     let (mut depth, mut steps) = (0.0, 0.0);
@@ -37,7 +38,7 @@ pub fn bound(seen: &[Seen], edge: f64, brightest: f64) -> f64 {
     (smooth + at_edges) * brightest
 }
 
-/// The first coefficients of e^q, q without a constant: k e_k = Σ j q_j e_{k−j}.
+/// Returns the first coefficients of e^q, q without a constant: k e_k = Σ j q_j e_{k−j}.
 fn exponential(q: &[f64; 7]) -> [f64; 7] {
     let mut e = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     for k in 1..7 {
@@ -101,7 +102,8 @@ mod tests {
         v
     }
 
-    /// Random pictures: every pixel within its bound; the greatest error over bound is told.
+    /// Checks every pixel of random pictures against its bound, and prints the greatest error over
+    /// bound.
     #[test]
     fn no_pixel_of_random_pictures_changes_more() {
         let full = [40, 30];
@@ -164,7 +166,7 @@ mod tests {
             println!(
                 "{n_blobs} blobs of tau up to {tau_most}, 1/{n}: greatest error/bound {greatest:.3}"
             );
-            // No bound that nothing comes near: one blob's edge does.
+            // The bound is not vacuous: one blob's edge comes near it.
             assert!(n_blobs > 1 || greatest > 0.05);
         }
     }

@@ -1,7 +1,8 @@
-//! The volume that sprites stand for, model.md §11 "volume": emission and absorption of overlapping
-//! Gaussian blobs along every pixel's ray, in f64, with an error estimate. In: blobs and eye
-//! relative to O, a radiance a blob, what stands behind. Out: [C_r, C_g, C_b, A] a pixel, row 0 at
-//! the top.
+//! The volume that sprites approximate, model.md §11 "volume": emission and absorption of
+//! overlapping Gaussian blobs along every pixel's ray, in f64, with an error estimate.
+//!
+//! In: blobs and eye relative to O, a radiance a blob, the background. Out: [C_r, C_g, C_b, A] a
+//! pixel, row 0 at the top.
 
 mod piece;
 #[cfg(test)]
@@ -10,47 +11,35 @@ mod tests;
 use glam::DVec3;
 
 use super::Blob;
-use super::sprites::{OpaquePixel, View};
-use piece::{March, Ray};
+use super::composite::OpaquePixel;
+use super::parallel::parallel_map;
+use super::view::View;
+use piece::{RayBlob, RayIntegral, RayIntegrator};
 
-/// One pixel: premultiplied colour and alpha.
+/// A pixel of the volume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pixel {
+    /// Premultiplied colour and alpha.
     pub color: [f64; 4],
-    /// What its radiance may be off, greatest channel: an estimate (model.md §11 "volume").
+    /// Estimated error of the radiance, greatest channel (model.md §11 "volume").
     pub error: f64,
 }
 
-/// One blob where a ray passes it. Lengths along the ray are view depths.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Passed {
-    /// Where the ray is nearest to its centre.
-    center: f64,
-    /// σ/|d|.
-    width: f64,
-    /// τ of the whole line.
-    depth: f64,
-    radiance: DVec3,
-    /// Beyond these less than [`OMITTED`] of optical depth lies, all blobs together.
-    from: f64,
-    to: f64,
-}
-
-/// Optical depth that all blobs together may have where they are taken to have ended: each its
-/// share, on either side or wherever its line passes.
+/// Optical depth of all blobs together that is omitted beyond their ends. Each blob has its share
+/// on either side, or where its line passes.
 const OMITTED: f64 = 1e-12;
-/// What this changes of a picture, by its greatest radiance: a blob's share on either side, once as
-/// light and once as shadow; and the rounding of sums of erfs, which is of the same order.
+/// Effect of the omission, as a share of the greatest radiance: a blob's share on either side, once
+/// as light and once as shadow, and the rounding of sums of erfs, which is of the same order.
 const OMITTED_ERROR: f64 = 8.0 * OMITTED;
-/// Of the greatest radiance: the error that a pixel's pieces share.
+/// Error that a pixel's pieces share, relative to the greatest radiance.
 const ACCURACY: f64 = 1e-6;
 
-/// A picture of blobs, row by row.
+/// Blobs with their radiance, integrated row by row.
 pub struct Volume<'a> {
     view: View,
     blobs: &'a [Blob],
     radiance: &'a [DVec3],
-    /// Of every blob the columns and rows that its rays lie in.
+    /// Columns and rows of every blob's rays.
     places: Vec<[(u32, u32); 2]>,
     /// Greatest magnitude of a channel of a blob's radiance.
     brightest: f64,
@@ -58,7 +47,7 @@ pub struct Volume<'a> {
 }
 
 impl<'a> Volume<'a> {
-    /// Of the view the cutoff does not count.
+    /// Prepares the blobs for a view, whose cutoff is ignored.
     pub fn new(view: &View, blobs: &'a [Blob], radiance: &'a [DVec3]) -> Volume<'a> {
         let omitted = OMITTED / blobs.len().max(1) as f64;
         let place = |blob: &Blob| {
@@ -73,28 +62,28 @@ impl<'a> Volume<'a> {
         Volume { view: *view, blobs, radiance, places, brightest, omitted }
     }
 
-    /// Row `j` before `behind`, a pixel each.
+    /// Integrates row `j` before `behind`, one a pixel.
     pub fn row(&self, j: u32, behind: &[OpaquePixel]) -> Vec<Pixel> {
         self.of_row(j, (0..self.view.width).zip(behind.iter().copied()))
     }
 
-    /// Some pixels of row `j`: their columns, and what is behind each.
+    /// Integrates some pixels of row `j`, given by column and background.
     pub fn of_row(&self, j: u32, columns: impl Iterator<Item = (u32, OpaquePixel)>) -> Vec<Pixel> {
         let inside = |(from, to): (u32, u32), i: u32| (from..to).contains(&i);
         let of_row: Vec<usize> =
             (0..self.blobs.len()).filter(|&k| inside(self.places[k][1], j)).collect();
-        let mut march = March::default();
+        let mut integrator = RayIntegrator::default();
         let pixel = |(i, behind): (u32, OpaquePixel)| {
             let ray = self.view.ray(i, j);
             let near = of_row.iter().filter(|&&k| inside(self.places[k][0], i));
             let passed = near.filter_map(|&k| self.pass(k, ray, behind.depth)).collect();
-            self.pixel(&mut march, passed, &behind)
+            self.pixel(&mut integrator, passed, &behind)
         };
         columns.map(pixel).collect()
     }
 
-    /// Blob `k` along `ray` from the near plane to `end`, where it is there at all.
-    fn pass(&self, k: usize, ray: DVec3, end: f64) -> Option<Passed> {
+    /// Returns blob `k` along `ray` from the near plane to `end`; `None` if it is not there.
+    fn pass(&self, k: usize, ray: DVec3, end: f64) -> Option<RayBlob> {
         let blob = &self.blobs[k];
         let c = blob.position - self.view.pose.position;
         let depth = blob.along(c, ray).tau();
@@ -103,16 +92,29 @@ impl<'a> Volume<'a> {
             (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
         let reach = reach(depth, self.omitted) * width;
         let (from, to) = ((center - reach).max(self.view.near), (center + reach).min(end));
-        (from < to).then_some(Passed { center, width, depth, radiance: self.radiance[k], from, to })
+        (from < to).then_some(RayBlob {
+            center,
+            width,
+            depth,
+            radiance: self.radiance[k],
+            from,
+            to,
+        })
     }
 
-    fn pixel(&self, march: &mut March, passed: Vec<Passed>, behind: &OpaquePixel) -> Pixel {
-        let Ray { color, tau, error } = march.integrate(&passed, ACCURACY * self.brightest);
+    fn pixel(
+        &self,
+        integrator: &mut RayIntegrator,
+        passed: Vec<RayBlob>,
+        behind: &OpaquePixel,
+    ) -> Pixel {
+        let RayIntegral { color, tau, error } =
+            integrator.integrate(&passed, ACCURACY * self.brightest);
         let through = (-tau).exp();
         let [r, g, b, a] = behind.color;
         let shown = color + through * DVec3::new(r, g, b);
         let brightest = behind.color.iter().fold(self.brightest, |most, v| most.max(v.abs()));
-        // 1 − T (1 − A_s), without losing a thin cloud's digits.
+        // 1 − T (1 − A_s), accurate for thin clouds.
         let alpha = -libm::expm1(-tau) + through * a;
         Pixel {
             color: [shown.x, shown.y, shown.z, alpha],
@@ -121,13 +123,13 @@ impl<'a> Volume<'a> {
     }
 }
 
-/// From how many σ on a blob of optical depth `depth` has less than `omitted` left; 0 where it
-/// never has more (or is no blob). The tail beyond x is below e^{−x²/2}/2 of the whole.
+/// Returns the number of σ beyond which a blob of optical depth `depth` has less than `omitted`
+/// left; 0 if it never has more. The tail beyond x is below e^{−x²/2}/2 of the whole.
 fn reach(depth: f64, omitted: f64) -> f64 {
     if depth > omitted { (2.0 * (depth / omitted).ln()).sqrt() } else { 0.0 }
 }
 
-/// The whole picture before `behind`, a pixel each, and nothing said in between.
+/// Integrates the whole picture before `behind`, one a pixel.
 pub fn render(
     view: &View,
     behind: &[OpaquePixel],
@@ -136,8 +138,6 @@ pub fn render(
 ) -> Vec<Pixel> {
     let volume = Volume::new(view, blobs, radiance);
     let width = view.width as usize;
-    super::area::mean::each(view.height as usize, |j| {
-        volume.row(j as u32, &behind[j * width..][..width])
-    })
-    .concat()
+    parallel_map(view.height as usize, |j| volume.row(j as u32, &behind[j * width..][..width]))
+        .concat()
 }

@@ -13,7 +13,7 @@ use crate::model::cloud::Particle;
 use crate::model::growth::Growth;
 use crate::model::gust::{Gust, Mode};
 use crate::model::scene::Scene;
-use crate::reference::picture::stages::FrameReference;
+use crate::reference::picture::FrameReference;
 use crate::reference::rounding::{SINE_ERROR, U_F32};
 
 pub const CASES: &[Case] = &[

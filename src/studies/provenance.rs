@@ -7,8 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::gpu::DeviceInfo;
 use crate::io::scene_file::LoadedScene;
-use crate::reference::picture::kind::ReferenceKind;
-use crate::reference::picture::pixels::Pixels;
+use crate::reference::picture::{Pixels, ReferenceKind};
 use crate::studies::reference_cache::Kept;
 use crate::timing::machine::{self, Clocks, Cpu, Device};
 

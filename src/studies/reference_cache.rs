@@ -15,9 +15,7 @@ use crate::model::basis::Sampling;
 use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::scene::{Gather, Lighting, Pairs, Scene, Simulate, Threading, Threads};
 use crate::model::sums::Sums;
-use crate::reference::picture::kind::{Reference, ReferenceKind};
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::whole::Listener;
+use crate::reference::picture::{OnProgress, Pixels, Reference, ReferenceKind};
 
 /// A reference, and where it came from.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,7 +51,7 @@ pub fn reference(
     time_s: f64,
     pixels: &Pixels,
     folder: Option<&Path>,
-    listener: Listener,
+    listener: OnProgress,
 ) -> Result<Kept> {
     against.check(scene, time_s)?;
     let hash = hash_of(against, scene, time_s, pixels);
@@ -62,7 +60,7 @@ pub fn reference(
     if let Some(reference) = path.as_ref().and_then(|path| read(path, &hash, pixels.at.len())) {
         return Ok(Kept { reference, hash, from_cache: true });
     }
-    let reference = against.reference(scene, time_s, pixels, listener)?;
+    let reference = against.render(scene, time_s, pixels, listener)?;
     if let Some(path) = path {
         // A cache that cannot be written costs time and nothing else.
         let _ = path.parent().map(fs::create_dir_all);
@@ -73,12 +71,13 @@ pub fn reference(
 
 /// Whether two scenes have one reference at one time.
 pub fn is_same(against: ReferenceKind, a: &Scene, b: &Scene) -> bool {
-    counted(&ReferenceKind::of_scene(a), against) == counted(&ReferenceKind::of_scene(b), against)
+    counted(&ReferenceKind::without_approximations(a), against)
+        == counted(&ReferenceKind::without_approximations(b), against)
 }
 
 fn hash_of(against: ReferenceKind, scene: &Scene, time_s: f64, pixels: &Pixels) -> String {
     let mut hasher = Sha256::new();
-    let counted = counted(&ReferenceKind::of_scene(scene), against);
+    let counted = counted(&ReferenceKind::without_approximations(scene), against);
     let pixels = (pixels.width, pixels.height, pixels.tile, pixels.cell);
     hasher.update(format!(
         "{}\n{against}\n{:x}\n{pixels:?}\n",

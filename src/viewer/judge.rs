@@ -20,9 +20,7 @@ use crate::measure::picture::flip;
 use crate::model::camera::{Camera, CameraKey};
 use crate::model::film::Film;
 use crate::model::scene::Scene;
-use crate::reference::picture::kind::{Reference, ReferenceKind};
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::whole::Work;
+use crate::reference::picture::{Pixels, Reference, ReferenceKind, RenderStage};
 use crate::studies::error::errors::picture_error;
 use crate::studies::error::records::PictureError;
 use crate::studies::reference_cache;
@@ -118,7 +116,7 @@ impl Known {
 /// How far the reference under way is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    pub work: Work,
+    pub work: RenderStage,
     /// Parts of that, facets or rows.
     pub n_done: usize,
     pub n: usize,
@@ -307,7 +305,7 @@ impl Worker {
         wish: u64,
     ) -> Result<Arc<Known>> {
         let n_pixels = pixels.at.len();
-        let listener = |work: Work, n: usize| {
+        let listener = |work: RenderStage, n: usize| {
             let mut desk = self.shared.lock();
             if !self.is_wanted(wish) {
                 drop(desk);

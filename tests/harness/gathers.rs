@@ -11,9 +11,9 @@ use nimbus::model::grid::DEPOSIT_CUT_SIGMA;
 use nimbus::model::light::Light;
 use nimbus::model::pairings::pairings;
 use nimbus::model::scene::{Gather, Scene};
-use nimbus::reference::area::mean::each;
+use nimbus::reference::emulation::{Exchange, Facet, Gathered, Region};
 use nimbus::reference::occlude::Rectangle;
-use nimbus::reference::second::{Exchange, Facet, Gathered, Region};
+use nimbus::reference::parallel::parallel_map;
 use nimbus::reference::transmit::{Obstacles, Receiver};
 use nimbus::reference::{grid, morton, place, sort};
 
@@ -48,7 +48,7 @@ pub fn reference(f: &Frame) -> Vec<Gathered> {
         .collect();
     let groups = scene.groups();
     let generated: Vec<_> =
-        scene.clouds.iter().flat_map(nimbus::reference::generate::cloud).collect();
+        scene.clouds.iter().flat_map(|c| nimbus::reference::live::cloud(c, 0.0)).collect();
     let offsets = place::offsets(&groups, &scene.clouds, 0.0, origin);
     let rest: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
     let blobs = place::blobs(&generated, &place::place(&rest, &groups, &offsets));
@@ -82,10 +82,10 @@ pub fn reference(f: &Frame) -> Vec<Gathered> {
     };
     let senders = exchange.senders();
     if scene.lighting.gather != Gather::Tree {
-        return each(facets.len(), |j| exchange.gather(j, &senders));
+        return parallel_map(facets.len(), |j| exchange.gather(j, &senders));
     }
     let clusters = exchange.clusters(&order(f), &senders, scene.lighting.theta);
-    each(facets.len(), |j| exchange.gather_from(j, &senders, &clusters))
+    parallel_map(facets.len(), |j| exchange.gather_from(j, &senders, &clusters))
 }
 
 /// The facet of each position. Keys are computed in f32 by a difference and a product, which Vulkan

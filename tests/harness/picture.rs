@@ -18,9 +18,11 @@ use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
+use nimbus::reference::composite::{OpaquePixel, Rounding};
 use nimbus::reference::sort::{depths, key32, order};
-use nimbus::reference::sprites::{OpaquePixel, Rounding, View, render_textured};
+use nimbus::reference::sprites::{Sprites, render_over};
 use nimbus::reference::texture::{Pool, SplatTexture, Textured};
+use nimbus::reference::view::View;
 
 use crate::bounded::{Bounded, U, dot, exact3};
 use crate::scenery::{Candidates, Scenery};
@@ -211,15 +213,11 @@ impl Picture {
         };
         let sheets = self.sheets();
         let factor = |j: usize, delta: DVec2| self.factor(&sheets, j, delta);
-        let (value, bound) = render_textured(
-            &self.view,
-            &behind,
-            &blobs,
-            &radiance,
-            &order,
-            &rounding,
-            Some(&factor),
-        );
+        let (value, bound) = {
+            let (blobs, radiance, order) = (&blobs, &radiance, &order);
+            let sprites = Sprites { blobs, radiance, order, factor: Some(&factor) };
+            render_over(&self.view, &behind, &sprites, &rounding)
+        };
         (value.concat(), bound.concat())
     }
 

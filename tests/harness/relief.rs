@@ -9,9 +9,9 @@ use glam::{DVec2, DVec3, Vec3};
 use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, RegionRecord};
 use nimbus::model::material::Brdf;
 use nimbus::model::terrain::{HALVES, Terrain};
-use nimbus::reference::sprites::View;
 use nimbus::reference::surfaces::Hit;
 use nimbus::reference::terrain::Triangle;
+use nimbus::reference::view::View;
 
 use crate::bounded::{Bounded, Random, U, dot, exact3};
 

@@ -8,8 +8,9 @@ use nimbus::layout::facet::{LitRecord, NO_LOBE, RegionRecord};
 use nimbus::model::camera::Pose;
 use nimbus::model::material::Brdf;
 use nimbus::model::surface::Surface;
-use nimbus::reference::sprites::{OpaquePixel, Rounding, View};
+use nimbus::reference::composite::{OpaquePixel, Rounding};
 use nimbus::reference::surfaces::{Hit, meet, radiance, render};
+use nimbus::reference::view::View;
 
 use crate::bounded::{Bounded, Random, U, dot, exact3};
 

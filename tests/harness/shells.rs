@@ -10,8 +10,8 @@ use nimbus::passes::facets::Facets;
 use nimbus::passes::grid::Grid;
 use nimbus::reference::Blob;
 use nimbus::reference::facets::{
-    CONDITIONING, Facet, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions, facets, gradient,
-    smoothstep,
+    CONDITIONING, Facet, FacetSources, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions, facets,
+    gradient, smoothstep,
 };
 use nimbus::reference::generate::uniforms;
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
@@ -180,7 +180,15 @@ impl Scene {
         let regions: Vec<u32> = self.i_group.iter().map(|g| REGIONS[*g as usize]).collect();
         let means: Vec<f64> =
             self.i_group.iter().map(|g| f64::from(SIGMA_MEANS[*g as usize])).collect();
-        facets(&self.spec, cells, &self.blobs, &means, &regions, &self.centers())
+        {
+            let sources = FacetSources {
+                blobs: &self.blobs,
+                sigma_means: &means,
+                regions: &regions,
+                colors: &[],
+            };
+            facets(&self.spec, cells, &sources, &self.centers())
+        }
     }
 
     /// Returns the bound on the density sampled at `p`. The f32 evaluation has a cell coordinate

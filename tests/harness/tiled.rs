@@ -4,7 +4,8 @@
 
 use glam::DVec2;
 use nimbus::model::film::FilmFormat;
-use nimbus::reference::sprites::{OpaquePixel, Rounding};
+use nimbus::reference::composite::{OpaquePixel, Rounding};
+use nimbus::reference::sprites::Sprites;
 use nimbus::reference::tiles::{self, Composition};
 use nimbus::reference::{Blob, chunks};
 
@@ -51,15 +52,9 @@ impl Picture {
         };
         let sheets = self.sheets();
         let factor = |j: usize, delta: DVec2| self.factor(&sheets, j, delta);
-        let of = Composition {
-            view: &self.view,
-            blobs: &blobs,
-            radiance: &radiance,
-            order: &order,
-            factor: Some(&factor),
-            rounding,
-            saturated,
-        };
+        let (blobs, radiance, order) = (&blobs, &radiance, &order);
+        let sprites = Sprites { blobs, radiance, order, factor: Some(&factor) };
+        let of = Composition { view: &self.view, sprites, rounding, saturated };
         let render = if by_tiles { tiles::render_over } else { chunks::render_over };
         let (value, bound) = render(&of, &behind);
         (value.concat(), bound.concat())

@@ -10,7 +10,7 @@ use nimbus::model::count::{Count, DrawnCount};
 use nimbus::model::film::{Film, FilmFormat, ToneMap, srgb_encode};
 use nimbus::model::grid::{GridSpec, MARGIN_CELLS, MAX_CELLS};
 use nimbus::model::growth::{Growth, MAX_SCALE, MIN_SCALE};
-use nimbus::reference::picture::pixels::Pixels;
+use nimbus::reference::picture::Pixels;
 use proptest::collection::vec;
 use proptest::prelude::*;
 

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Subcommand, ValueEnum};
 
 use super::parse_size;
-use crate::reference::picture::kind::ReferenceKind;
-use crate::reference::picture::samples::MAX_SAMPLES;
+use crate::reference::picture::{MAX_SAMPLES, ReferenceKind};
 
 #[derive(Debug, ClapArgs)]
 pub struct FarmArgs {

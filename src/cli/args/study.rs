@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::{SceneArgs, parse_positive};
-use crate::reference::picture::kind::ReferenceKind;
+use crate::reference::picture::ReferenceKind;
 
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \

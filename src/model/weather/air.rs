@@ -1,59 +1,59 @@
-//! Temperature, humidity and density of air, in the formulas and with the constants of wrf-python
-//! (NCAR), docs/model.md §15.
+//! Temperature, humidity and density of air, with the formulas and constants of wrf-python (NCAR),
+//! docs/model.md §15.
 
 use crate::model::moisture::{Saturation, Vapour};
 
-/// m/s², of geopotential to height.
+/// Gravity that converts geopotential to height, m/s².
 pub const GRAVITY: f64 = 9.81;
 /// Gas constant of dry air, J/(kg K).
 pub const R_DRY: f64 = 287.0;
 /// Specific heat of dry air at constant pressure, J/(kg K): 7/2 of [`R_DRY`], so that R/c_p is 2/7.
 pub const HEAT_CAPACITY: f64 = 3.5 * R_DRY;
-/// What WRF's T is less than the potential temperature, K.
-pub const THETA_BASE_K: f64 = 300.0;
-/// Where potential temperature is temperature, Pa.
-pub const P0_PA: f64 = 1e5;
-/// Molecular weights, water over dry air.
+/// Potential temperature minus WRF's T, K.
+const THETA_BASE_K: f64 = 300.0;
+/// Pressure at which potential temperature equals temperature, Pa.
+const P0_PA: f64 = 1e5;
+/// Molecular weight of water over that of dry air.
 pub const EPSILON: f64 = 0.622;
-/// No air of the earth is outside, K: what is there is no temperature. Bolton's formula has a pole
-/// at 29.65 K.
+/// Range of air temperatures on Earth, K. Values outside are not temperatures; Bolton's formula has
+/// a pole at 29.65 K.
 pub const TEMPERATURES_K: (f64, f64) = (100.0, 400.0);
-/// The same of pressure, Pa; WRF's tops lie above 100 Pa.
+/// Range of air pressures, Pa; WRF's tops lie above 100 Pa.
 pub const PRESSURES_PA: (f64, f64) = (0.1, 120_000.0);
 
-/// T = θ (p/p₀)^(2/7), `perturbation_k` being WRF's T = θ − 300 K.
+/// Returns the temperature θ (p/p₀)^(2/7), K, from WRF's T = θ − 300 K.
 pub fn temperature(perturbation_k: f64, p_pa: f64) -> f64 {
     (perturbation_k + THETA_BASE_K) * (p_pa / P0_PA).powf(2.0 / 7.0)
 }
 
-/// What wrf-python takes at every temperature: Bolton over water, whose formula and constants are
-/// the same.
+/// Bolton over water, which wrf-python uses at every temperature with the same constants.
 const WATER: Vapour = Vapour { saturation: Saturation::Bolton, ice: false };
 
-/// Saturation vapour pressure over water, Pa: Bolton 1980 (10).
+/// Returns the saturation vapour pressure over water, Pa. *Source*: Bolton 1980 (10).
 pub fn saturation_pa(t_k: f64) -> f64 {
     WATER.saturation(t_k)
 }
 
-/// Mixing ratio of saturated air, kg/kg, ε E/(p − (1 − ε) E): wrf-python's, whose 1 − ε makes q/q_s
-/// what a specific humidity's would be. Infinite where water boils.
+/// Returns the mixing ratio of saturated air, kg/kg: ε E/(p − (1 − ε) E). Infinite where water
+/// boils. It is wrf-python's formula; its 1 − ε makes q/q_s the quotient of specific humidities.
 pub fn saturation_ratio(p_pa: f64, t_k: f64) -> f64 {
     let e = saturation_pa(t_k);
     let dry = p_pa - (1.0 - EPSILON) * e;
     if dry > 0.0 { EPSILON * e / dry } else { f64::INFINITY }
 }
 
-/// q_v over [`saturation_ratio`]: above 1 where the air is supersaturated (wrf-python cuts there).
+/// Returns q_v over [`saturation_ratio`]: above 1 in supersaturated air, which wrf-python clamps.
 pub fn relative_humidity(q_vapour: f64, p_pa: f64, t_k: f64) -> f64 {
     q_vapour / saturation_ratio(p_pa, t_k)
 }
 
-/// Density of the dry part of the air, kg/m³, which mixing ratios count by: p/(R_d T (1 + q_v/ε)).
+/// Returns the density of the air's dry part, kg/m³, which mixing ratios refer to: p/(R_d T (1 +
+/// q_v/ε)).
 pub fn dry_density(p_pa: f64, t_k: f64, q_vapour: f64) -> f64 {
     p_pa / (R_DRY * t_k * (1.0 + q_vapour / EPSILON))
 }
 
-/// Height in metres of a geopotential in m²/s².
+/// Returns the height in metres of a geopotential in m²/s².
 pub fn height(geopotential: f64) -> f64 {
     geopotential / GRAVITY
 }
@@ -64,10 +64,11 @@ mod tests {
 
     #[test]
     fn air_by_hand() {
-        // Where p = p₀ potential temperature is temperature; at half of it 2^(−2/7) = 0.820335.
+        // At p = p₀ potential temperature is temperature; at half of it the factor is 2^(−2/7) =
+        // 0.820335.
         assert_eq!(temperature(0.0, P0_PA), 300.0);
         assert!((temperature(0.0, 5e4) - 246.1005).abs() < 1e-3);
-        // Bolton 1980, table 1, which his (10) keeps within 0.3 %: 6.112 hPa at 0 °C, 23.37 at 20
+        // Bolton 1980, table 1, which his (10) matches within 0.3 %: 6.112 hPa at 0 °C, 23.37 at 20
         // °C, 42.43 at 30 °C, 0.1891 at −40 °C.
         for (celsius, hpa) in [(0.0, 6.112), (20.0, 23.37), (30.0, 42.43), (-40.0, 0.1891)] {
             let e = saturation_pa(273.15 + celsius) / 100.0;

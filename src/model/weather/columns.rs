@@ -1,5 +1,4 @@
-//! Optical depth straight up through every column: of a file's cells, and of the blobs that stand
-//! for them.
+//! Vertical optical depth of every column: of a file's cells, and of the blobs that represent them.
 
 use std::f64::consts::TAU;
 
@@ -8,10 +7,10 @@ use libm::erf;
 use super::grid::Grid;
 use super::particles::WeatherBlob;
 
-/// A blob's footprint is added up to this many σ_xy: 2 · 10⁻⁹ of its mass lies beyond.
+/// Radius of a blob's footprint, σ_xy: 2 · 10⁻⁹ of its mass lies beyond.
 const REACH: f64 = 6.0;
 
-/// Σ β Δh of each column.
+/// Returns Σ β Δh of each column.
 pub fn of_cells(grid: &Grid, extinction: &[f64]) -> Vec<f64> {
     let n_columns = grid.shape().n_columns();
     let mut depths = vec![0.0; n_columns];
@@ -21,8 +20,8 @@ pub fn of_cells(grid: &Grid, extinction: &[f64]) -> Vec<f64> {
     depths
 }
 
-/// The blobs' optical depth straight up, its mean over the area of each column: every blob's mass
-/// over the area, by the share of its footprint that lies within (a product of differences of erf).
+/// Returns the blobs' vertical optical depth, averaged over the area of each column. The share of a
+/// footprint within a column is a product of differences of erf.
 pub fn of_blobs(grid: &Grid, blobs: &[WeatherBlob]) -> Vec<f64> {
     let ground = &grid.ground;
     let mut depths = vec![0.0; ground.shape.n_columns()];
@@ -41,8 +40,8 @@ pub fn of_blobs(grid: &Grid, blobs: &[WeatherBlob]) -> Vec<f64> {
     depths
 }
 
-/// The blobs' optical depth straight up at `side`² points of each column, in the middles of equal
-/// parts; a column's lie together.
+/// Returns the blobs' vertical optical depth at `side`² points of each column, in the middles of
+/// equal parts. *Shape*: [column][point].
 pub fn at_points(grid: &Grid, blobs: &[WeatherBlob], side: usize) -> Vec<f64> {
     let ground = &grid.ground;
     let n_points = side * side;
@@ -64,14 +63,14 @@ pub fn at_points(grid: &Grid, blobs: &[WeatherBlob], side: usize) -> Vec<f64> {
     depths
 }
 
-/// Root mean square of the differences of e^{−τ}; `b` may have several values for each of `a`.
+/// Returns the root mean square difference of e^{−τ}; `b` may have several values for each of `a`.
 pub fn transmittance_rms(a: &[f64], b: &[f64]) -> f64 {
     let each = b.len() / a.len().max(1);
     let square = |(i, depth): (usize, &f64)| ((-depth).exp() - (-a[i / each.max(1)]).exp()).powi(2);
     (b.iter().enumerate().map(square).sum::<f64>() / b.len().max(1) as f64).sqrt()
 }
 
-/// Columns that a blob reaches, and some around them.
+/// Returns the columns that a blob reaches, and some around them.
 fn near(grid: &Grid, blob: &WeatherBlob, reach: f64) -> impl Iterator<Item = usize> {
     let ground = &grid.ground;
     let (nx, ny) = (ground.shape.nx, ground.shape.ny);
@@ -84,12 +83,12 @@ fn near(grid: &Grid, blob: &WeatherBlob, reach: f64) -> impl Iterator<Item = usi
     })
 }
 
-/// From one to the other, and one more on each side.
+/// Returns the range between two indices, widened by one on each side.
 fn margin(a: usize, b: usize, n: usize) -> std::ops::Range<usize> {
     a.min(b).saturating_sub(1)..(a.max(b) + 2).min(n)
 }
 
-/// Index of the place nearest to `at` of `n` that rise or fall.
+/// Returns the index of the place nearest to `at`, of `n` that rise or fall.
 fn nearest(n: usize, at: f64, place: impl Fn(usize) -> f64) -> usize {
     let falls = n > 1 && place(n - 1) < place(0);
     let is_before = |i: usize| if falls { place(i) > at } else { place(i) < at };

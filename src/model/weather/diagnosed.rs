@@ -1,5 +1,5 @@
-//! Clouds where a file has no cloud water: from relative humidity, docs/model.md §15. Whatever
-//! shows them says "diagnosed".
+//! Clouds diagnosed from relative humidity where a file has no cloud water, docs/model.md §15.
+//! Outputs label them "diagnosed".
 
 use super::air::{
     EPSILON, GRAVITY, HEAT_CAPACITY, R_DRY, dry_density, relative_humidity, saturation_ratio,
@@ -7,19 +7,19 @@ use super::air::{
 use super::extinction::single_moment_phase;
 use super::grid::Grid;
 
-/// Relative humidity above which a cell has clouds: between Sundqvist's 0.75 over land and 0.85
+/// Relative humidity above which a cell has clouds, between Sundqvist's 0.75 over land and 0.85
 /// over sea.
-pub const CRITICAL_HUMIDITY: f64 = 0.8;
-/// Share of the adiabatic liquid water that a cloud has: mixing takes the rest. A choice;
-/// stratocumulus has 0.6 to 0.9 of it, cumulus half and less.
-pub const ADIABATIC_SHARE: f64 = 0.5;
-/// Most water within a cloud, kg/kg: beyond it, it rains.
-pub const MAX_WATER_RATIO: f64 = 0.5e-3;
+const CRITICAL_HUMIDITY: f64 = 0.8;
+/// Liquid water of a cloud as a share of the adiabatic one; mixing removes the rest. A choice:
+/// stratocumulus has 0.6 to 0.9, cumulus half and less.
+const ADIABATIC_SHARE: f64 = 0.5;
+/// Greatest water content of a cloud, kg/kg; beyond it, rain removes water.
+const MAX_WATER_RATIO: f64 = 0.5e-3;
 /// Latent heat of evaporation, J/kg, at 0 °C.
 const LATENT_HEAT: f64 = 2.501e6;
 
-/// Share of a cell that clouds cover: Sundqvist, Berge and Kristjánsson 1989, 1 − √((1 − f)/(1 −
-/// f_c)).
+/// Returns the share of a cell that clouds cover: 1 − √((1 − f)/(1 − f_c)). *Source*: Sundqvist,
+/// Berge and Kristjánsson 1989.
 pub fn fraction(humidity: f64) -> f64 {
     if humidity.is_nan() || humidity <= CRITICAL_HUMIDITY {
         return 0.0;
@@ -27,9 +27,9 @@ pub fn fraction(humidity: f64) -> f64 {
     1.0 - ((1.0 - humidity.min(1.0)) / (1.0 - CRITICAL_HUMIDITY)).sqrt()
 }
 
-/// What rising saturated air condenses, kg/kg a metre: (c_p/L)(Γ_d − Γ_s), Γ_s the moist-adiabatic
-/// lapse rate of the Glossary of Meteorology (AMS).
-pub fn condensed_per_metre(p_pa: f64, t_k: f64) -> f64 {
+/// Returns the water that rising saturated air condenses, kg/kg per metre: (c_p/L)(Γ_d − Γ_s).
+/// *Source*: Γ_s is the moist-adiabatic lapse rate of the Glossary of Meteorology (AMS).
+fn condensed_per_metre(p_pa: f64, t_k: f64) -> f64 {
     let q = saturation_ratio(p_pa, t_k);
     let dry = GRAVITY / HEAT_CAPACITY;
     let (warmth, spread) =
@@ -38,17 +38,19 @@ pub fn condensed_per_metre(p_pa: f64, t_k: f64) -> f64 {
     (HEAT_CAPACITY / LATENT_HEAT * (dry - moist)).max(0.0)
 }
 
-/// Air of one moment on a grid's cells.
+/// Air on a grid's cells at one moment.
 #[derive(Debug, Clone, Copy)]
 pub struct Air<'a> {
+    /// Pressure.
     pub pressure_pa: &'a [f64],
+    /// Temperature.
     pub temperature_k: &'a [f64],
-    /// kg/kg.
+    /// Mixing ratio of water vapour, kg/kg.
     pub vapour: &'a [f64],
 }
 
-/// Extinction in m⁻¹ of every cell: [`fraction`] times water that grows adiabatically from the
-/// lowest humid cell of the layer. What is below 273.15 K is ice.
+/// Returns the extinction of every cell, m⁻¹: [`fraction`] times water that grows adiabatically
+/// from the lowest humid cell of the layer. Water below 273.15 K is ice.
 pub fn extinction(grid: &Grid, air: Air) -> Vec<f64> {
     let shape = grid.shape();
     let mut extinction = vec![0.0; shape.n_cells()];
@@ -100,7 +102,7 @@ mod tests {
             "{}",
             condensed_per_metre(9e4, 283.15)
         );
-        // Cold air has next to nothing to condense.
+        // Cold air condenses almost nothing.
         assert!(condensed_per_metre(3e4, 230.0) < 0.3e-6);
     }
 
@@ -115,12 +117,13 @@ mod tests {
         let vapour = [0.5, 1.0, 1.0, 0.5, 1.0].map(|f| f * saturated);
         let air = Air { pressure_pa: &[p; 5], temperature_k: &[t; 5], vapour: &vapour };
         let beta = extinction(&grid, air);
-        // 0.5 · 1.889e-6 · 100 m = 9.444e-5 kg/kg at the middle of the first 200 m; 0.15 m⁻¹ a g/kg
-        // in 1 kg/m³, of which there are 9e4/(287 · 283.15 (1 + 8.524e-3/0.622)) = 1.0925.
+        // 0.5 · 1.889e-6 · 100 m = 9.444e-5 kg/kg at the middle of the first 200 m. The extinction
+        // is 0.15 m⁻¹ a g/kg in 1 kg/m³, and the dry density is 9e4/(287 · 283.15 (1 +
+        // 8.524e-3/0.622)) = 1.0925.
         assert!((beta[1] - 0.15 * 1.0925 * 0.09444).abs() < 1e-5, "{beta:?}");
         assert!((beta[2] / beta[1] - 3.0).abs() < 1e-12);
         assert_eq!((beta[0], beta[3], beta[4]), (0.0, 0.0, beta[1]));
-        // A kilometre deep it is what it may be at most.
+        // A kilometre deep, the cloud has its greatest water content.
         let deep = Grid { heights_m: vec![0.0, 1e3, 2e3, 3e3, 4e3, 5e3], ..grid };
         assert!((extinction(&deep, air)[2] - 0.15 * 1.0925 * 0.5).abs() < 1e-5);
     }

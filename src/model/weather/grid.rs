@@ -1,49 +1,56 @@
-//! Where WRF's cells are: their sizes on the ground from the map factors, their bottoms and tops
-//! from staggered heights.
+//! Places of WRF's cells: sizes on the ground from map factors, bottoms and tops from staggered
+//! heights.
 
-/// Cells along west–east, south–north and upward.
+/// Number of cells west–east, south–north and upward.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
+    /// Cells west–east.
     pub nx: usize,
+    /// Cells south–north.
     pub ny: usize,
+    /// Cells upward.
     pub nz: usize,
 }
 
 impl Shape {
+    /// Returns the number of columns.
     pub fn n_columns(self) -> usize {
         self.nx * self.ny
     }
 
+    /// Returns the number of cells.
     pub fn n_cells(self) -> usize {
         self.n_columns() * self.nz
     }
 
-    /// Number of a cell of column `i_column` at level `k`.
+    /// Returns the index of the cell of column `i_column` at level `k`.
     pub fn cell(self, k: usize, i_column: usize) -> usize {
         k * self.n_columns() + i_column
     }
 }
 
-/// What the ground under a grid is divided into.
+/// Columns of a grid on the ground.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ground {
+    /// Number of cells.
     pub shape: Shape,
-    /// Sizes of the columns, m: the file's spacing over the map factor there.
+    /// Size of the columns west–east, m: the file's spacing over the map factor.
     pub dx_m: Vec<f64>,
+    /// Size of the columns south–north, m.
     pub dy_m: Vec<f64>,
-    /// Their centres, m east and m south of the domain's centre: sizes added up along rows and
-    /// columns, so that every column has its own size; rows are then shifted against each other by
-    /// what map factors differ.
+    /// Centres of the columns, m east of the domain's centre. Sizes are summed along rows, so that
+    /// every column has its own size, and rows are shifted as map factors differ.
     pub east_m: Vec<f64>,
+    /// Centres of the columns, m south of the domain's centre, summed along columns.
     pub south_m: Vec<f64>,
 }
 
 impl Ground {
-    /// From the file's spacing and its map factors, a column each; a factor of 0 is that of an
-    /// idealised file, which has no map, if `is_idealised`.
+    /// Computes sizes and centres from the file's spacing and map factors, one a column. A factor
+    /// of 0 counts as 1 if `is_idealised`: such a file has no map.
     ///
     /// # Errors
-    /// What a spacing or a factor should be.
+    /// A map factor is out of range.
     pub fn new(
         shape: Shape,
         spacing_m: (f64, f64),
@@ -62,17 +69,18 @@ impl Ground {
         }
         for i in 0..shape.nx {
             let column = (0..shape.ny).map(|j| dy_m[j * shape.nx + i]);
-            // Rows go north, and z goes south.
+            // Rows run north, and z points south.
             centres(column, |j, place| south_m[j * shape.nx + i] = -place);
         }
         Ok(Ground { shape, dx_m, dy_m, east_m, south_m })
     }
 
+    /// Returns the area of a column.
     pub fn area_m2(&self, i_column: usize) -> f64 {
         self.dx_m[i_column] * self.dy_m[i_column]
     }
 
-    /// Greatest distance of a column's edge from the centre, m.
+    /// Returns the greatest distance of a column's edge from the centre, east and south, m.
     pub fn extent_m(&self) -> (f64, f64) {
         let greatest = |places: &[f64], sizes: &[f64]| {
             places
@@ -85,7 +93,7 @@ impl Ground {
     }
 }
 
-/// Map factors of any projection where WRF runs.
+/// Range of the map factors of WRF's projections.
 const FACTORS: (f64, f64) = (0.05, 20.0);
 
 fn size(spacing_m: f64, factor: f64, is_idealised: bool) -> Result<f64, String> {
@@ -99,7 +107,7 @@ fn size(spacing_m: f64, factor: f64, is_idealised: bool) -> Result<f64, String> 
     Ok(spacing_m / factor)
 }
 
-/// Centres of intervals laid end to end, around the middle of all.
+/// Computes the centres of intervals laid end to end about their common middle.
 fn centres(sizes: impl Iterator<Item = f64> + Clone, mut put: impl FnMut(usize, f64)) {
     let mut edge = -sizes.clone().sum::<f64>() / 2.0;
     for (i, size) in sizes.enumerate() {
@@ -108,17 +116,20 @@ fn centres(sizes: impl Iterator<Item = f64> + Clone, mut put: impl FnMut(usize, 
     }
 }
 
-/// A grid at one moment: the ground, and the height of every cell's bottom and top.
+/// A grid at one moment: the ground, and the bottom and top of every cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
+    /// Columns on the ground.
     pub ground: Ground,
-    /// Staggered, m above sea level: nz + 1 levels.
+    /// Staggered heights, m above sea level. *Shape*: [nz + 1][column].
     pub heights_m: Vec<f64>,
 }
 
 impl Grid {
+    /// Combines ground and heights.
+    ///
     /// # Errors
-    /// Where heights do not rise.
+    /// The heights of a column do not rise.
     pub fn new(ground: Ground, heights_m: Vec<f64>) -> Result<Self, String> {
         let n = ground.shape.n_columns();
         let is_above = |(below, above): (&f64, &f64)| above > below;
@@ -135,28 +146,33 @@ impl Grid {
         Ok(Grid { ground, heights_m })
     }
 
+    /// Returns the number of cells.
     pub fn shape(&self) -> Shape {
         self.ground.shape
     }
 
+    /// Returns the height of a cell's bottom.
     pub fn bottom_m(&self, i_cell: usize) -> f64 {
         self.heights_m[i_cell]
     }
 
+    /// Returns the height of a cell's top.
     pub fn top_m(&self, i_cell: usize) -> f64 {
         self.heights_m[i_cell + self.ground.shape.n_columns()]
     }
 
+    /// Returns the thickness of a cell.
     pub fn thickness_m(&self, i_cell: usize) -> f64 {
         self.top_m(i_cell) - self.bottom_m(i_cell)
     }
 
-    /// Height of a cell's mass point: the mean of its bottom and top, as WRF's tools destagger.
+    /// Returns the height of a cell's mass point: the mean of bottom and top, as WRF's tools
+    /// destagger.
     pub fn middle_m(&self, i_cell: usize) -> f64 {
         0.5 * (self.bottom_m(i_cell) + self.top_m(i_cell))
     }
 
-    /// The grid `weight` of the way to another moment's.
+    /// Returns the grid at `weight` of the way to another moment's.
     pub fn toward(&self, other: &Grid, weight: f64) -> Grid {
         let mix = |(a, b): (&f64, &f64)| a + weight * (b - a);
         let heights_m = self.heights_m.iter().zip(&other.heights_m).map(mix).collect();
@@ -176,13 +192,13 @@ mod tests {
         let ground = Ground::new(SHAPE, (100.0, 50.0), (&factors, &[1.0; 6]), false).unwrap();
         assert_eq!(ground.dx_m, [100.0, 50.0, 100.0, 100.0, 100.0, 100.0]);
         assert_eq!(ground.east_m, [-75.0, 0.0, 75.0, -100.0, 0.0, 100.0]);
-        // The first row is the southern one.
+        // The first row is the southernmost.
         assert_eq!(ground.south_m, [25.0, 25.0, 25.0, -25.0, -25.0, -25.0]);
         assert_eq!(ground.extent_m(), (150.0, 50.0));
     }
 
     #[test]
-    fn factors_of_nothing_are_one_without_a_map() {
+    fn map_factors_of_zero_count_as_one_in_idealised_files() {
         let of = |factor: f64, is_idealised| {
             Ground::new(SHAPE, (9.0, 9.0), (&[factor; 6], &[1.0; 6]), is_idealised)
         };
@@ -192,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn heights_rise_or_say_where_not() {
+    fn heights_that_do_not_rise_are_refused_with_their_place() {
         let ground = Ground::new(SHAPE, (9.0, 9.0), (&[1.0; 6], &[1.0; 6]), false).unwrap();
         let mut heights: Vec<f64> = (0..12).map(|i| if i < 6 { 10.0 } else { 60.0 }).collect();
         let grid = Grid::new(ground.clone(), heights.clone()).unwrap();

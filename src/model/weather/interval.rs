@@ -1,27 +1,29 @@
-//! The blobs of all moments between two steps, or of one step alone: laid out once, and then as
-//! cheap as a mean of two numbers a blob.
+//! The blobs between two steps, or of one step alone. They are laid out once; any moment is then
+//! one interpolation a blob.
 
 use super::grid::Grid;
 use super::particles::{Layout, WeatherBlob};
 
-/// What a step says of its clouds.
+/// The clouds of a step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepClouds<'a> {
+    /// Grid of the step.
     pub grid: &'a Grid,
-    /// m⁻¹, a cell each.
+    /// Extinction of every cell, m⁻¹.
     pub extinction: &'a [f64],
 }
 
+/// Blobs of two neighbouring steps, or of one step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interval {
     from: Vec<WeatherBlob>,
-    /// None where a step stands alone.
+    /// `None` for a single step.
     to: Option<Vec<WeatherBlob>>,
 }
 
 impl Interval {
-    /// From a step to the next one, on a grid of the same shape, or a step alone; `layout` stands
-    /// for them, and maybe for more.
+    /// Places the blobs of `layout` for a step and the next one on a grid of the same shape, or for
+    /// a step alone.
     pub fn laid_out(layout: &Layout, a: StepClouds, b: Option<StepClouds>) -> Self {
         Interval {
             from: layout.blobs(a.grid, a.extinction),
@@ -29,16 +31,18 @@ impl Interval {
         }
     }
 
+    /// Returns the number of blobs.
     pub fn len(&self) -> usize {
         self.from.len()
     }
 
+    /// Returns whether there are no blobs.
     pub fn is_empty(&self) -> bool {
         self.from.is_empty()
     }
 
-    /// A blob `weight` of the way from the first step to the second: place, widths and mass are
-    /// linear in it, so that the clouds' mass is.
+    /// Returns a blob at `weight` of the way from the first step to the second. Place, widths and
+    /// mass are linear in it, so that the clouds' mass is, too.
     pub fn blob(&self, i: usize, weight: f64) -> WeatherBlob {
         let from = self.from[i];
         let Some(to) = self.to.as_ref().map(|to| to[i]).filter(|_| weight != 0.0) else {

@@ -1,5 +1,5 @@
-//! Blobs for cells: how many each gets, where they lie, and the extinction that makes their mass
-//! the cell's (docs/model.md §15).
+//! Blobs for cells: how many each cell gets, where they lie, and the extinction that preserves the
+//! cell's mass (docs/model.md §15).
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,64 +8,70 @@ use glam::DVec3;
 use super::grid::{Grid, Shape};
 use super::places::CellSeed;
 
-/// A column thinner than this optical depth, 0.1 % of the light, may be without blobs where more
-/// than one in [`AFFORDED`] would go to see that every column has one. Its mass goes to the next
-/// column that has.
+/// Optical depth below which a column may be without blobs, 0.1 % of the light. It applies if more
+/// than one blob in [`AFFORDED`] would be needed to give every column one. The column's mass goes
+/// to the next column with blobs.
 pub const THIN: f64 = 1e-3;
+/// Number of blobs for each of which one blob may serve thin columns.
 pub const AFFORDED: usize = 10;
 /// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other,
-/// narrower ones leave gaps between themselves (docs/model.md §15 has the errors).
+/// narrower ones leave gaps (errors: docs/model.md §15).
 pub const SPREAD: f64 = 0.45;
-/// By how many σ_xy the centres keep further from a cell's edge: thick clouds leak less into clear
-/// columns, and what is missing at an edge between two clouds is small.
-pub const INSET: f64 = 0.5;
-/// σ of what is spread evenly over a length of 1: 1/√12.
+/// Additional distance of the centres from a cell's edge, σ_xy. Thick clouds then leak less into
+/// clear columns, and the loss between two cloudy cells is small.
+const INSET: f64 = 0.5;
+/// σ of a uniform distribution over a length of 1: 1/√12.
 const EVEN: f64 = 0.288_675_134_594_812_9;
-/// σ_z over the thickness of a cell that several blobs share: their heights, over half of it, bring
-/// the rest of the variance, 1/16 + 1/48 = 1/12.
+/// σ_z over the thickness of a cell with several blobs. Their heights, over half of the cell, add
+/// the rest of the variance: 1/16 + 1/48 = 1/12.
 const THICKNESS: f64 = 0.25;
 
-/// A Gaussian blob with a round footprint: κ exp(−(x² + z²)/2σ_xy² − y²/2σ_z²). Metres: x east, y
-/// up from sea level, z south, from the middle of the domain.
+/// A Gaussian blob with a round footprint: κ exp(−(x² + z²)/2σ_xy² − y²/2σ_z²).
+///
+/// *Units*: metres, x east, y up from sea level, z south, from the middle of the domain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeatherBlob {
+    /// Centre.
     pub position: DVec3,
+    /// Standard deviation along x and z.
     pub sigma_xy: f64,
+    /// Standard deviation along y.
     pub sigma_z: f64,
     /// Peak extinction, m⁻¹.
     pub kappa: f64,
 }
 
 impl WeatherBlob {
-    /// ∫ of the extinction over all space, m².
+    /// Returns the integral of the extinction over space, m².
     pub fn mass(&self) -> f64 {
         self.kappa * TAU * (2.0 * PI).sqrt() * self.sigma_xy * self.sigma_xy * self.sigma_z
     }
 }
 
-/// Which blob of which cell.
+/// A blob of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Place {
+    /// Index of the cell.
     pub i_cell: u32,
+    /// Number of the blob within the cell.
     pub number: u32,
 }
 
-/// Which cells have how many blobs, and which cell's blobs hold a cell's mass. It stands for one
-/// step, or for all moments between two, over which blobs keep their places and only their
-/// extinction changes.
+/// Numbers of blobs of all cells, and the cells whose blobs hold each cell's mass. A layout serves
+/// one step, or all moments between two: blobs keep their places and only their extinction changes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     seed: u32,
     n_blobs: Vec<u32>,
-    /// For every cell the cell whose blobs hold its mass; itself where it has some.
+    /// For every cell the cell whose blobs hold its mass; itself if it has blobs.
     hosts: Vec<u32>,
-    /// In the order that a first part of which stands for all.
+    /// All blobs, in an order of which any first part represents all cells evenly.
     places: Vec<Place>,
 }
 
 impl Layout {
-    /// `n` blobs, by 1 − e^{−τ} of the cells; of several moments each cell has the greatest weight
-    /// that it has in any of them.
+    /// Distributes `n` blobs by 1 − e^{−τ} of the cells. With several moments, each cell has its
+    /// greatest weight in any of them.
     pub fn new(grid: &Grid, moments: &[&[f64]], n: usize, seed: u32) -> Self {
         let depths = greatest_depths(grid, moments);
         let n_blobs = allocate(grid, &depths, n);
@@ -85,18 +91,19 @@ impl Layout {
         Layout { seed, n_blobs, hosts, places }
     }
 
+    /// Returns all blobs in drawing order.
     pub fn places(&self) -> &[Place] {
         &self.places
     }
 
-    /// Blobs of each cell.
+    /// Returns the number of blobs of each cell.
     pub fn n_blobs(&self) -> &[u32] {
         &self.n_blobs
     }
 
-    /// The blobs that hold the extinction of `extinction`, m⁻¹ a cell, on `grid`: together ∫ β dV
-    /// of it, and of each cell or of those whose host it is its own. Linear in `extinction`, which
-    /// has clouds only where one of the moments has that the layout was made for.
+    /// Returns the blobs that represent `extinction`, m⁻¹ a cell, on `grid`. Their mass is ∫ β dV,
+    /// and each cell's blobs hold the mass of the cells they serve. The result is linear in
+    /// `extinction`, which may be positive only where it is in a moment of the layout.
     pub fn blobs(&self, grid: &Grid, extinction: &[f64]) -> Vec<WeatherBlob> {
         let n_columns = grid.shape().n_columns();
         let mut masses = vec![0.0; extinction.len()];
@@ -118,8 +125,8 @@ impl Layout {
             (ground.dx_m[i_column], ground.dy_m[i_column], grid.thickness_m(i));
         let sigma_xy = (SPREAD * (dx * dy / n).sqrt()).min(EVEN * dx.min(dy));
         let sigma_z = if n > 1.0 { THICKNESS } else { EVEN } * thickness;
-        // Of centres and σ together the variance is the cell's: centres keep to its middle by as
-        // much as blobs are wide.
+        // Centres and widths together have the cell's variance: the centres' range shrinks as blobs
+        // are wider.
         let room =
             |size: f64, sigma: f64| size * (1.0 - (sigma / (EVEN * size)).powi(2)).max(0.0).sqrt();
         let inside = |size: f64| (room(size, sigma_xy) - 2.0 * INSET * sigma_xy).max(0.0);
@@ -133,14 +140,14 @@ impl Layout {
     }
 }
 
-/// Optical depth upward of every cell, the greatest of all moments.
+/// Returns the vertical optical depth of every cell, the greatest of all moments.
 fn greatest_depths(grid: &Grid, moments: &[&[f64]]) -> Vec<f64> {
     let greatest = |i: usize| moments.iter().map(|m| m[i]).fold(0.0, f64::max);
     (0..grid.shape().n_cells()).map(|i| greatest(i) * grid.thickness_m(i)).collect()
 }
 
-/// How many blobs each cell has: those of its column are dealt by Σ 1 − e^{−τ}, and those of the
-/// column's cells by rounding the running sum, so that thin cells have one together.
+/// Returns the number of blobs of each cell. Columns get blobs by Σ 1 − e^{−τ}, and the cells of a
+/// column by rounding the running sum, so that thin cells share one.
 fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
     let shape = grid.shape();
     let n_columns = shape.n_columns();
@@ -152,13 +159,13 @@ fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
     }
     let mut n_blobs = vec![0u32; depths.len()];
     for (i_column, &n_column) in
-        deal(&weights, &of_columns, n, &there_and_back(shape)).iter().enumerate()
+        apportion(&weights, &of_columns, n, &boustrophedon(shape)).iter().enumerate()
     {
         let (mut sum, mut n_before) = (0.0, 0);
         for k in 0..shape.nz {
             let i = shape.cell(k, i_column);
             sum += -(-depths[i]).exp_m1();
-            // The last sum is the weight itself, to the bit.
+            // The last sum equals the weight to the bit.
             let n_until = if n_column == 0 {
                 0
             } else {
@@ -171,16 +178,16 @@ fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
     n_blobs
 }
 
-/// `n` things dealt by weight. Where there are enough, one to each that is not thin, and of the
-/// rest whole ones by largest remainder (ties to the first); to the others by rounding the running
-/// sum in `order`, so that some neighbours have one together.
-fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize> {
-    let mut dealt = vec![0; weights.len()];
+/// Apportions `n` items by weight. If there are enough, every item that is not thin gets one, and
+/// the rest goes by largest remainder, ties to the first. The others get theirs by rounding the
+/// running sum in `order`, so that some neighbours share one.
+fn apportion(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize> {
+    let mut apportioned = vec![0; weights.len()];
     let total: f64 = weights.iter().sum();
     if total <= 0.0 {
-        return dealt;
+        return apportioned;
     }
-    // Columns without a cloud are never due anything.
+    // Columns without a cloud get none.
     let n_cloudy = weights.iter().filter(|weight| **weight > 0.0).count();
     let least = if n_cloudy <= n / AFFORDED { f64::MIN_POSITIVE } else { THIN };
     let n_thick = depths.iter().filter(|depth| **depth >= least).count();
@@ -190,20 +197,19 @@ fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize
     for &i in order.iter().filter(|i| !is_thick(**i)) {
         sum += weights[i];
         let n_until = ((n as f64 * (sum / total) + 0.5) as usize).min(room);
-        dealt[i] = n_until - n_thin;
+        apportioned[i] = n_until - n_thin;
         n_thin = n_until;
     }
     if n_thick > n || n_thick == 0 {
-        // By rounding the last sum may come short of all.
+        // Rounding may leave the last sum short of `n`.
         if let Some(&i) = order.iter().rev().find(|i| weights[**i] > 0.0) {
-            dealt[i] += n.saturating_sub(n_thin);
+            apportioned[i] += n.saturating_sub(n_thin);
         }
-        return dealt;
+        return apportioned;
     }
     let left = room - n_thin;
     let thick: Vec<usize> = (0..weights.len()).filter(|&i| is_thick(i)).collect();
-    // What each is due beyond the one that it has; where that is nothing for all, it goes by
-    // weight.
+    // Each one's share beyond the item it has; if nobody has a share, it goes by weight.
     let due: Vec<f64> =
         thick.iter().map(|&i| (n as f64 * weights[i] / total - 1.0).max(0.0)).collect();
     let due = if due.iter().sum::<f64>() > 0.0 {
@@ -216,30 +222,31 @@ fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize
     let mut by_remainder: Vec<usize> = (0..thick.len()).collect();
     by_remainder.sort_by(|&a, &b| quotas[b].fract().total_cmp(&quotas[a].fract()).then(a.cmp(&b)));
     let n_whole: usize = quotas.iter().map(|q| *q as usize).sum();
-    thick.iter().zip(&quotas).for_each(|(&i, quota)| dealt[i] = 1 + *quota as usize);
+    thick.iter().zip(&quotas).for_each(|(&i, quota)| apportioned[i] = 1 + *quota as usize);
     for &i in by_remainder.iter().take(left.saturating_sub(n_whole)) {
-        dealt[thick[i]] += 1;
+        apportioned[thick[i]] += 1;
     }
-    dealt
+    apportioned
 }
 
-/// Columns row by row from the south, there and back, so that each lies beside the one before it.
-fn there_and_back(shape: Shape) -> Vec<usize> {
+/// Returns the columns row by row from the south, alternately eastward and westward, so that each
+/// is a neighbour of the one before it.
+fn boustrophedon(shape: Shape) -> Vec<usize> {
     let along =
         |j: usize, i: usize| j * shape.nx + if j.is_multiple_of(2) { i } else { shape.nx - 1 - i };
     (0..shape.ny).flat_map(|j| (0..shape.nx).map(move |i| along(j, i))).collect()
 }
 
-/// Whose blobs hold a cell's mass: its own; else those of the cell nearest in level of its column;
-/// else of the next column that has some, row by row and there and back.
+/// Returns the cell whose blobs hold each cell's mass: its own; else the nearest level of its
+/// column with blobs; else of the next column with blobs in boustrophedon order.
 fn hosts(grid: &Grid, depths: &[f64], n_blobs: &[u32]) -> Vec<u32> {
     let shape = grid.shape();
     let n_columns = shape.n_columns();
     let has_some = |i_column: usize| (0..shape.nz).any(|k| n_blobs[shape.cell(k, i_column)] > 0);
-    // For every column the one that holds its mass, in order, those after the last from there
-    // backwards.
+    // For every column the next one with blobs in that order; the columns after the last one use
+    // the last one.
     let mut holders = vec![None; n_columns];
-    let order = there_and_back(shape);
+    let order = boustrophedon(shape);
     let backwards: Vec<usize> = order.iter().rev().copied().collect();
     for order in [backwards, order] {
         let mut next = None;

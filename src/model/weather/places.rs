@@ -1,42 +1,43 @@
-//! Where in its cell a blob lies and in what order blobs are drawn: evenly, and the same of every
-//! (seed, cell, number) at every time.
+//! Places of blobs in their cells and their drawing order: even, and constant for every (seed,
+//! cell, number).
 
 use glam::DVec3;
 
 use crate::model::philox::{philox4x32_10, uniform};
 
-/// "weat": parts these random numbers from all others of the same seed.
+/// "weat": a Philox stream of its own.
 const STREAM: u32 = 0x7765_6174;
-/// The root of x³ = x + 1, whose powers spread points of a plane most evenly, and that of x² = x +
-/// 1 for their heights: Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018);
-/// any first points of a cell are spread as all of them are.
+/// Roots of x³ = x + 1, whose powers spread points of a plane most evenly, and of x² = x + 1 for
+/// the heights. Any first points of a cell are spread evenly. *Source*: Roberts, "The unreasonable
+/// effectiveness of quasirandom sequences" (2018).
 const PLANE_ROOT: f64 = 1.324_717_957_244_746;
 const LINE_ROOT: f64 = 1.618_033_988_749_895;
 
-/// What is random about a cell.
+/// Random numbers of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CellSeed {
     shift: DVec3,
-    /// In [0, 1).
+    /// Shift of the drawing order, in [0, 1).
     order: f64,
 }
 
 impl CellSeed {
+    /// Draws the random numbers of a cell.
     pub fn new(seed: u32, i_cell: u32) -> Self {
         let words = philox4x32_10([seed, STREAM], [i_cell, 0, 0, 0]);
         let [x, y, z, order] = words.map(uniform);
         CellSeed { shift: DVec3::new(x, y, z), order }
     }
 
-    /// Of the cell's `number`-th blob: in [−½, ½)³.
+    /// Returns the place of the cell's `number`-th blob, in [−½, ½)³.
     pub fn place(self, number: u32) -> DVec3 {
         let steps = DVec3::new(1.0 / PLANE_ROOT, 1.0 / LINE_ROOT, 1.0 / (PLANE_ROOT * PLANE_ROOT));
         let at = self.shift + steps * (f64::from(number) + 1.0);
         at - at.floor() - 0.5
     }
 
-    /// Where in the order of all the `number`-th of `n` blobs comes, in [0, 1): a first part of the
-    /// order has the same part of every cell.
+    /// Returns the position of the `number`-th of `n` blobs in the drawing order, in [0, 1). Any
+    /// first part of the order holds the same part of every cell.
     pub fn order(self, number: u32, n: u32) -> f64 {
         (f64::from(number) + self.order) / f64::from(n)
     }
@@ -57,7 +58,7 @@ mod tests {
             plane[(p.x * 4.0) as usize * 4 + (p.z * 4.0) as usize] += 1;
             line[(p.y * 16.0) as usize] += 1;
         }
-        // Random ones would have 10 ± 3.2 and stray to 4 and 17.
+        // Random points would have 10 ± 3.2 and stray to 4 and 17.
         assert!(plane.iter().chain(&line).all(|n| (7..=13).contains(n)), "{plane:?} {line:?}");
         assert_ne!(CellSeed::new(7, 4), cell);
         assert_ne!(CellSeed::new(8, 3), cell);

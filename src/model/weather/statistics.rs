@@ -1,33 +1,35 @@
-//! What there is of clouds in a step, for people.
+//! Statistics of the clouds of a step.
 
 use super::columns;
 use super::grid::Grid;
 
-/// Cells of less extinction, m⁻¹, hold no cloud that can be seen: through 10 km of it 99 % of the
-/// light come.
+/// Extinction below which a cell holds no visible cloud, m⁻¹: through 10 km of it 99 % of the light
+/// pass.
 pub const FAINT: f64 = 1e-6;
 
+/// Statistics of the clouds of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloudStatistics {
-    /// Cells of more than [`FAINT`].
+    /// Number of cells above [`FAINT`].
     pub n_cells: usize,
-    /// Columns that have such a cell.
+    /// Number of columns with such a cell.
     pub n_columns: usize,
-    /// m⁻¹.
+    /// Greatest extinction, m⁻¹.
     pub greatest_extinction: f64,
-    /// Straight up through a column.
+    /// Greatest vertical optical depth of a column.
     pub greatest_depth: f64,
     /// Mean over the columns of 1 − e^{−τ}.
     pub mean_opacity: f64,
     /// Lowest bottom and highest top of such a cell, m above sea level.
     pub base_and_top_m: Option<(f64, f64)>,
-    /// Columns whose highest cell is such a cell: where there is more than one level, what is above
-    /// may have some, too.
+    /// Number of columns whose highest cell is such a cell. With more than one level, clouds may
+    /// continue above the file's top.
     pub n_columns_to_the_top: usize,
     /// ∫ β dV over the domain, m².
     pub mass_m2: f64,
 }
 
+/// Computes the statistics of an extinction field, m⁻¹.
 pub fn of(grid: &Grid, extinction: &[f64]) -> CloudStatistics {
     let shape = grid.shape();
     let n = shape.n_columns();

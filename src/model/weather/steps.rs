@@ -1,13 +1,13 @@
-//! The times of a file's steps: their text, their order, and between which of them a moment lies.
+//! Times of a file's steps: parsing and printing, order, and interpolation between them.
 
-/// Steps further apart are not interpolated, s: clouds on fixed seeds are off by half of their
-/// spread between steps 10 minutes apart, and by three quarters between steps 3 hours apart
-/// (docs/model.md §15).
+/// Longest interval that is interpolated, s. Blobs on fixed seeds are off by half of their spread
+/// between steps 10 minutes apart, and by three quarters between steps 3 hours apart (docs/model.md
+/// §15).
 pub const LONGEST_INTERPOLATED_S: f64 = 600.0;
 
 const SECONDS_A_DAY: f64 = 86_400.0;
 
-/// Days from 1970-01-01 of a date of the Gregorian calendar, extended backwards: the algorithm of
+/// Returns the days from 1970-01-01 of a date of the proleptic Gregorian calendar. *Source*:
 /// Hinnant, "chrono-compatible low-level date algorithms".
 pub fn days(year: i64, month: u32, day: u32) -> i64 {
     let year = if month <= 2 { year - 1 } else { year };
@@ -18,7 +18,7 @@ pub fn days(year: i64, month: u32, day: u32) -> i64 {
     era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468
 }
 
-/// Year, month and day of such a day.
+/// Returns year, month and day of such a day.
 pub fn date(days: i64) -> (i64, u32, u32) {
     let z = days + 719_468;
     let era = z.div_euclid(146_097);
@@ -31,8 +31,8 @@ pub fn date(days: i64) -> (i64, u32, u32) {
     (year_of_era + era * 400 + i64::from(month <= 2), month, day)
 }
 
-/// Seconds from 1970-01-01 00:00 UTC of WRF's "YYYY-MM-DD_HH:MM:SS"; None of all that is no such
-/// time.
+/// Parses WRF's "YYYY-MM-DD_HH:MM:SS" to seconds from 1970-01-01 00:00 UTC; `None` for any other
+/// text.
 pub fn parse(text: &str) -> Option<f64> {
     let bytes = text.as_bytes();
     let separators = [(4, b'-'), (7, b'-'), (13, b':'), (16, b':')];
@@ -50,7 +50,7 @@ pub fn parse(text: &str) -> Option<f64> {
     let (year, month, day) = (i64::from(number(0, 4)?), number(5, 7)?, number(8, 10)?);
     let (hour, minute, second) = (number(11, 13)?, number(14, 16)?, number(17, 19)?);
     let of_date = days(year, month, day);
-    // What is no date, such as 30 February, is another one when it is told back.
+    // An invalid date such as 30 February does not survive the round trip.
     if !(1..=12).contains(&month)
         || date(of_date) != (year, month, day)
         || hour > 23
@@ -62,8 +62,8 @@ pub fn parse(text: &str) -> Option<f64> {
     Some(of_date as f64 * SECONDS_A_DAY + f64::from(hour * 3600 + minute * 60 + second))
 }
 
-/// "YYYY-MM-DD HH:MM:SS" (UTC) of such a time, to the nearest second; what is beyond the years 0 to
-/// 9999 as seconds.
+/// Formats a time as "YYYY-MM-DD HH:MM:SS" (UTC), to the nearest second; times beyond the years 0
+/// to 9999 as seconds.
 pub fn format(time_s: f64) -> String {
     let whole = time_s.round();
     if !whole.is_finite() {
@@ -78,23 +78,27 @@ pub fn format(time_s: f64) -> String {
     format!("{year:04}-{month:02}-{day:02} {:02}:{:02}:{second:02}", hour as u32, minute as u32)
 }
 
-/// The first step whose time is not after that of the step before it, if there is one.
+/// Returns the first step whose time is not after that of the step before it.
 pub fn first_out_of_order(times_s: &[f64]) -> Option<usize> {
     let is_later = |w: &[f64]| w[1] > w[0];
     times_s.windows(2).position(|w| !is_later(w)).map(|i| i + 1)
 }
 
-/// Where a moment lies: (1 − weight) of step i and weight of step j.
+/// Interpolation of a moment: (1 − weight) of step i and weight of step j.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Between {
+    /// Index of the earlier step.
     pub i: usize,
+    /// Index of the later step; `i` if only one step counts.
     pub j: usize,
+    /// Weight of the later step.
     pub weight: f64,
 }
 
-/// Between which of the steps at `times_s`, rising, `t_s` lies: linear where they are at most
-/// [`LONGEST_INTERPOLATED_S`] apart, else the one before. The first step stands for all before it,
-/// the last for all after it. None of no steps or of NaN.
+/// Returns the steps that `t_s` lies between, of steps at rising `times_s`. Steps at most
+/// [`LONGEST_INTERPOLATED_S`] apart are interpolated linearly; otherwise the earlier one counts.
+/// The first step stands for all earlier times, the last for all later ones. `None` without steps
+/// or for NaN.
 pub fn between(times_s: &[f64], t_s: f64) -> Option<Between> {
     if times_s.is_empty() || t_s.is_nan() {
         return None;
@@ -117,12 +121,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_read_and_told() {
+    fn times_parse_and_print_alike() {
         assert_eq!(parse("1970-01-01_00:00:00"), Some(0.0));
-        // date -u -d 2005-08-28T12:00:00 +%s
+        // From `date -u -d 2005-08-28T12:00:00 +%s`.
         assert_eq!(parse("2005-08-28_12:00:00"), Some(1_125_230_400.0));
         assert_eq!(parse("2000-02-29_23:59:59"), Some(951_868_799.0));
-        // The idealised cases begin in the year 1: 719162 days before 1970.
+        // Idealised cases begin in the year 1: 719162 days before 1970.
         assert_eq!(parse("0001-01-01_00:46:00"), Some(-719_162.0 * 86_400.0 + 2760.0));
         for text in [
             "2005-08-28_12:00:00",
@@ -167,7 +171,7 @@ mod tests {
         assert_eq!(at(0.0), (0, 0, 0.0));
         assert_eq!(at(30.0), (0, 1, 0.25));
         assert_eq!(at(120.0), (1, 1, 0.0));
-        // Ten minutes apart are interpolated, half a second more is not.
+        // Ten minutes are interpolated, half a second more is not.
         assert_eq!(at(420.0), (1, 2, 0.5));
         assert_eq!(at(1320.0), (2, 2, 0.0));
         assert_eq!(at(1320.5), (3, 3, 0.0));

@@ -1,14 +1,16 @@
-//! Where the sun stands: the low-precision formulas of the Astronomical Almanac as Michalsky, "The
-//! Astronomical Almanac's algorithm for approximate solar position (1950–2050)", Solar Energy 40
-//! (1988), gives them: 0.01° in those years. No refraction and no parallax.
+//! Position of the sun by the low-precision formulas of the Astronomical Almanac, accurate to 0.01°
+//! from 1950 to 2050, without refraction and parallax.
+//!
+//! *Source*: Michalsky, "The Astronomical Almanac's algorithm for approximate solar position
+//! (1950–2050)", Solar Energy 40 (1988).
 
 use glam::DVec3;
 
 /// J2000.0, 2000-01-01 12:00 UT, in days from 1970-01-01.
 const J2000_DAYS: f64 = 10_957.5;
 
-/// Right ascension and declination, radians, at `time_s` (seconds from 1970-01-01, UTC).
-pub fn equatorial(time_s: f64) -> (f64, f64) {
+/// Returns right ascension and declination, radians, at `time_s` (seconds from 1970-01-01, UTC).
+fn equatorial(time_s: f64) -> (f64, f64) {
     let n = time_s / 86_400.0 - J2000_DAYS;
     let longitude = 280.460 + 0.985_647_4 * n;
     let anomaly = (357.528 + 0.985_600_3 * n).to_radians();
@@ -18,8 +20,8 @@ pub fn equatorial(time_s: f64) -> (f64, f64) {
     (ascension.rem_euclid(std::f64::consts::TAU), (obliquity.sin() * ecliptic.sin()).asin())
 }
 
-/// The unit vector toward the sun, x east, y up, z south, from `latitude` and `longitude` (radians,
-/// north and east positive).
+/// Returns the unit vector toward the sun, x east, y up, z south, from `latitude` and `longitude`
+/// (radians, north and east positive).
 pub fn toward(time_s: f64, latitude: f64, longitude: f64) -> DVec3 {
     let (ascension, declination) = equatorial(time_s);
     let n = time_s / 86_400.0 - J2000_DAYS;
@@ -39,7 +41,7 @@ mod tests {
     use super::super::steps::parse;
     use super::*;
 
-    /// The elevation above the horizon and the azimuth from north over east, degrees.
+    /// Returns the elevation above the horizon and the azimuth from north over east, degrees.
     fn angles(toward: DVec3) -> (f64, f64) {
         (toward.y.asin().to_degrees(), toward.x.atan2(-toward.z).to_degrees().rem_euclid(360.0))
     }
@@ -68,7 +70,7 @@ mod tests {
         // The equator at an equinox: east, overhead, west; the equation of time is 7.5 minutes,
         // 1.9°.
         assert!(of_hour("06").x > 0.99 && of_hour("12").y > 0.99 && of_hour("18").x < -0.99);
-        // Noon in the northern winter stands in the south, which is +z.
+        // Noon in the northern winter is in the south, which is +z.
         let noon = toward(parse("2005-12-21_12:00:00").unwrap(), 50f64.to_radians(), 0.0);
         let (elevation, azimuth) = angles(noon);
         assert!(

@@ -1,6 +1,6 @@
-//! Adaptive cubature over triangles: Dunavant's rule of degree 8 for the value, Radon's of degree 5
-//! beside it for the error; the cell of greatest error is halved across its longest edge until the
-//! sum of all errors is small enough.
+//! Adaptive cubature over triangles. Dunavant's rule of degree 8 gives the value, Radon's of degree
+//! 5 the error. The cell of greatest error is halved across its longest edge until the sum of all
+//! errors is small enough.
 
 use std::collections::BinaryHeap;
 
@@ -8,18 +8,19 @@ use glam::{DVec2, DVec3};
 
 use super::clip::Polygon;
 
-/// When an integral is good enough.
+/// Accuracy that an integral must reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// The error's share of the result, both in their greatest channel.
+    /// Error as a share of the result, both in their greatest channel.
     pub relative: f64,
-    /// An error that is small enough whatever the result.
+    /// Error that is small enough whatever the result.
     pub absolute: f64,
-    /// Points at which the integrand may be evaluated, at most.
+    /// Greatest number of evaluations of the integrand.
     pub max_evaluations: usize,
 }
 
 impl Accuracy {
+    /// Returns a relative accuracy with a limit of two million evaluations.
     pub const fn relative(relative: f64) -> Accuracy {
         Accuracy { relative, absolute: 0.0, max_evaluations: 2_000_000 }
     }
@@ -29,44 +30,50 @@ impl Accuracy {
     }
 }
 
-/// Radiance and irradiance, and what error they are known to have themselves: (of radiance, of
-/// irradiance, 0).
+/// Radiance, irradiance, and their own known errors: (of radiance, of irradiance, 0).
 pub type Sample = [DVec3; 3];
 
+/// No light.
 pub const NOTHING: Sample = [DVec3::ZERO; 3];
 
-/// An integral and what is known of its error.
+/// An integral with its error estimates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
+    /// Radiance, W m⁻² sr⁻¹.
     pub radiance: DVec3,
+    /// Irradiance, W m⁻².
     pub irradiance: DVec3,
-    /// Of the radiance, greatest channel: the sum over cells of the greater of |degree 8 − degree
-    /// 5|, which is the error of the lesser rule, and half of what the last halving changed.
-    /// Infinite where the evaluations ran out before every lobe, light and blob was resolved.
+    /// Estimated error of the radiance, greatest channel. It sums over cells the greater of |degree
+    /// 8 − degree 5|, the error of the lesser rule, and half of the change by the last halving.
+    /// Infinite if the evaluations ran out before every lobe, light and blob was resolved.
     pub error: f64,
-    /// Of the irradiance, in the same way.
+    /// Estimated error of the irradiance, likewise.
     pub irradiance_error: f64,
+    /// Number of evaluations of the integrand.
     pub n_evaluations: usize,
 }
 
-/// A triangle of piece `i_piece` in its rectangle's coordinates.
+/// A triangle of region `i_region`, in its rectangle's coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
+    /// Corners.
     pub corners: [DVec2; 3],
-    pub i_piece: usize,
+    /// Index of the region.
+    pub i_region: usize,
 }
 
+/// A function over the regions of rectangles.
 pub trait Integrand {
-    /// Per unit area of the rectangle's coordinates.
-    fn at(&self, i_piece: usize, x: DVec2) -> Sample;
-    /// Whether the cell is small enough for the rules to see all that there is in it.
+    /// Returns the value per unit area of the rectangle's coordinates.
+    fn at(&self, i_region: usize, x: DVec2) -> Sample;
+    /// Returns whether the cell is small enough for the rules to notice everything in it.
     fn is_resolved(&self, cell: &Cell) -> bool;
-    /// Squared length of the step `d`.
-    fn length_squared(&self, i_piece: usize, d: DVec2) -> f64;
-    /// What the rules' difference is multiplied by: 1 where the integrand is smooth within cells,
-    /// so that the greater degree errs much less than the lesser; more where it bends and both err
-    /// alike.
-    fn doubt(&self) -> f64 {
+    /// Returns the squared length of the step `d`.
+    fn length_squared(&self, i_region: usize, d: DVec2) -> f64;
+    /// Returns the factor on the rules' difference in the error estimate. It is 1 where the
+    /// integrand is smooth within cells, so that the greater degree errs much less; more where it
+    /// has kinks and both err alike.
+    fn safety_factor(&self) -> f64 {
         1.0
     }
 }
@@ -77,10 +84,10 @@ impl Cell {
         0.5 * (b - a).perp_dot(c - a).abs()
     }
 
-    /// Halves across the longest edge.
+    /// Halves the cell across its longest edge.
     fn halves(&self, f: &dyn Integrand) -> [Cell; 2] {
         let edge =
-            |i: usize| f.length_squared(self.i_piece, self.corners[(i + 1) % 3] - self.corners[i]);
+            |i: usize| f.length_squared(self.i_region, self.corners[(i + 1) % 3] - self.corners[i]);
         let lengths = [edge(0), edge(1), edge(2)];
         let i = (0..3).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
         let [a, b, c] = [self.corners[i], self.corners[(i + 1) % 3], self.corners[(i + 2) % 3]];
@@ -89,17 +96,17 @@ impl Cell {
     }
 }
 
-/// A polygon as a fan of triangles.
-pub fn triangles(polygon: &Polygon, i_piece: usize) -> impl Iterator<Item = Cell> {
+/// Divides a polygon into a fan of triangles.
+pub fn triangles(polygon: &Polygon, i_region: usize) -> impl Iterator<Item = Cell> {
     (1..polygon.len().saturating_sub(1))
-        .map(move |i| Cell { corners: [polygon[0], polygon[i], polygon[i + 1]], i_piece })
+        .map(move |i| Cell { corners: [polygon[0], polygon[i], polygon[i + 1]], i_region })
 }
 
-/// Barycentric coordinates, the weight in the rule of degree 8 and in that of degree 5.
+/// Barycentric coordinates, weight in the rule of degree 8, weight in the rule of degree 5.
 type Node = ([f64; 3], f64, f64);
 
-/// Orbits of Dunavant's 16-point rule of degree 8 (Int. J. Numer. Meth. Engng 21, 1985): (one
-/// coordinate, another, weight).
+/// Orbits of Dunavant's 16-point rule of degree 8: (one coordinate, another, weight). *Source*:
+/// Int. J. Numer. Meth. Engng 21, 1985.
 const DEGREE_8: [(f64, f64, f64); 5] = [
     (1.0 / 3.0, 1.0 / 3.0, 0.144_315_607_677_787_2),
     (0.459_292_588_292_723_1, 0.459_292_588_292_723_1, 0.095_091_634_267_284_6),
@@ -108,7 +115,7 @@ const DEGREE_8: [(f64, f64, f64); 5] = [
     (0.008_394_777_409_957_6, 0.263_112_829_634_638_1, 0.027_230_314_174_434_99),
 ];
 
-/// The 22 nodes of both rules, the centroid shared.
+/// Returns the 22 nodes of both rules, which share the centroid.
 fn nodes() -> Vec<Node> {
     let root = 15f64.sqrt();
     let (a, b) = ((6.0 - root) / 21.0, (6.0 + root) / 21.0);
@@ -122,7 +129,7 @@ fn nodes() -> Vec<Node> {
     nodes
 }
 
-/// All different orders of (x, y, 1 − x − y).
+/// Adds all different orders of (x, y, 1 − x − y).
 fn orbit(nodes: &mut Vec<Node>, x: f64, y: f64, high: f64, low: f64) {
     let z = 1.0 - x - y;
     let orders: &[[f64; 3]] = match (x == y, x == 1.0 / 3.0) {
@@ -134,70 +141,70 @@ fn orbit(nodes: &mut Vec<Node>, x: f64, y: f64, high: f64, low: f64) {
 }
 
 /// A cell with its integral.
-struct Measured {
-    /// The greater share of the totals that the error of radiance or irradiance is: who is greatest
-    /// is halved next.
+struct CellEstimate {
+    /// The error as a share of the total, of radiance or irradiance, whichever is greater. The cell
+    /// with the greatest key is halved next.
     key: f64,
     cell: Cell,
     value: Sample,
     error: [DVec3; 2],
 }
 
-impl PartialEq for Measured {
+impl PartialEq for CellEstimate {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
-impl Eq for Measured {}
-impl PartialOrd for Measured {
+impl Eq for CellEstimate {}
+impl PartialOrd for CellEstimate {
     fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
         Some(self.cmp(other))
     }
 }
-impl Ord for Measured {
+impl Ord for CellEstimate {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
         self.key.total_cmp(&other.key)
     }
 }
 
-/// A cell whose error is a smaller share of the total has only rounding left to halve away.
-const LEAST_KEY: f64 = 1e-17;
+/// Least key: below it only rounding is left to halve away.
+const MIN_KEY: f64 = 1e-17;
 
-fn measure(f: &dyn Integrand, nodes: &[Node], cell: Cell) -> Measured {
+fn integrate_cell(f: &dyn Integrand, nodes: &[Node], cell: Cell) -> CellEstimate {
     let [a, b, c] = cell.corners;
     let (mut high, mut low) = (NOTHING, NOTHING);
     for &([x, y, z], w_high, w_low) in nodes {
-        let value = f.at(cell.i_piece, x * a + y * b + z * c);
+        let value = f.at(cell.i_region, x * a + y * b + z * c);
         for k in 0..2 {
             high[k] += w_high * value[k];
             low[k] += w_low * value[k];
         }
-        // An error may be infinite, and the lesser rule's nodes have no weight in the value.
+        // The known error may be infinite, and the lesser rule's nodes have no weight in the value.
         if w_high > 0.0 {
             high[2] += w_high * value[2];
         }
     }
     let area = cell.area();
-    let error = [0, 1].map(|k| f.doubt() * area * (high[k] - low[k]).abs());
-    Measured { key: 0.0, cell, value: high.map(|v| area * v), error }
+    let error = [0, 1].map(|k| f.safety_factor() * area * (high[k] - low[k]).abs());
+    CellEstimate { key: 0.0, cell, value: high.map(|v| area * v), error }
 }
 
-/// What halving a cell changed is an error too that each half may still have: where the integrand
-/// is smooth it is less than the rules' difference, across a jump it is not.
-fn distrust(halves: &mut [Measured; 2], whole: &Measured) {
+/// Raises the errors of both halves to half of the change by halving. Where the integrand is smooth
+/// the change is less than the rules' difference; across a jump it is not.
+fn widen_errors(halves: &mut [CellEstimate; 2], whole: &CellEstimate) {
     for k in 0..2 {
         let change = 0.5 * (halves[0].value[k] + halves[1].value[k] - whole.value[k]).abs();
         halves.iter_mut().for_each(|half| half.error[k] = half.error[k].max(change));
     }
 }
 
-fn key(m: &Measured, scale: [f64; 2]) -> f64 {
+fn key(m: &CellEstimate, scale: [f64; 2]) -> f64 {
     let share = |k: usize| if scale[k] > 0.0 { m.error[k].max_element() / scale[k] } else { 0.0 };
     share(0).max(share(1))
 }
 
-/// Sum of value and error over all cells, on top of what is known exactly.
-fn total<'a>(known: Sample, cells: impl Iterator<Item = &'a Measured>) -> (Sample, [DVec3; 2]) {
+/// Sums value and error over all cells, on top of the part that is known exactly.
+fn total<'a>(known: Sample, cells: impl Iterator<Item = &'a CellEstimate>) -> (Sample, [DVec3; 2]) {
     cells.fold((known, [DVec3::ZERO; 2]), |(v, e), m| {
         (
             [v[0] + m.value[0], v[1] + m.value[1], v[2] + m.value[2]],
@@ -206,7 +213,8 @@ fn total<'a>(known: Sample, cells: impl Iterator<Item = &'a Measured>) -> (Sampl
     })
 }
 
-/// Cells halved until each is resolved, and whether there was room for all.
+/// Halves cells until each is resolved. The second value tells whether the number of cells
+/// sufficed.
 fn resolve(
     f: &dyn Integrand,
     cells: impl Iterator<Item = Cell>,
@@ -227,7 +235,7 @@ fn resolve(
     (done, true)
 }
 
-/// ∫ over `cells`, added to `known`.
+/// Integrates over `cells`, and adds `known`.
 pub fn integrate(
     f: &dyn Integrand,
     cells: impl Iterator<Item = Cell>,
@@ -237,14 +245,15 @@ pub fn integrate(
     let nodes = nodes();
     let (cells, all_resolved) = resolve(f, cells, (accuracy.max_evaluations / nodes.len()).max(1));
     let mut n_evaluations = cells.len() * nodes.len();
-    let measured: Vec<Measured> = cells.into_iter().map(|cell| measure(f, &nodes, cell)).collect();
-    let (mut value, mut error) = total(known, measured.iter());
+    let estimates: Vec<CellEstimate> =
+        cells.into_iter().map(|cell| integrate_cell(f, &nodes, cell)).collect();
+    let (mut value, mut error) = total(known, estimates.iter());
     let scale = [0, 1].map(|k| value[k].abs().max_element() + error[k].max_element());
-    let keyed = |mut m: Measured| {
+    let keyed = |mut m: CellEstimate| {
         m.key = key(&m, scale);
         m
     };
-    let mut heap: BinaryHeap<Measured> = measured.into_iter().map(keyed).collect();
+    let mut heap: BinaryHeap<CellEstimate> = estimates.into_iter().map(keyed).collect();
     let met =
         |v: &Sample, e: &[DVec3; 2]| accuracy.is_met(v[0], e[0]) && accuracy.is_met(v[1], e[1]);
     while all_resolved
@@ -252,23 +261,23 @@ pub fn integrate(
         && !met(&value, &error)
     {
         let Some(worst) = heap.pop() else { break };
-        if worst.key.is_nan() || worst.key <= LEAST_KEY {
+        if worst.key.is_nan() || worst.key <= MIN_KEY {
             heap.push(worst);
             break;
         }
-        let mut halves = worst.cell.halves(f).map(|cell| measure(f, &nodes, cell));
-        distrust(&mut halves, &worst);
+        let mut halves = worst.cell.halves(f).map(|cell| integrate_cell(f, &nodes, cell));
+        widen_errors(&mut halves, &worst);
         for half in halves.map(keyed) {
             (0..3).for_each(|k| value[k] += half.value[k]);
             (0..2).for_each(|k| error[k] += half.error[k]);
             heap.push(half);
         }
         (0..3).for_each(|k| value[k] -= worst.value[k]);
-        // The running sum may round below what is left, never below nothing.
+        // The running sum may round below the true rest, but never below 0.
         (0..2).for_each(|k| error[k] = (error[k] - worst.error[k]).max(DVec3::ZERO));
         n_evaluations += 2 * nodes.len();
     }
-    // Without the running sums' roundings.
+    // The final sums are free of the running sums' roundings.
     let (value, error) = total(known, heap.iter());
     let known_error =
         |k: usize| if all_resolved { error[k].max_element() + value[2][k] } else { f64::INFINITY };
@@ -350,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_closed_in_on_and_a_cap_is_kept_honestly() {
+    fn the_error_bounds_a_jump_within_any_number_of_evaluations() {
         // The quarter disc's edge crosses the cells: area π/4.
         let step =
             |x: DVec2| if x.length_squared() < 1.0 && x.x > 0.0 && x.y > 0.0 { 1.0 } else { 0.0 };

@@ -1,32 +1,35 @@
-//! Means over a surface or one of its facets, and work spread over the processor's threads.
+//! Means of radiance and irradiance over a surface or one of its facets.
 
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 
 use super::adaptive::{self, Accuracy, Cell, Estimate, Integrand, NOTHING, Sample, triangles};
 use super::clip::{self, Line, Polygon, WHOLE};
-use super::{AreaScene, resolve};
+use super::resolve::{self, ViewOfSurface};
+use super::scene::AreaScene;
 use crate::model::surface::Surface;
 
-/// Of the error asked for, the inner integral's share: it adds to the outer one's.
+/// Share of the accuracy that the inner integral gets; its error adds to the outer one's.
 const INNER_SHARE: f64 = 0.1;
 
-/// Of L2 over a surface: it bends wherever a corner appears behind an edge, and there the two
-/// rules' errors are numbers of one size and no fixed sign, of whose difference one is seldom more
-/// than three times.
-const DOUBT: f64 = 3.0;
+/// Safety factor on the error of L2's mean over a surface. L2 has a kink wherever a corner appears
+/// behind an edge. There the two rules' errors are of one size and no fixed sign, and one is seldom
+/// more than three times their difference.
+const SAFETY_FACTOR: f64 = 3.0;
 
 /// A rectangle within a surface's (s, t).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
+    /// Low corner.
     pub low: DVec2,
+    /// High corner.
     pub high: DVec2,
 }
 
 impl Window {
+    /// The whole surface.
     pub const WHOLE: Window = Window { low: DVec2::NEG_ONE, high: DVec2::ONE };
 
-    /// Facet `i` of a surface.
+    /// Returns the window of facet `i` of a surface.
     pub fn facet(surface: &Surface, i: u32) -> Window {
         let [n_u, n_v] = surface.subdivide;
         let at = |k: u32, n: u32| 2.0 * f64::from(k) / f64::from(n) - 1.0;
@@ -50,7 +53,7 @@ impl Window {
 }
 
 impl AreaScene<'_> {
-    /// Mean of L1 toward the eye at `eye`, and of I_d.
+    /// Returns the means of L1 toward the eye at `eye`, and of I_d.
     pub fn mean_first(
         &self,
         i_surface: usize,
@@ -58,16 +61,16 @@ impl AreaScene<'_> {
         eye: DVec3,
         accuracy: &Accuracy,
     ) -> Estimate {
-        let pieces = &self.pieces[i_surface];
-        let mean = Mean { scenery: self, i_surface, eye, window, of: Of::First, accuracy };
-        let cells = pieces
+        let regions = &self.regions[i_surface];
+        let mean = Mean { scene: self, i_surface, eye, window, of: Quantity::First, accuracy };
+        let cells = regions
             .iter()
             .enumerate()
-            .flat_map(|(i, piece)| triangles(&window.cut(&piece.polygon), i).collect::<Vec<_>>());
+            .flat_map(|(i, region)| triangles(&window.cut(&region.polygon), i).collect::<Vec<_>>());
         adaptive::integrate(&mean, cells, NOTHING, accuracy)
     }
 
-    /// Mean of L2 toward the eye at `eye`, and of I_i.
+    /// Returns the means of L2 toward the eye at `eye`, and of I_i.
     pub fn mean_second(
         &self,
         i_surface: usize,
@@ -80,39 +83,40 @@ impl AreaScene<'_> {
             absolute: INNER_SHARE * accuracy.absolute,
             max_evaluations: accuracy.max_evaluations,
         };
-        let mean = Mean { scenery: self, i_surface, eye, window, of: Of::Second, accuracy: &inner };
+        let mean =
+            Mean { scene: self, i_surface, eye, window, of: Quantity::Second, accuracy: &inner };
         adaptive::integrate(&mean, triangles(&window.cut(&WHOLE.to_vec()), 0), NOTHING, accuracy)
     }
 }
 
-enum Of {
+enum Quantity {
     First,
     Second,
 }
 
 struct Mean<'s, 'a> {
-    scenery: &'s AreaScene<'a>,
+    scene: &'s AreaScene<'a>,
     i_surface: usize,
     eye: DVec3,
     window: &'s Window,
-    of: Of,
-    /// Of what is integrated at every point.
+    of: Quantity,
+    /// Accuracy of the value at every point.
     accuracy: &'s Accuracy,
 }
 
 impl Integrand for Mean<'_, '_> {
-    fn at(&self, i_piece: usize, x: DVec2) -> Sample {
-        let rect = &self.scenery.rects[self.i_surface];
+    fn at(&self, i_region: usize, x: DVec2) -> Sample {
+        let rect = &self.scene.rectangles[self.i_surface];
         let p = rect.point(x.x, x.y);
         let toward = (self.eye - p).normalize_or_zero();
         let [radiance, irradiance, error] = match self.of {
-            Of::First => {
-                let lit = &self.scenery.pieces[self.i_surface][i_piece].lit;
-                self.scenery.first_on_piece(self.i_surface, lit, p, toward)
+            Quantity::First => {
+                let lit = &self.scene.regions[self.i_surface][i_region].lit;
+                self.scene.first_in_region(self.i_surface, lit, p, toward)
             }
-            Of::Second => {
-                let e = self.scenery.second(
-                    &self.scenery.on_surface(self.i_surface, p),
+            Quantity::Second => {
+                let e = self.scene.second(
+                    &self.scene.on_surface(self.i_surface, p),
                     toward,
                     self.accuracy,
                 );
@@ -124,30 +128,27 @@ impl Integrand for Mean<'_, '_> {
 
     fn is_resolved(&self, cell: &Cell) -> bool {
         match self.of {
-            Of::First => resolve::mean_is_resolved(
-                self.scenery,
-                self.i_surface,
-                self.eye,
-                cell,
-                self.accuracy.relative,
-            ),
-            Of::Second => resolve::mirror_is_resolved(self.scenery, self.i_surface, self.eye, cell),
+            Quantity::First => {
+                let (scene, i_surface) = (self.scene, self.i_surface);
+                let lit = &scene.regions[i_surface][cell.i_region].lit;
+                let relative = self.accuracy.relative;
+                let view = ViewOfSurface { scene, i_surface, lit, relative };
+                resolve::is_first_resolved(&view, self.eye, cell)
+            }
+            Quantity::Second => {
+                resolve::is_second_resolved(self.scene, self.i_surface, self.eye, cell)
+            }
         }
     }
 
     fn length_squared(&self, _: usize, d: DVec2) -> f64 {
-        self.scenery.rects[self.i_surface].length_squared(d)
+        self.scene.rectangles[self.i_surface].length_squared(d)
     }
 
-    fn doubt(&self) -> f64 {
+    fn safety_factor(&self) -> f64 {
         match self.of {
-            Of::First => 1.0,
-            Of::Second => DOUBT,
+            Quantity::First => 1.0,
+            Quantity::Second => SAFETY_FACTOR,
         }
     }
-}
-
-/// `f` of 0…n−1, on as many threads as the machine has.
-pub fn each<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-    (0..n).into_par_iter().map(f).collect()
 }

@@ -1,65 +1,71 @@
-//! Any number of reflections by random paths: an estimate with a standard error, and of the second
-//! reflection one that shares no quadrature with `AreaScene::second`. Each path starts at the
-//! receiver, goes where its BRDF sends it (or to one of the discs) and collects L1 at every vertex;
-//! V is tested point by point.
+//! Any number of reflections by random paths, with standard errors. For the second reflection it is
+//! an estimate that shares no quadrature with `AreaScene::second`.
+//!
+//! Each path starts at the receiver, continues as its BRDF reflects or to one of the discs, and
+//! collects L1 at every vertex. V is tested point by point.
 
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 use glam::DVec3;
 
-use super::visibility::{Rect, Source};
-use super::{AreaScene, Receiver, mean, reflectance};
+use super::scene::{AreaScene, Receiver, reflectance};
+use super::visibility::met;
 use crate::model::material::Brdf;
 use crate::model::philox::{philox4x32_10, uniform};
+use crate::reference::occlude::{Rectangle, Source};
+use crate::reference::parallel::parallel_map;
 
-/// Second word of the key, so that paths share no numbers with particles.
+/// Second word of the Philox key: paths share no random numbers with particles.
 const KEY: u32 = 0x7061_7468;
-/// Paths a job, one after another; jobs run on all threads.
+/// Number of paths of a job. Jobs run in parallel.
 const PATHS_A_JOB: u32 = 1024;
 
-/// Radiance of one number of reflections, toward the eye.
+/// Radiance of one number of reflections toward the eye.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reflected {
+    /// Mean radiance, W m⁻² sr⁻¹.
     pub radiance: DVec3,
-    /// One standard error of the mean, every channel; 0 for the first reflection, which needs no
-    /// chance. It is of the same paths: too small where few of them met the light, 0 where none
-    /// did. Below a tenth of the radiance, which takes a hundred paths that meet it, differences
-    /// from the truth are normal numbers of it (`tests/area.rs`).
+    /// One standard error of the mean, every channel; 0 for the first reflection, which is not
+    /// sampled. It comes from the same paths, so it is too small if few of them met the light, and
+    /// 0 if none did. Where it is below a tenth of the radiance, which takes a hundred paths that
+    /// meet the light, errors are normally distributed with it (`tests/area.rs`).
     pub error: DVec3,
 }
 
-/// How many paths, and which.
+/// Number and random numbers of the paths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathSampling {
+    /// Number of paths.
     pub n_paths: u32,
+    /// Seed.
     pub seed: u32,
-    /// Of several samples which one: they share no numbers.
+    /// Number of the sample; samples share no random numbers.
     pub i_sample: u32,
 }
 
-/// Sums of one job: of every reflection beyond the first, and of all of them together (last).
+/// Sums of one job: of every reflection beyond the first, and last of all of them together.
 type Sums = Vec<(DVec3, DVec3)>;
 
 impl AreaScene<'_> {
-    /// Radiance toward the unit vector `toward` after exactly 1, 2, … `k` reflections, and last of
-    /// all together.
+    /// Returns the radiance toward the unit vector `toward` after exactly 1, 2, … `k` reflections,
+    /// and last of all together.
     pub fn reflections(
         &self,
         at: &Receiver,
         toward: DVec3,
         k: usize,
-        chance: PathSampling,
+        sampling: PathSampling,
     ) -> Vec<Reflected> {
         let first = Reflected { radiance: self.first(at, toward), error: DVec3::ZERO };
         let n_more = k.saturating_sub(1);
-        let n_jobs = chance.n_paths.div_ceil(PATHS_A_JOB);
+        let n_jobs = sampling.n_paths.div_ceil(PATHS_A_JOB);
         let job = |i: usize| {
             let i = i as u32;
-            let paths = i * PATHS_A_JOB..chance.n_paths.min((i + 1) * PATHS_A_JOB);
+            let paths = i * PATHS_A_JOB..sampling.n_paths.min((i + 1) * PATHS_A_JOB);
             let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); n_more + 1];
             for i_path in paths {
                 let mut all = DVec3::ZERO;
-                let found = self.path(at, toward, n_more, (chance, i_path));
+                let found = self.path(at, toward, n_more, (sampling, i_path));
                 for (sum, l) in sums.iter_mut().zip(found) {
                     *sum = (sum.0 + l, sum.1 + l * l);
                     all += l;
@@ -68,8 +74,8 @@ impl AreaScene<'_> {
             }
             sums
         };
-        let sums = mean::each(n_jobs as usize, job).into_iter().reduce(add).unwrap_or_default();
-        let n = f64::from(chance.n_paths);
+        let sums = parallel_map(n_jobs as usize, job).into_iter().reduce(add).unwrap_or_default();
+        let n = f64::from(sampling.n_paths);
         let of = |(sum, squares): (DVec3, DVec3)| {
             let radiance = sum / n;
             let variance =
@@ -78,25 +84,26 @@ impl AreaScene<'_> {
         };
         let mut all: Vec<Reflected> =
             std::iter::once(first).chain(sums.into_iter().map(of)).collect();
-        // The last sum is that of all beyond the first; without paths there is none.
+        // The last sum is that of all reflections beyond the first; without paths there is none.
         all.resize(k.max(1) + 1, Reflected { radiance: DVec3::ZERO, error: DVec3::ZERO });
         all[k.max(1)].radiance += first.radiance;
         all
     }
 
-    /// What one path finds at its vertices: the second reflection, the third, …
+    /// Returns the light that one path collects at its vertices: the second reflection, the third,
+    /// …
     fn path(
         &self,
         at: &Receiver,
         toward: DVec3,
         n_more: usize,
-        (chance, i_path): (PathSampling, u32),
+        (sampling, i_path): (PathSampling, u32),
     ) -> Vec<DVec3> {
         let (mut at, mut toward, mut weight) = (*at, toward, DVec3::ONE);
         let mut found = vec![DVec3::ZERO; n_more];
         for (i, l) in found.iter_mut().enumerate() {
             let draw = |turn: u32| {
-                philox4x32_10([chance.seed, KEY], [i_path, i as u32, turn, chance.i_sample])
+                philox4x32_10([sampling.seed, KEY], [i_path, i as u32, turn, sampling.i_sample])
                     .map(uniform)
             };
             let Some((next, direction, w)) = self.step(&at, toward, draw(0), draw(1)) else {
@@ -109,7 +116,7 @@ impl AreaScene<'_> {
         found
     }
 
-    /// The next vertex, the direction there, and f cos θ V over the probability.
+    /// Returns the next vertex, the direction to it, and f cos θ V over the probability.
     fn step(
         &self,
         at: &Receiver,
@@ -117,7 +124,7 @@ impl AreaScene<'_> {
         u: [f64; 4],
         more: [f64; 4],
     ) -> Option<(Receiver, DVec3, DVec3)> {
-        let to_discs = match (self.discs.is_empty(), self.rects.is_empty()) {
+        let to_discs = match (self.discs.is_empty(), self.rectangles.is_empty()) {
             (true, _) => 0.0,
             (false, true) => 1.0,
             (false, false) => 0.5,
@@ -130,8 +137,8 @@ impl AreaScene<'_> {
         if cosine <= 0.0 {
             return None;
         }
-        let (i, t) = nearest(&self.rects, at.position, direction)?;
-        if self.rects[i].normal.dot(direction) >= 0.0 {
+        let (i, t) = nearest(&self.rectangles, at.position, direction)?;
+        if self.rectangles[i].normal.dot(direction) >= 0.0 {
             return None;
         }
         let position = at.position + t * direction;
@@ -141,8 +148,8 @@ impl AreaScene<'_> {
         Some((self.on_surface(i, position), direction, w))
     }
 
-    /// The same to one of the discs, drawn by how much light each would bring if all shone alike
-    /// and nothing lay between; the choice fell on discs with probability `chosen`.
+    /// Returns the next vertex on one of the discs. Discs are drawn by the light each would send if
+    /// all had one radiance and nothing lay between. Discs were chosen with probability `chosen`.
     fn step_to_disc(
         &self,
         at: &Receiver,
@@ -151,7 +158,7 @@ impl AreaScene<'_> {
         chosen: f64,
     ) -> Option<(Receiver, DVec3, DVec3)> {
         let pairs: Vec<f64> = (0..self.discs.len())
-            .map(|i| if at.i_disc == Some(i) { 0.0 } else { self.pair(i, at) })
+            .map(|i| if at.i_disc == Some(i) { 0.0 } else { self.disc_form_factor(i, at) })
             .collect();
         let sum: f64 = pairs.iter().sum();
         let mut left = u * sum;
@@ -159,9 +166,9 @@ impl AreaScene<'_> {
             left -= pair;
             left < 0.0
         });
-        // None lies before it, or rounding led past the last.
+        // No disc counts before the last, or rounding led past it.
         let i = drawn.or_else(|| pairs.iter().rposition(|pair| *pair > 0.0))?;
-        let (e, direction) = self.of_disc(i, at, DVec3::splat(sum / (pairs[i] * chosen)));
+        let (e, direction) = self.disc_light(i, at, DVec3::splat(sum / (pairs[i] * chosen)));
         let w = e * reflectance(&at.brdf, at.normal, direction, toward);
         (w != DVec3::ZERO).then(|| (self.on_disc(i), direction, w))
     }
@@ -171,21 +178,20 @@ fn add(a: Sums, b: Sums) -> Sums {
     a.into_iter().zip(b).map(|((s, q), (t, r))| (s + t, q + r)).collect()
 }
 
-fn nearest(rects: &[Rect], p: DVec3, direction: DVec3) -> Option<(usize, f64)> {
-    let met = |(i, r): (usize, &Rect)| r.met(p, Source::Toward(direction)).map(|t| (i, t));
-    rects.iter().enumerate().filter_map(met).min_by(|a, b| a.1.total_cmp(&b.1))
+fn nearest(rectangles: &[Rectangle], p: DVec3, direction: DVec3) -> Option<(usize, f64)> {
+    let hit = |(i, r): (usize, &Rectangle)| met(r, p, Source::Toward(direction)).map(|t| (i, t));
+    rectangles.iter().enumerate().filter_map(hit).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Share of directions drawn from the lobe: none for an eye behind. It sees no lobe, and its half
-/// vectors about the normal lead before the surface also where `density`, whose half vectors turn
-/// toward the eye, knows nothing of them.
+/// Returns the share of directions drawn from the lobe; none for an eye behind. Such an eye sees no
+/// lobe, and half vectors about the normal would give directions that `density` does not cover.
 fn lobe_share(brdf: &Brdf, normal: DVec3, toward: DVec3) -> f64 {
     let (d, s) = (brdf.kd.max_element(), brdf.ks.max_element());
     if s > 0.0 && normal.dot(toward) > 0.0 { s / (d + s) } else { 0.0 }
 }
 
-/// About the normal by cos θ/π, or about the mirror direction by a half vector of density
-/// (n_s+1)/2π cos^{n_s} γ.
+/// Draws a direction about the normal by cos θ/π, or about the mirror direction by a half vector of
+/// density (n_s+1)/2π cos^{n_s} γ.
 fn direction(brdf: &Brdf, normal: DVec3, toward: DVec3, u: [f64; 4]) -> DVec3 {
     // 1 − u is never 0.
     let (x, phi) = (1.0 - u[0], TAU * u[1]);
@@ -199,7 +205,7 @@ fn direction(brdf: &Brdf, normal: DVec3, toward: DVec3, u: [f64; 4]) -> DVec3 {
     if glossy { (2.0 * toward.dot(h) * h - toward).normalize_or_zero() } else { h }
 }
 
-/// Per solid angle.
+/// Returns the probability density per solid angle of a drawn direction.
 fn density(brdf: &Brdf, normal: DVec3, toward: DVec3, direction: DVec3) -> f64 {
     let share = lobe_share(brdf, normal, toward);
     let diffuse = (1.0 - share) * normal.dot(direction) * FRAC_1_PI;

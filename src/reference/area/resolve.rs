@@ -1,100 +1,106 @@
-//! Which cells are too large for their cubature to see all that there is in them. A rule of 22
-//! points takes a cell that a lobe, a near light or a small blob falls between for an empty one,
-//! and reports no error; such cells are halved before any is measured.
+//! Resolution of cells before their cubature. A rule of 22 points reports no error for a cell whose
+//! lobe, near light or small blob falls between its nodes. Such cells are halved before any is
+//! evaluated.
 
 use glam::DVec3;
 
 use super::adaptive::Cell;
 use super::clip::WHOLE;
-use super::visibility::{Rect, Source, source_of};
-use super::{AreaScene, Reach, Seen};
+use super::scene::{AreaScene, Exposure, Receiver};
 use crate::model::light::{Light, MIN_PENUMBRA};
 use crate::reference::Blob;
+use crate::reference::occlude::{Rectangle, Source, source_of};
 
-/// Greatest radius of a cell, in its distance from what varies as 1/d². There the integrand has no
-/// feature narrower than d, and no node of the rules is further than 0.5 radii from the next.
+/// Greatest radius of a cell, over its distance from anything that varies as 1/d². There the
+/// integrand has no feature narrower than d, and neighbouring nodes are at most 0.5 radii apart.
 const NEAREST: f64 = 0.7;
-/// How closely a lobe is looked at, in widths 1/√n_s.
-struct Detail {
+/// Resolution of a lobe, in widths 1/√n_s.
+struct LobeDetail {
     /// Greatest spread of the half vector over a cell.
     widths: f64,
-    /// Distance from the peak beyond which there is nothing.
+    /// Distance from the peak beyond which the lobe vanishes.
     reach: f64,
 }
 
-/// Neighbouring nodes lie within a width; e^{−8²/2} = 1.3e-14 of the peak.
-const LOBE: Detail = Detail { widths: 1.5, reach: 8.0 };
-/// In a mean of L2: nodes within 1.5 widths meet every peak, and e^{−4²/2} = 3e-4 of it is of no
+/// Neighbouring nodes lie within a width; e^{−8²/2} = 1.3e-14 of the peak is left at the reach.
+const LOBE: LobeDetail = LobeDetail { widths: 1.5, reach: 8.0 };
+/// For a mean of L2: nodes within 1.5 widths meet every peak, and e^{−4²/2} = 3e-4 of it has no
 /// weight in a mean.
-const MIRROR: Detail = Detail { widths: 3.0, reach: 4.0 };
-/// The same of a blob, in σ: radius of a cell, and e^{−4²/2} = 3e-4 of its depth, that varies over
-/// σ.
+const MIRROR: LobeDetail = LobeDetail { widths: 3.0, reach: 4.0 };
+/// Greatest radius of a cell and reach of a blob, σ. At the reach e^{−4²/2} = 3e-4 of the depth is
+/// left.
 const BLOB_WIDTHS: f64 = 1.5;
 const BLOB_REACH: f64 = 4.0;
-/// Greatest angular radius of a cell in a spot's penumbra, in widths of that: no node is further
-/// than a third of the penumbra from the next. What lies between nodes unseen along an edge of it
-/// falls with the square (inner edge) and the cube (outer) of that radius; at this radius it was
-/// measured as 6e-6 of a cone's flux.
+/// Greatest angular radius of a cell in a spot's penumbra, in widths of the penumbra. Neighbouring
+/// nodes are at most a third of the penumbra apart. Light missed along an edge falls with the
+/// square (inner edge) and the cube (outer edge) of the radius; at this radius 6e-6 of a cone's
+/// flux was measured.
 const PENUMBRA_WIDTHS: f64 = 0.7;
 const PENUMBRA_TOLERANCE: f64 = 1e-4;
-/// Cells that look smaller than this are as small as they need be: a lobe at grazing angles can ask
-/// for no end.
-const LEAST_ANGLE: f64 = 1e-9;
+/// Angular radius below which a cell is small enough, since a lobe at grazing angles could be
+/// divided without end.
+const MIN_ANGLE: f64 = 1e-9;
 
-/// The ball about a cell's centroid, of which the rest is cones.
+/// The ball about a cell's centroid that contains the cell.
 struct Ball {
     center: DVec3,
     radius: f64,
 }
 
 impl Ball {
-    fn of(rect: &Rect, cell: &Cell) -> Ball {
+    fn of(rect: &Rectangle, cell: &Cell) -> Ball {
         let corners = cell.corners.map(|x| rect.point(x.x, x.y));
         let center = (corners[0] + corners[1] + corners[2]) / 3.0;
         Ball { center, radius: corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max) }
     }
 }
 
-/// Whether a cell of what a receiver sees is small enough.
-pub(super) fn seen_is_resolved(seen: &Seen, cell: &Cell) -> bool {
-    let (i_surface, lit) = seen.pieces[cell.i_piece];
-    let (scenery, at) = (seen.scenery, seen.at);
-    let ball = Ball::of(&scenery.rects[i_surface], cell);
+/// A surface's region seen from somewhere.
+pub(super) struct ViewOfSurface<'s, 'a> {
+    /// The scene.
+    pub scene: &'s AreaScene<'a>,
+    /// Index of the surface.
+    pub i_surface: usize,
+    /// The lights that reach the region.
+    pub lit: &'s [(usize, Exposure)],
+    /// Relative accuracy of the integral.
+    pub relative: f64,
+}
+
+/// Returns whether a cell is small enough for the light that `at` reflects from it along `toward`.
+pub(super) fn is_incident_resolved(
+    view: &ViewOfSurface,
+    at: &Receiver,
+    toward: DVec3,
+    cell: &Cell,
+) -> bool {
+    let ball = Ball::of(&view.scene.rectangles[view.i_surface], cell);
     let Some((from, spread)) = cone(&ball, at.position) else { return false };
-    if spread < LEAST_ANGLE {
+    if spread < MIN_ANGLE {
         return true;
     }
     let gloss = &at.brdf;
-    (gloss.ks == DVec3::ZERO
-        || lobe_is_resolved(gloss.ns, at.normal, seen.toward, from, spread, LOBE))
-        && first_is_resolved(scenery, i_surface, lit, &ball, (-from, spread), seen.relative)
-        && blobs_are_resolved(scenery, &ball, Source::At(at.position), seen.relative)
+    (gloss.ks == DVec3::ZERO || is_lobe_resolved(gloss.ns, at.normal, toward, from, spread, LOBE))
+        && is_light_resolved(view, &ball, (-from, spread))
+        && are_blobs_resolved(view.scene, &ball, Source::At(at.position), view.relative)
 }
 
-/// Whether a cell of a mean of L1 toward `eye` is small enough.
-pub(super) fn mean_is_resolved(
-    scenery: &AreaScene,
-    i_surface: usize,
-    eye: DVec3,
-    cell: &Cell,
-    relative: f64,
-) -> bool {
-    let ball = Ball::of(&scenery.rects[i_surface], cell);
-    let lit = &scenery.pieces[i_surface][cell.i_piece].lit;
+/// Returns whether a cell of a mean of L1 toward `eye` is small enough.
+pub(super) fn is_first_resolved(view: &ViewOfSurface, eye: DVec3, cell: &Cell) -> bool {
+    let ball = Ball::of(&view.scene.rectangles[view.i_surface], cell);
     let Some((from, spread)) = cone(&ball, eye) else { return false };
-    spread < LEAST_ANGLE
-        || first_is_resolved(scenery, i_surface, lit, &ball, (-from, spread), relative)
+    spread < MIN_ANGLE || is_light_resolved(view, &ball, (-from, spread))
 }
 
-/// Whether a cell of a mean of L2 toward `eye` is small enough: against its distance from every
-/// other surface, or that one's size, and for the lobe in which it mirrors what lights it.
-pub(super) fn mirror_is_resolved(
-    scenery: &AreaScene,
+/// Returns whether a cell of a mean of L2 toward `eye` is small enough: for the distance or size of
+/// every other surface, and for the lobe that mirrors the light sources.
+pub(super) fn is_second_resolved(
+    scene: &AreaScene,
     i_surface: usize,
     eye: DVec3,
     cell: &Cell,
 ) -> bool {
-    let (rect, brdf) = (&scenery.rects[i_surface], &scenery.brdfs[i_surface]);
+    let (rect, brdf) = (&scene.rectangles[i_surface], &scene.brdfs[i_surface]);
     let ball = Ball::of(rect, cell);
     let view = ball.center.distance(eye);
     let glossy = brdf.ks != DVec3::ZERO;
@@ -103,7 +109,7 @@ pub(super) fn mirror_is_resolved(
     }
     let (toward, turn) =
         ((eye - ball.center).normalize_or_zero(), (ball.radius / view).min(1.0).asin());
-    let others = scenery.rects.iter().enumerate().filter(|(_, other)| !lies_behind(rect, other));
+    let others = scene.rectangles.iter().enumerate().filter(|(_, other)| !lies_behind(rect, other));
     others.into_iter().all(|(i, other)| {
         let way = other.nearest(ball.center) - ball.center;
         let narrow = other.u.length().min(other.v.length());
@@ -111,50 +117,44 @@ pub(super) fn mirror_is_resolved(
         if ball.radius > NEAREST * reach {
             return false;
         }
-        // The lobe and what it mirrors blur each other: their features are as wide as the wider of
-        // both.
+        // The lobe and the source that it mirrors blur each other, so their features are as wide as
+        // the wider one.
         let ns = brdf.ns.min((reach / narrow).powi(2));
         let spread = (ball.radius / reach).asin() + turn;
-        let dark = scenery.pieces[i].is_empty();
-        let mirrors = |from: DVec3| lobe_is_resolved(ns, rect.normal, from, toward, spread, MIRROR);
+        let dark = scene.regions[i].is_empty();
+        let mirrors = |from: DVec3| is_lobe_resolved(ns, rect.normal, from, toward, spread, MIRROR);
         !glossy || dark || way.try_normalize().is_none_or(mirrors)
     })
 }
 
-fn lies_behind(rect: &Rect, other: &Rect) -> bool {
-    WHOLE.iter().all(|x| rect.side_of(other.point(x.x, x.y)) <= 0.0)
+fn lies_behind(rect: &Rectangle, other: &Rectangle) -> bool {
+    WHOLE.iter().all(|x| rect.side(other.point(x.x, x.y)) <= 0.0)
 }
 
-/// The first reflection from the ball toward whoever sees it along `view`, a direction and how far
-/// it turns.
-fn first_is_resolved(
-    scenery: &AreaScene,
-    i_surface: usize,
-    lit: &[(usize, Reach)],
-    ball: &Ball,
-    view: (DVec3, f64),
-    relative: f64,
-) -> bool {
-    let (brdf, normal) = (&scenery.brdfs[i_surface], scenery.rects[i_surface].normal);
-    lit.iter().filter(|(_, reach)| *reach == Reach::Open).all(|&(i_light, _)| {
-        let light = &scenery.lights[i_light];
+/// Returns whether the first reflection from the ball along `along`, a direction and how far it
+/// turns over the ball, is resolved.
+fn is_light_resolved(view: &ViewOfSurface, ball: &Ball, along: (DVec3, f64)) -> bool {
+    let ViewOfSurface { scene, i_surface, lit, relative } = *view;
+    let (brdf, normal) = (&scene.brdfs[i_surface], scene.rectangles[i_surface].normal);
+    lit.iter().filter(|(_, exposure)| *exposure == Exposure::Open).all(|&(i_light, _)| {
+        let light = &scene.lights[i_light];
         let Some((toward, spread)) = light_cone(light, ball, relative) else { return false };
         let no_lobe = light.is_sky() || brdf.ks == DVec3::ZERO;
-        (no_lobe || lobe_is_resolved(brdf.ns, normal, toward, view.0, spread + view.1, LOBE))
-            && blobs_are_resolved(scenery, ball, source_of(light), relative)
+        (no_lobe || is_lobe_resolved(brdf.ns, normal, toward, along.0, spread + along.1, LOBE))
+            && are_blobs_resolved(scene, ball, source_of(light), relative)
     })
 }
 
-/// Direction of a ball's centre from `p` and half angle of the cone about the ball; nothing where
-/// it is too near.
+/// Returns the direction of a ball's centre from `p` and the half angle of the cone about it;
+/// `None` if the ball is too near.
 fn cone(ball: &Ball, p: DVec3) -> Option<(DVec3, f64)> {
     let way = ball.center - p;
     let distance = way.length();
     (ball.radius <= NEAREST * distance).then(|| (way / distance, (ball.radius / distance).asin()))
 }
 
-/// Direction toward a light from the ball's centre and how far it turns within the ball; nothing
-/// where the ball is too large for the light's distance or cone.
+/// Returns the direction toward a light from the ball's centre and how far it turns within the
+/// ball; `None` if the ball is too large for the light's distance or cone.
 fn light_cone(light: &Light, ball: &Ball, relative: f64) -> Option<(DVec3, f64)> {
     let arrival = light.arrival(ball.center);
     if arrival.distance.is_infinite() {
@@ -168,9 +168,9 @@ fn light_cone(light: &Light, ball: &Ball, relative: f64) -> Option<(DVec3, f64)>
         if off_axis - spread > outer {
             return Some((toward, spread));
         }
-        // Light ends within the penumbra, and what a cell there has of it may lie between its
-        // nodes: a strip as wide as the cell along the outer edge, where light sets in with the
-        // square, along the inner one, where it bends.
+        // Light ends within the penumbra, and a cell's share may fall between its nodes: a strip as
+        // wide as the cell along the outer edge, where light begins with the square, or along the
+        // inner edge, where it bends.
         let strict = (relative / PENUMBRA_TOLERANCE).min(1.0);
         let crosses = |edge: f64| (off_axis - edge).abs() < spread;
         let finer = if crosses(inner) {
@@ -187,23 +187,23 @@ fn light_cone(light: &Light, ball: &Ball, relative: f64) -> Option<(DVec3, f64)>
     (ball.radius <= NEAREST * arrival.distance).then_some((toward, spread))
 }
 
-/// Whether over directions within `spread` of `a` and `b` together the half vector of both turns
-/// little against the lobe's width, or stays where the lobe is nothing.
-fn lobe_is_resolved(
+/// Returns whether the half vector of directions within `spread` of `a` and `b` together turns
+/// little compared with the lobe's width, or stays where the lobe vanishes.
+fn is_lobe_resolved(
     ns: f64,
     normal: DVec3,
     a: DVec3,
     b: DVec3,
     spread: f64,
-    detail: Detail,
+    detail: LobeDetail,
 ) -> bool {
     let width = 1.0 / ns.max(1.0).sqrt();
     let sum = a + b;
-    // The half vector turns by ½ of what one direction does along the arc between both, and across
-    // it by 1/(2 cos(θ/2)), θ the angle between them.
+    // The half vector turns by ½ of a direction's turn along the arc between both, and by 1/(2
+    // cos(θ/2)) of it across, θ the angle between them.
     let half_angle = (0.5 * sum.length()).min(1.0).acos() + 0.5 * spread;
     if half_angle >= std::f64::consts::FRAC_PI_2 {
-        return spread <= LEAST_ANGLE;
+        return spread <= MIN_ANGLE;
     }
     let turn = 0.5 * spread / half_angle.cos();
     if turn <= detail.widths * width {
@@ -213,23 +213,22 @@ fn lobe_is_resolved(
     gamma - turn > detail.reach * width
 }
 
-/// Whether every blob that casts a shadow between the ball and `end` is wide against the rays from
-/// the ball there.
-fn blobs_are_resolved(scenery: &AreaScene, ball: &Ball, end: Source, relative: f64) -> bool {
+/// Returns whether every blob that casts a shadow between the ball and `end` is wide compared with
+/// the rays from the ball there.
+fn are_blobs_resolved(scene: &AreaScene, ball: &Ball, end: Source, relative: f64) -> bool {
     let (way, length) = match end {
         Source::At(q) => ((q - ball.center).normalize_or_zero(), ball.center.distance(q)),
         Source::Toward(d) => (d, f64::INFINITY),
     };
     let matters = |blob: &&Blob| {
-        let depth = (1.0 - scenery.forward) * blob.deepest();
+        let depth = (1.0 - scene.forward) * blob.deepest();
         blob.sigma > 0.0 && depth > relative
     };
-    scenery.blobs.iter().filter(matters).all(|blob| {
+    scene.blobs.iter().filter(matters).all(|blob| {
         let offset = blob.position - ball.center;
         let reach = BLOB_REACH * blob.widest();
         let along = offset.dot(way);
-        // Rays from the ball to a point close in on it; those to a direction stay as wide as the
-        // ball.
+        // Rays from the ball converge to a point; rays to a direction stay as wide as the ball.
         let radius = ball.radius * (1.0 - along.clamp(0.0, length) / length);
         let before = along > -reach - ball.radius;
         let before_end = along < length + reach;

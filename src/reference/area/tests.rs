@@ -1,10 +1,18 @@
-//! Numbers worked by hand and published ones, then agreement with paths that share no quadrature.
+//! Values worked by hand and published ones, and agreement with paths that share no quadrature.
 
-use super::mean::{Window, each};
+use super::mean::Window;
 use super::paths::PathSampling;
-use super::visibility::visible;
 use super::*;
-use crate::model::philox::{philox4x32_10, uniform};
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use crate::model::light::Light;
+use crate::model::material::Brdf;
+use crate::model::surface::Surface;
+use crate::reference::Blob;
+
+mod estimates;
 
 const UP: DVec3 = DVec3::Y;
 const FINE: Accuracy = Accuracy::relative(1e-9);
@@ -17,7 +25,7 @@ fn at(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// A unit square at height `y` that faces down: under a sky it is lit by the constant share alone.
+/// A unit square at height `y` that faces down. A sky lights it by the constant share alone.
 fn ceiling(y: f64) -> Surface {
     rect(at(0.0, y, 0.0), 0.5 * DVec3::X, 0.5 * DVec3::Z)
 }
@@ -30,12 +38,12 @@ fn glossy(kd: f64, ks: f64, ns: f64) -> Brdf {
     Brdf { kd: DVec3::splat(kd), ks: DVec3::splat(ks), ns }
 }
 
-/// A white surface that no other light reaches has L1 = 1 under it.
+/// A white surface that no other light reaches has L1 = 1 under this sky.
 const GLOW: Light = Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 };
 
 fn close(e: &Estimate, irradiance: f64, relative: f64) {
     let off = (e.irradiance.x - irradiance).abs();
-    // The true value's own digits are beyond the tolerance; 1e-13 for the sums' roundings.
+    // The expected value is accurate beyond the tolerance; 1e-13 covers the sums' roundings.
     assert!(off <= e.irradiance_error + 1e-13 * irradiance, "{e:?} is not {irradiance}");
     assert!(e.irradiance_error <= relative * irradiance, "{e:?}");
 }
@@ -61,7 +69,7 @@ fn form_factors_from_an_element() {
 }
 
 #[test]
-fn a_receiver_that_touches_what_it_sees_converges() {
+fn a_receiver_that_touches_an_emitter_converges() {
     // B-4 as the element nears the wall's foot: F = ½ − Y/2 …, by its closed form with X = 2, Y =
     // 2c.
     let wall = rect(at(0.0, 0.5, 0.0), 0.5 * DVec3::Y, 0.5 * DVec3::Z);
@@ -74,9 +82,9 @@ fn a_receiver_that_touches_what_it_sees_converges() {
             "{c}: {f} {truth} {error}"
         );
     }
-    // In the wall's plane nothing of it is seen.
+    // In the wall's plane nothing of the wall is seen.
     assert_eq!(form_factor(&wall, DVec3::ZERO, UP, &FINE).0, 0.0);
-    // Parallel plates a hair apart see only each other.
+    // Parallel plates that almost touch see only each other.
     let (f, error) = form_factor(&ceiling(1e-5), at(0.1, 0.0, 0.2), UP, &Accuracy::relative(1e-7));
     assert!((f - 1.0).abs() < 1e-8 + error && error < 1e-7);
 }
@@ -118,7 +126,7 @@ fn cube(albedo: Brdf) -> (Vec<Surface>, Vec<Brdf>) {
 }
 
 #[test]
-fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
+fn a_furnace_reflects_powers_of_its_albedo() {
     let (faces, brdfs) = cube(matte(0.7));
     let sky = [Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 }];
     let s = AreaScene::new(&faces, &brdfs, &sky, &[], 0.0, &[]);
@@ -132,7 +140,7 @@ fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
             close(&e, PI * 0.7, 1e-7);
         }
     }
-    // Paths drawn by the cosine carry the albedo itself: no chance is left.
+    // Paths drawn by the cosine carry the albedo exactly, without variance.
     let receiver = s.on_surface(2, faces[2].center + 0.3 * faces[2].u);
     let found = s.reflections(
         &receiver,
@@ -157,7 +165,7 @@ fn an_eye_behind_sees_the_diffuse_part_alone() {
             (receiver.normal.any_orthonormal_vector() - depth * receiver.normal).normalize();
         let e = s.second(&receiver, toward, &Accuracy::relative(1e-7));
         assert!((e.radiance.x - 0.35).abs() <= e.error && e.error <= 1e-7 * 0.35, "{e:?}");
-        // All directions are drawn by the cosine: no chance is left, only 2000 sums' roundings.
+        // All directions are drawn by the cosine, so that only the rounding of 2000 sums is left.
         let found = s.reflections(
             &receiver,
             toward,
@@ -171,7 +179,7 @@ fn an_eye_behind_sees_the_diffuse_part_alone() {
 }
 
 #[test]
-fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
+fn blockers_and_blobs_attenuate() {
     let lamp = ceiling(2.0);
     let receiver = Receiver::new(DVec3::ZERO, UP, matte(0.5));
     let second = |surfaces: &[Surface], blobs: &[Blob]| {
@@ -179,16 +187,15 @@ fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
         AreaScene::new(surfaces, &brdfs, &[GLOW], blobs, 0.0, &[]).second(&receiver, UP, &FINE)
     };
     let free = second(&[lamp], &[]);
-    // A black one with its edge through the axis, level and leaning.
+    // A black blocker with its edge through the axis, level and leaning.
     for lean in [0.0, 0.7] {
         let along = DVec3::X.rotate_z(lean);
         let blocker = rect(at(0.0, 1.0, 0.0) + 3.0 * along, 3.0 * along, 9.0 * DVec3::Z);
         let s = AreaScene::new(&[lamp, blocker], &[matte(1.0), matte(0.0)], &[GLOW], &[], 0.0, &[]);
         close(&s.second(&receiver, UP, &FINE), 0.5 * free.irradiance.x, 1e-9);
-        assert!(!visible(&[lamp, blocker], DVec3::ZERO, lamp.center + 0.2 * DVec3::X));
     }
-    // A wide blob, seen through its centre by every ray within a small lamp: e^{−τ}, τ hardly
-    // varying with direction.
+    // A wide blob that every ray to a small lamp crosses near its centre: e^{−τ}, with τ nearly
+    // constant.
     let small = rect(at(0.0, 200.0, 0.0), 0.1 * DVec3::X, 0.1 * DVec3::Z);
     let blob = Blob { aspect: 1.0, position: at(0.0, 100.0, 0.0), sigma: 5.0, kappa: 0.2 };
     let ratio = second(&[small], &[blob]).irradiance.x / second(&[small], &[]).irradiance.x;
@@ -199,8 +206,8 @@ fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
 #[test]
 fn a_lobe_of_any_width_is_found() {
     // Eye along the normal, a lamp that fills the lobe: ∫ K_s (n+2)/2π cos^n γ cos 2γ · 4 cos γ
-    // dω_h = 4 K_s (n+2) ∫ c^{n+1} (2c² − 1) dc = 4 K_s (2(n+2)/(n+4) − 1); below cos 22.5° there
-    // is nothing left.
+    // dω_h = 4 K_s (n+2) ∫ c^{n+1} (2c² − 1) dc = 4 K_s (2(n+2)/(n+4) − 1). Below cos 22.5° nothing
+    // is left.
     let lamp = rect(UP, DVec3::X, DVec3::Z);
     let sun = [Light::Directional { direction: UP, irradiance: DVec3::ONE }];
     let nothing = matte(0.0);
@@ -247,203 +254,5 @@ fn means_of_the_first_reflection_hold_the_lights_flux() {
         for relative in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
             check(light, truth, relative);
         }
-    }
-}
-
-/// Twelve rectangles at random in a box of half edge 2, four of them glossy, and lights.
-fn random_scene(seed: u32) -> (Vec<Surface>, Vec<Brdf>, Vec<Light>) {
-    let mut n = 0;
-    let mut next = || {
-        n += 1;
-        uniform(philox4x32_10([seed, 77], [n, 0, 0, 0])[0])
-    };
-    let (mut surfaces, mut brdfs) = (Vec::new(), Vec::new());
-    for i in 0..12 {
-        let mut v = || at(next(), next(), next()) * 2.0 - 1.0;
-        let (center, u, w) = (2.0 * v(), v(), v());
-        let u = u.normalize();
-        let v = (w - w.dot(u) * u).normalize();
-        surfaces.push(Surface {
-            center,
-            u: u * (0.3 + next()),
-            v: v * (0.3 + next()),
-            i_material: i,
-            subdivide: [8, 8],
-        });
-        let kd = at(next(), next(), next()) * 0.6;
-        let (ks, ns) = if i % 3 == 0 { (0.1, 10f64.powf(1.0 + 2.0 * next())) } else { (0.0, 1.0) };
-        brdfs.push(Brdf { kd, ks: DVec3::splat(ks), ns });
-    }
-    let direction = at(0.3, -0.8, 0.5).normalize();
-    let lights = vec![
-        Light::Directional { direction, irradiance: at(3.0, 2.9, 2.7) },
-        Light::Point { position: at(0.5, 2.5, -1.0), intensity: DVec3::splat(4.0), radius: 0.01 },
-        Light::Sky { irradiance: at(0.3, 0.4, 0.6), constant: 0.1 },
-    ];
-    (surfaces, brdfs, lights)
-}
-
-#[test]
-fn quadrature_and_paths_agree_in_random_scenes() {
-    let blobs = [
-        Blob { aspect: 1.0, position: at(0.2, 0.3, -0.4), sigma: 0.4, kappa: 1.5 },
-        Blob { aspect: 1.0, position: at(-1.0, 0.0, 0.7), sigma: 0.25, kappa: 2.0 },
-    ];
-    let discs = [
-        DiscFacet {
-            position: at(0.1, 1.9, 0.2),
-            normal: at(0.6, -0.8, 0.0),
-            area: 0.4,
-            kd: at(0.9, 0.8, 0.7),
-        },
-        DiscFacet {
-            position: at(-1.4, 0.1, 0.9),
-            normal: at(0.0, 0.0, -1.0),
-            area: 0.2,
-            kd: at(0.5, 0.8, 0.7),
-        },
-    ];
-    let (mut n, mut chi2) = (0.0, 0.0);
-    for seed in 0..3 {
-        let (surfaces, brdfs, lights) = random_scene(seed);
-        let s = AreaScene::new(&surfaces, &brdfs, &lights, &blobs, 0.2, &discs);
-        let mut receivers: Vec<Receiver> =
-            (0..12).map(|i| s.on_surface(i, surfaces[i].facet_center(19))).collect();
-        receivers.extend((0..2).map(|i| s.on_disc(i)));
-        for receiver in receivers {
-            let toward =
-                (receiver.normal + 0.4 * receiver.normal.any_orthonormal_vector()).normalize();
-            let e = s.second(&receiver, toward, &Accuracy::relative(1e-4));
-            let found = s.reflections(
-                &receiver,
-                toward,
-                2,
-                PathSampling { n_paths: 20_000, seed, i_sample: 0 },
-            )[1];
-            for c in 0..3 {
-                // Light of radiance about 1 that fewer than one path in 20 000 meets is not in the
-                // sample's variance.
-                let (off, sigma) = (
-                    (e.radiance[c] - found.radiance[c]).abs(),
-                    found.error[c].hypot(e.error) + 5e-5,
-                );
-                if e.radiance[c] > 0.0 {
-                    // 126 normal numbers: beyond 5 of them one in 2e-5 such tests.
-                    assert!(off < 5.0 * sigma, "{seed} {receiver:?} {e:?} {found:?}");
-                    (n, chi2) = (n + 1.0, chi2 + (off / sigma).powi(2));
-                }
-            }
-        }
-    }
-    // The channels of one receiver are nearly one number, so the sum has a third of the freedom: 5
-    // √(2/(n/3)).
-    let expected: f64 = 1.0;
-    assert!(n > 60.0 && chi2 / n < expected + 5.0 * (6.0 / n).sqrt(), "{chi2} of {n}");
-}
-
-#[test]
-fn the_error_bounds_what_a_finer_integral_finds() {
-    let (surfaces, brdfs, lights) = random_scene(7);
-    let s = AreaScene::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
-    let off_by = |i: usize| {
-        let receiver = s.on_surface(i % 12, surfaces[i % 12].facet_center(i as u32));
-        let toward = receiver.normal;
-        let truth = s.second(&receiver, toward, &Accuracy::relative(1e-9));
-        for relative in [1e-1, 1e-2, 1e-4, 1e-6] {
-            let e = s.second(&receiver, toward, &Accuracy::relative(relative));
-            let off = (e.radiance - truth.radiance).abs().max_element();
-            let off_e = (e.irradiance - truth.irradiance).abs().max_element();
-            assert!(
-                off <= e.error + truth.error
-                    && off_e <= e.irradiance_error + truth.irradiance_error,
-                "{i} {e:?}"
-            );
-            assert!(e.error <= relative * e.radiance.max_element());
-        }
-        truth.irradiance.x
-    };
-    assert!(each(48, off_by).iter().filter(|&&e| e > 0.0).count() > 30);
-}
-
-#[test]
-fn a_mean_is_that_of_its_facets() {
-    let (surfaces, brdfs, lights) = random_scene(3);
-    let s = AreaScene::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
-    let (eye, accuracy) = (at(3.0, 4.0, 5.0), Accuracy::relative(1e-3));
-    let surface = Surface { subdivide: [2, 2], ..surfaces[1] };
-    let mean =
-        |w: &Window| [s.mean_first(1, w, eye, &accuracy), s.mean_second(1, w, eye, &accuracy)];
-    let facets = each(4, |i| mean(&Window::facet(&surface, i as u32)));
-    for (k, whole) in mean(&Window::WHOLE).iter().enumerate() {
-        let of_facets = facets.iter().map(|f| f[k].irradiance).sum::<DVec3>() / 4.0;
-        let error = whole.irradiance_error
-            + facets.iter().map(|f| f[k].irradiance_error).sum::<f64>() / 4.0;
-        assert!(
-            whole.irradiance.x > 0.0 && (whole.irradiance - of_facets).abs().max_element() <= error,
-            "{k}"
-        );
-    }
-}
-
-#[test]
-fn a_pair_of_discs_by_hand() {
-    // Sun straight down with E = π on a white disc of area π facing up at the origin; a receiver
-    // one above it, facing down: E = L A/(d² + A/π) = π/2.
-    let disc = DiscFacet { position: DVec3::ZERO, normal: UP, area: PI, kd: DVec3::ONE };
-    let sun = [Light::Directional { direction: at(0.0, -1.0, 0.0), irradiance: DVec3::splat(PI) }];
-    let discs = [disc, DiscFacet { position: UP, normal: -UP, ..disc }];
-    let s = AreaScene::new(&[], &[], &sun, &[], 0.0, &discs);
-    let e = s.second(&s.on_disc(1), -UP, &FINE);
-    assert!(
-        (e.irradiance.x - PI / 2.0).abs() < 1e-15
-            && (e.radiance.x - 0.5).abs() < 1e-15
-            && e.error == 0.0
-    );
-    // Its own light does not fall on itself.
-    assert_eq!(s.second(&s.on_disc(0), UP, &FINE).irradiance, DVec3::ZERO);
-    assert_eq!(s.irradiance(&s.on_disc(0)), DVec3::splat(PI));
-}
-
-#[test]
-fn where_evaluations_run_out_the_error_has_no_end() {
-    let s = AreaScene::new(&[ceiling(1e-5)], &[matte(1.0)], &[GLOW], &[], 0.0, &[]);
-    let few = Accuracy { relative: 1e-6, absolute: 0.0, max_evaluations: 200 };
-    let e = s.second(&Receiver::new(DVec3::ZERO, UP, matte(1.0)), UP, &few);
-    assert!(e.error.is_infinite() && e.n_evaluations <= 220);
-}
-
-#[test]
-fn the_error_of_a_mean_bounds_what_a_finer_one_finds() {
-    let eye = at(3.0, 4.0, 5.0);
-    let check = |s: &AreaScene, i: usize, window: &Window| {
-        let truth = s.mean_second(i, window, eye, &Accuracy::relative(1e-3));
-        for relative in [1e-1, 1e-2] {
-            let e = s.mean_second(i, window, eye, &Accuracy::relative(relative));
-            let off = (e.radiance - truth.radiance).abs().max_element();
-            assert!(off <= e.error + truth.error, "{i} {window:?} {off} {e:?} {truth:?}");
-            let off = (e.irradiance - truth.irradiance).abs().max_element();
-            assert!(
-                off <= e.irradiance_error + truth.irradiance_error,
-                "{i} {window:?} {off} {e:?} {truth:?}"
-            );
-        }
-    };
-    let (surfaces, brdfs, lights) = random_scene(0);
-    let s = AreaScene::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
-    each(6, |i| check(&s, i, &Window::facet(&surfaces[i], 5 + 3 * i as u32)));
-    // A polished floor under a small lamp that faces it, and a small lamp a hair above it.
-    let floor = rect(DVec3::ZERO, 2.0 * DVec3::Z, 2.0 * DVec3::X);
-    let lamp = |x: f64, y: f64, half: f64| rect(at(x, y, 0.37), half * DVec3::X, half * DVec3::Z);
-    let surfaces = [floor, lamp(0.5, 1.0, 0.01), lamp(-1.2, 0.02, 0.05)];
-    for ns in [1.0, 1e3] {
-        let s = AreaScene::new(
-            &surfaces,
-            &[glossy(0.1, 0.3, ns), matte(1.0), matte(1.0)],
-            &[GLOW],
-            &[],
-            0.0,
-            &[],
-        );
-        check(&s, 0, &Window::WHOLE);
     }
 }

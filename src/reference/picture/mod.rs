@@ -1,10 +1,35 @@
-//! Whole pictures in f64, drawn from a scene alone: the light of every stage, then sprites, the
-//! volume that they stand for, or the model itself.
+//! Whole pictures in f64, computed from a scene alone: no device, no files.
+//!
+//! - [`ReferenceKind`] names the reference, and [`ReferenceKind::render`] draws it.
+//! - [`sums`] draws any range of samples at any pixels, so that a picture can be computed in parts
+//!   and put together to the same bits.
+//! - [`FrameReference`] holds every stage of one frame up to the light on its facets.
+//! - [`drawn_as_set`] draws a frame with the scene's own drawing settings.
 
-pub mod kind;
-pub mod model_light;
-pub mod model_picture;
-pub mod pixels;
-pub mod samples;
-pub mod stages;
-pub mod whole;
+mod background;
+mod error_estimate;
+mod frame;
+mod kind;
+mod local_scene;
+mod model_light;
+mod model_picture;
+mod pixels;
+mod progress;
+mod render;
+mod renderer;
+mod samples;
+mod scene_light;
+mod sprites;
+
+pub use background::view;
+pub use error_estimate::ErrorEstimate;
+pub use frame::{FrameReference, colors};
+pub use kind::{ReferenceKind, n_reflections};
+pub use pixels::{Pixels, Tile};
+pub use progress::{OnProgress, RenderStage};
+pub use render::{DrawnPicture, Reference, drawn_as_set};
+pub use renderer::{ModelDrawing, render_model};
+pub use samples::{
+    MAX_SAMPLES, MeanPicture, N_VALUES, PairwiseSum, ReferenceRequest, SampleSums, sums, to_f32,
+};
+pub use scene_light::{BlobModel, PixelSample, RenderedPixels, render_lit_scene};

@@ -1,211 +1,154 @@
-//! Pictures in the model's own light ([`crate::reference::picture::model_light`]), sample by sample.
+//! Pictures in the model's own light, sample by sample.
 
 use glam::DVec3;
 
-use crate::error::Result;
-use crate::model::scene::{LightingMode, Scene};
+use super::background::{draw_ground, view};
+use super::error_estimate::ErrorEstimate;
+use super::frame::FrameReference;
+use super::model_light::{ModelLight, ModelScene, RadianceEstimate};
+use super::pixels::Pixels;
+use super::progress::{OnProgress, RenderStage};
+use super::scene_light::{PixelSample, RenderedPixels, volume_at};
+use crate::model::scene::Scene;
 use crate::model::surface::Surface;
-use crate::reference::area::mean::each;
-use crate::reference::picture::kind::{Drawn, Sample, of_scene_light, volume};
-use crate::reference::picture::model_light::{Doubt, Lit, Met, ModelLight};
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::stages::FrameReference;
-use crate::reference::picture::whole::{self, Drawing, Listener, Work};
-use crate::reference::sprites::{OpaquePixel, View};
+use crate::reference::composite::OpaquePixel;
+use crate::reference::parallel::parallel_map;
 use crate::reference::surfaces;
-use crate::reference::volume::{Pixel, Volume};
+use crate::reference::view::View;
+use crate::reference::volume::Volume;
 
-/// One picture of `scene`, through the centres of `pixels`. `n`: reflections, where they are not
-/// the scene's. `by_facet`: surfaces are lit where the scene has facets, and between them as it is
-/// drawn; else at every pixel.
-pub(crate) fn of_model(
-    scene: &Scene,
-    time_s: f64,
-    n: Option<u32>,
-    by_facet: bool,
-    pixels: &Pixels,
-    listener: Listener,
-) -> Result<Drawn> {
-    let truth = FrameReference::unlit(scene, time_s)?;
-    if scene.lighting.mode == LightingMode::None {
-        return Ok(of_scene_light(
-            scene,
-            &truth,
-            Drawing::Volume,
-            pixels,
-            Sample::CENTER,
-            listener,
-        ));
-    }
-    let met = Met::of(scene, &truth);
-    let model = Model {
-        scene,
-        truth: &truth,
-        met: &met,
-        light: ModelLight::new(scene, &met, &truth, n),
-        by_facet,
-    };
-    let discs = model.discs(0, pixels, listener);
-    Ok(model.draw(&discs, pixels, Sample::CENTER, listener))
-}
-
-/// A scene, and the light in it.
-pub(crate) struct Model<'a> {
+/// A scene and the light in it.
+pub(super) struct ModelPicture<'a> {
+    /// The scene.
     pub scene: &'a Scene,
-    pub truth: &'a FrameReference,
-    pub met: &'a Met,
+    /// Its particles.
+    pub frame: &'a FrameReference,
+    /// Everything that its light meets.
+    pub model: &'a ModelScene,
+    /// The light.
     pub light: ModelLight<'a>,
-    /// See [`of_model`].
+    /// Lights surfaces at their facets and interpolates, instead of at every pixel.
     pub by_facet: bool,
+    /// The pixels to draw.
+    pub pixels: &'a Pixels,
+    /// Called as parts are done.
+    pub on_progress: OnProgress<'a>,
 }
 
-impl Model<'_> {
-    /// The discs' light in a sample; in every sample the same where nothing of it is random.
-    pub fn discs(&self, i_sample: u32, pixels: &Pixels, listener: Listener) -> Vec<Lit> {
-        let n_parts = self.n_parts(pixels);
-        each(self.met.n_discs(), |i| {
+impl ModelPicture<'_> {
+    /// Lights the facets of ground and particles in one sample. The result is the same in every
+    /// sample unless the light is random.
+    pub fn discs(&self, i_sample: u32) -> Vec<RadianceEstimate> {
+        let n_parts = self.n_parts();
+        parallel_map(self.model.n_discs(), |i| {
             let lit = self.light.of_disc(i, i_sample);
-            listener(Work::Lighting, n_parts);
+            (self.on_progress)(RenderStage::Lighting, n_parts);
             lit
         })
     }
 
-    /// Points of surfaces that are lit where they have facets.
-    fn facets(&self) -> Vec<(usize, DVec3)> {
+    /// Surface and centre of every facet, if surfaces are lit at their facets.
+    fn surface_facets(&self) -> Vec<(usize, DVec3)> {
         if !self.by_facet {
             return Vec::new();
         }
         let of = |(i, s): (usize, &Surface)| {
-            let centers: Vec<_> =
-                (0..s.n_facets() as u32).map(|k| (i, s.facet_center(k))).collect();
-            centers
+            (0..s.n_facets() as u32).map(|k| (i, s.facet_center(k))).collect::<Vec<_>>()
         };
-        self.met.surfaces.iter().enumerate().flat_map(of).collect()
+        self.model.surfaces().iter().enumerate().flat_map(of).collect()
     }
 
-    /// What is lit, one by one.
-    fn n_parts(&self, pixels: &Pixels) -> usize {
-        let n_surfaces = if self.by_facet { self.facets().len() } else { pixels.at.len() };
-        self.met.n_discs() + n_surfaces
+    /// Number of points that are lit one by one.
+    fn n_parts(&self) -> usize {
+        let n_on_surfaces =
+            if self.by_facet { self.surface_facets().len() } else { self.pixels.at.len() };
+        self.model.n_discs() + n_on_surfaces
     }
 
-    /// The picture of one sample, whose discs are lit so.
-    pub fn draw(
-        &self,
-        discs: &[Lit],
-        pixels: &Pixels,
-        sample: Sample,
-        listener: Listener,
-    ) -> Drawn {
-        let view = View { shift: sample.shift, ..whole::view(self.scene, self.truth) };
-        let (n_discs, n_parts) = (self.met.n_discs(), self.n_parts(pixels));
-        let heard = |lit| {
-            listener(Work::Lighting, n_parts);
-            lit
+    /// Draws one sample whose discs are lit as given.
+    pub fn draw(&self, discs: &[RadianceEstimate], sample: PixelSample) -> RenderedPixels {
+        let view = View { shift: sample.shift, ..view(self.scene, self.frame) };
+        let (ground, particles) = discs.split_at(self.model.n_ground());
+        let opaque = if self.by_facet {
+            self.interpolated_surfaces(&view, sample.i)
+        } else {
+            self.surfaces_at_pixels(&view, sample.i)
         };
-        let behind = match self.by_facet {
-            true => {
-                let facets = self.facets();
-                let lit = |k: usize| {
-                    self.light.of_surface(facets[k].0, facets[k].1, n_discs + k, sample.i)
+        let opaque = self.with_ground(opaque, &view, ground);
+        let radiance: Vec<DVec3> = particles.iter().map(|lit| lit.radiance).collect();
+        let particle_error = ErrorEstimate::root_mean_square(particles.iter().map(|lit| lit.error));
+        let places: Vec<OpaquePixel> = opaque.iter().map(|(pixel, _)| *pixel).collect();
+        let volume = Volume::new(&view, &self.frame.blobs, &radiance);
+        let found = volume_at(&volume, self.pixels, &places, self.on_progress);
+        // A surface's error may show entirely, a particle's as far as the particles are opaque.
+        RenderedPixels::from_volume(found, |k, p| {
+            let (pixel, error) = opaque[k];
+            let through = if pixel.color[3] > 0.0 { 1.0 } else { 0.0 };
+            ErrorEstimate::from_quadrature(p.error) + error * through + particle_error * p.color[3]
+        })
+    }
+
+    /// Lights the surface seen in every pixel; its back is black.
+    fn surfaces_at_pixels(&self, view: &View, i_sample: u32) -> Vec<(OpaquePixel, ErrorEstimate)> {
+        let (n_discs, n_parts) = (self.model.n_discs(), self.n_parts());
+        parallel_map(self.pixels.at.len(), |k| {
+            let ([i, j], number) = (self.pixels.at[k], n_discs + self.pixels.number(k));
+            let ray = view.ray(i, j);
+            let mut found = (OpaquePixel::EMPTY, ErrorEstimate::default());
+            if let Some((i_surface, hit)) = surfaces::seen(view, self.model.surfaces(), ray) {
+                let lit = if hit.is_front {
+                    let position = view.pose.position + hit.depth * ray;
+                    self.light.of_surface(i_surface, position, number, i_sample)
+                } else {
+                    RadianceEstimate::DARK
                 };
-                let lit: Vec<Lit> = each(facets.len(), |k| heard(lit(k)));
-                between(&view, &self.met.surfaces, &lit, pixels)
+                let color = lit.radiance.extend(1.0).to_array();
+                found = (OpaquePixel { color, depth: hit.depth, ..OpaquePixel::EMPTY }, lit.error);
             }
-            false => each(pixels.at.len(), |k| {
-                let (behind, lit) =
-                    self.seen(&view, pixels.at[k], n_discs + pixels.number(k), sample.i);
-                (behind, heard(lit).doubt)
-            }),
-        };
-        let (ground, discs) = discs.split_at(self.met.n_ground());
-        let behind = self.over(behind, &view, ground, pixels);
-        let radiance: Vec<DVec3> = discs.iter().map(|lit| lit.radiance).collect();
-        let of_discs = Doubt::mean(discs.iter().map(|lit| lit.doubt));
-        let places: Vec<OpaquePixel> = behind.iter().map(|(b, _)| *b).collect();
-        let found =
-            volume(&Volume::new(&view, &self.truth.blobs, &radiance), pixels, &places, listener);
-        // Of a surface or ground all may show, of particles as much as they hold back.
-        let doubt = |(p, (behind, doubt)): (&Pixel, &(OpaquePixel, Doubt))| {
-            let through = if behind.color[3] > 0.0 { 1.0 } else { 0.0 };
-            let of_volume = Doubt { quadrature: p.error, chance: 0.0 };
-            of_volume + *doubt * through + of_discs * p.color[3]
-        };
-        let doubts = found.iter().zip(&behind).map(doubt).collect();
-        Drawn { rgba: found.into_iter().map(|p| p.color).collect(), doubts }
+            (self.on_progress)(RenderStage::Lighting, n_parts);
+            found
+        })
     }
 
-    /// The surface in a pixel and its light; black from behind.
-    fn seen(
+    /// Lights the surfaces at their facets and draws them from that.
+    fn interpolated_surfaces(
         &self,
         view: &View,
-        [i, j]: [u32; 2],
-        number: usize,
         i_sample: u32,
-    ) -> (OpaquePixel, Lit) {
-        const DARK: Lit =
-            Lit { radiance: DVec3::ZERO, doubt: Doubt { quadrature: 0.0, chance: 0.0 } };
-        let ray = view.ray(i, j);
-        let Some((i_surface, hit)) = surfaces::seen(view, &self.met.surfaces, ray) else {
-            return (OpaquePixel::EMPTY, DARK);
-        };
-        let lit = match hit.is_front {
-            true => self.light.of_surface(
-                i_surface,
-                view.pose.position + hit.depth * ray,
-                number,
-                i_sample,
-            ),
-            false => DARK,
-        };
-        (
-            OpaquePixel {
-                color: lit.radiance.extend(1.0).to_array(),
-                depth: hit.depth,
-                ..OpaquePixel::EMPTY
-            },
-            lit,
-        )
+    ) -> Vec<(OpaquePixel, ErrorEstimate)> {
+        let (facets, n_parts) = (self.surface_facets(), self.n_parts());
+        let lit: Vec<RadianceEstimate> = parallel_map(facets.len(), |k| {
+            let (i_surface, position) = facets[k];
+            let number = self.model.n_discs() + k;
+            let lit = self.light.of_surface(i_surface, position, number, i_sample);
+            (self.on_progress)(RenderStage::Lighting, n_parts);
+            lit
+        });
+        let radiance: Vec<DVec3> = lit.iter().map(|lit| lit.radiance).collect();
+        let error = ErrorEstimate::root_mean_square(lit.iter().map(|lit| lit.error));
+        let at = self.pixels.at.iter().copied();
+        let seen = surfaces::render_at(view, self.model.surfaces(), &radiance, at);
+        seen.into_iter().map(|pixel| (pixel, error)).collect()
     }
 
-    /// `behind`, and over it what is nearer of the ground, as it is drawn from the light of its
-    /// points.
-    fn over(
+    /// Draws the ground over `opaque` where it is nearer, from the light of its points.
+    fn with_ground(
         &self,
-        behind: Vec<(OpaquePixel, Doubt)>,
+        opaque: Vec<(OpaquePixel, ErrorEstimate)>,
         view: &View,
-        ground: &[Lit],
-        pixels: &Pixels,
-    ) -> Vec<(OpaquePixel, Doubt)> {
+        ground: &[RadianceEstimate],
+    ) -> Vec<(OpaquePixel, ErrorEstimate)> {
         if ground.is_empty() {
-            return behind;
+            return opaque;
         }
         let radiance: Vec<DVec3> = ground.iter().map(|lit| lit.radiance).collect();
-        let doubt = Doubt::mean(ground.iter().map(|lit| lit.doubt));
-        let mut picture = vec![OpaquePixel::EMPTY; pixels.tile.n_pixels()];
-        whole::ground_over(
-            (&mut picture, pixels.tile),
-            self.scene,
-            self.truth.setting.light_origin,
-            view,
-            &radiance,
-        );
-        let nearer = |(other, seen): ((OpaquePixel, Doubt), OpaquePixel)| {
-            if seen.depth < other.0.depth { (seen, doubt) } else { other }
+        let error = ErrorEstimate::root_mean_square(ground.iter().map(|lit| lit.error));
+        let tile = self.pixels.tile;
+        let mut picture = vec![OpaquePixel::EMPTY; tile.n_pixels()];
+        draw_ground((&mut picture, tile), self.scene, self.frame, view, &radiance);
+        let nearer = |(other, seen): ((OpaquePixel, ErrorEstimate), OpaquePixel)| {
+            if seen.depth < other.0.depth { (seen, error) } else { other }
         };
-        behind.into_iter().zip(pixels.pick_tile(&picture)).map(nearer).collect()
+        opaque.into_iter().zip(self.pixels.pick_tile(&picture)).map(nearer).collect()
     }
-}
-
-/// The surfaces in the pixels as they are drawn from the light of their facets.
-fn between(
-    view: &View,
-    placed: &[Surface],
-    facets: &[Lit],
-    pixels: &Pixels,
-) -> Vec<(OpaquePixel, Doubt)> {
-    let radiance: Vec<DVec3> = facets.iter().map(|lit| lit.radiance).collect();
-    let doubt = Doubt::mean(facets.iter().map(|lit| lit.doubt));
-    let seen = surfaces::render_at(view, placed, &radiance, pixels.at.iter().copied());
-    seen.into_iter().map(|behind| (behind, doubt)).collect()
 }

@@ -1,53 +1,60 @@
-//! At which pixels a reference is known: all of them, or one in each cell of a square raster.
+//! The pixels that a reference is computed at: all of them, or one in each cell of a square grid.
 
 use crate::model::philox::{philox4x32_10, uniform};
 
-/// Second word of the key, so that pixels share no numbers with particles and paths.
+/// Second word of the Philox key: pixels share no random numbers with particles and paths.
 const KEY: u32 = 0x7069_7873;
 
 /// A rectangle of pixels of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tile {
+    /// First column.
     pub left: u32,
+    /// First row, counted from the top.
     pub top: u32,
+    /// Number of columns.
     pub width: u32,
+    /// Number of rows.
     pub height: u32,
 }
 
 impl Tile {
+    /// Returns the tile that is the whole picture.
     pub fn whole(width: u32, height: u32) -> Tile {
         Tile { left: 0, top: 0, width, height }
     }
 
+    /// Returns the number of pixels.
     pub fn n_pixels(self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// [column, row] of the picture, row by row.
+    /// Returns [column, row] of every pixel, row by row.
     pub fn pixels(self) -> impl Iterator<Item = [u32; 2]> {
         let Tile { left, top, width, height } = self;
         (top..top + height).flat_map(move |j| (left..left + width).map(move |i| [i, j]))
     }
 }
 
-/// Pixels of a picture, or of a tile of it, cell by cell, rows of cells from the top.
+/// Pixels of a picture or of one of its tiles, one a cell, rows of cells from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pixels {
-    /// Of the picture.
+    /// Columns of the whole picture.
     pub width: u32,
+    /// Rows of the whole picture.
     pub height: u32,
-    /// What of it they lie in.
+    /// The tile that the pixels lie in.
     pub tile: Tile,
-    /// Pixels along a side of a cell.
+    /// Side of a cell, in pixels.
     pub cell: u32,
-    /// [column, row], one a cell.
+    /// [column, row] of the whole picture, one a cell.
     pub at: Vec<[u32; 2]>,
 }
 
 impl Pixels {
-    /// One pixel at random in each cell, at most `n` in all but for the cells that the picture's
-    /// edges cut. A mean over them is one over the picture but for those cells, whose pixels count
-    /// as much as a whole one's.
+    /// Selects one random pixel in each cell, at most `n` apart from the cells that the picture's
+    /// edges cut. The mean over the pixels estimates the picture's mean, with cut cells weighted as
+    /// whole ones.
     pub fn sample(width: u32, height: u32, n: usize) -> Pixels {
         let all = f64::from(width) * f64::from(height);
         let cell = ((all / n.max(1) as f64).sqrt().ceil() as u32).max(1);
@@ -67,47 +74,50 @@ impl Pixels {
         Pixels { width, height, tile: Tile::whole(width, height), cell, at }
     }
 
-    /// All pixels of `tile`, which lies within the picture.
+    /// Selects all pixels of `tile`, which lies within the picture.
     pub fn tile(width: u32, height: u32, tile: Tile) -> Pixels {
         Pixels { width, height, tile, cell: 1, at: tile.pixels().collect() }
     }
 
+    /// Selects all pixels of the picture.
     pub fn all(width: u32, height: u32) -> Pixels {
         Pixels::sample(width, height, usize::MAX)
     }
 
+    /// Returns the number of cells in a row.
     pub fn n_columns(&self) -> u32 {
         self.tile.width.div_ceil(self.cell)
     }
 
+    /// Returns the number of rows of cells.
     pub fn n_rows(&self) -> u32 {
         self.tile.height.div_ceil(self.cell)
     }
 
-    /// Place of a pixel in a picture's rows.
+    /// Returns the index of a pixel in the whole picture, row by row.
     pub fn index(&self, [i, j]: [u32; 2]) -> usize {
         j as usize * self.width as usize + i as usize
     }
 
-    /// Number of pixel `k` where each is to be told from all others: in a whole picture and in its
-    /// tiles the same.
+    /// Returns a number that identifies pixel `k`, the same in a whole picture and in its tiles.
     pub fn number(&self, k: usize) -> usize {
         if self.cell == 1 { self.index(self.at[k]) } else { k }
     }
 
-    /// Their values of a whole picture, row 0 at the top.
+    /// Picks the pixels' values from a whole picture, row 0 at the top.
     pub fn pick<T: Copy>(&self, whole: &[T]) -> Vec<T> {
         self.at.iter().map(|&at| whole[self.index(at)]).collect()
     }
 
-    /// The same of all pixels of their tile.
+    /// Picks the pixels' values from those of all pixels of their tile.
     pub fn pick_tile<T: Copy>(&self, of_tile: &[T]) -> Vec<T> {
         let Tile { left, top, width, .. } = self.tile;
         let place = |[i, j]: [u32; 2]| (j - top) as usize * width as usize + (i - left) as usize;
         self.at.iter().map(|&at| of_tile[place(at)]).collect()
     }
 
-    /// A whole picture that shows in every cell its pixel's value; of pixels of all of it.
+    /// Returns a whole picture that shows its pixel's value in every cell. The pixels are of the
+    /// whole picture.
     pub fn spread<T: Copy>(&self, values: &[T]) -> Vec<T> {
         let columns = self.n_columns();
         let of = |i: u32, j: u32| values[((j / self.cell) * columns + i / self.cell) as usize];
@@ -120,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_in_each_cell_of_few_enough() {
+    fn a_sample_has_one_pixel_in_each_cell() {
         let pixels = Pixels::sample(80, 61, 500);
         // 4880/500 = 9.76: cells of 4, 20 by 16 of them.
         assert_eq!(
@@ -131,7 +141,7 @@ mod tests {
             assert_eq!((i / 4, j / 4), (k as u32 % 20, k as u32 / 20));
             assert!(*i < 80 && *j < 61);
         }
-        // All places within a cell come up.
+        // Every place within a cell is selected somewhere.
         let mut places: Vec<u32> = pixels.at.iter().map(|[i, j]| i % 4 + 4 * (j % 4)).collect();
         places.sort_unstable();
         places.dedup();
@@ -139,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn all_of_them_in_order() {
+    fn whole_pictures_and_tiles_pick_and_spread_their_pixels() {
         let pixels = Pixels::all(5, 3);
         let whole: Vec<u32> = (0..15).collect();
         assert_eq!((pixels.pick(&whole), pixels.spread(&whole)), (whole.clone(), whole.clone()));

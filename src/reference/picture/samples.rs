@@ -1,200 +1,176 @@
-//! A reference picture as the mean of samples, each through another place of every pixel and by
-//! other random paths; and the sums that parts of it are put together from, tile by tile and range
-//! by range, to the same bits as the whole.
+//! A reference picture as the mean of samples, each through another place of every pixel and with
+//! other random paths. Parts of a picture, by tile and by range of samples, sum to the same bits as
+//! the whole.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec2;
 
+use super::error_estimate::root_mean_square;
+use super::kind::ReferenceKind;
+use super::pixels::Pixels;
+use super::progress::{OnProgress, RenderStage};
+use super::renderer::with_renderer;
+use super::scene_light::{PixelSample, RenderedPixels};
 use crate::error::{Error, Result};
-use crate::model::scene::{LightingMode, Scene};
-use crate::reference::picture::kind::{Drawn, ReferenceKind, Sample, of_scene_light};
-use crate::reference::picture::model_light::{Lit, Met, ModelLight, root_mean_square};
-use crate::reference::picture::model_picture::Model;
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::stages::FrameReference;
-use crate::reference::picture::whole::{Drawing, Listener, Work};
+use crate::model::scene::Scene;
 
-/// Most samples of a picture: their numbers' last digits still tell places in a pixel apart.
+/// Greatest number of samples: the low digits of their numbers still tell places in a pixel apart.
 pub const MAX_SAMPLES: u32 = 1 << 20;
 
-/// Values of a pixel in [`Sums`]: premultiplied linear R, G, B, A; the sum of their squares; what
-/// quadrature leaves; and the square of the random paths' standard error.
+/// Number of values of a pixel in [`SampleSums`]: premultiplied linear R, G, B, A; the sum of their
+/// squares; the quadrature error; the squared standard error of the random paths.
 pub const N_VALUES: usize = 7;
 
-/// Sums over samples, [`N_VALUES`] a pixel.
+/// Sums over samples. *Shape*: [pixel][[`N_VALUES`]].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sums {
+pub struct SampleSums {
+    /// Number of samples summed.
     pub n_samples: u32,
+    /// The sums.
     pub values: Vec<f64>,
 }
 
-/// What is drawn.
+/// Which picture is drawn.
 #[derive(Debug, Clone, Copy)]
-pub struct Subject<'a> {
-    pub of: ReferenceKind,
+pub struct ReferenceRequest<'a> {
+    /// The reference.
+    pub kind: ReferenceKind,
+    /// The scene, drawn with its own drawing settings.
     pub scene: &'a Scene,
+    /// Time of the frame.
     pub time_s: f64,
 }
 
 /// A mean over samples.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Mean {
+pub struct MeanPicture {
     /// Premultiplied linear RGBA, in the order of the pixels.
     pub rgba: Vec<[f64; 4]>,
-    /// Root mean square of the estimates of what each pixel may be off: quadrature, and one
-    /// standard error of the mean.
+    /// Root mean square of the pixels' error estimates: quadrature, and one standard error of the
+    /// mean.
     pub own_error: f64,
 }
 
-/// Where in a pixel sample `i` lies, off its centre: the first in it, the others spread evenly
-/// (Roberts' R2, the powers of the plastic number's inverse), whatever number of them is taken.
-pub fn shift(i: u32) -> DVec2 {
+/// Returns where in a pixel sample `i` lies, off its centre, in pixels. The first sample is the
+/// centre; any number of first samples is spread evenly.
+///
+/// *Source*: R2 sequence, powers of the plastic number's inverse (Roberts 2018).
+fn shift(i: u32) -> DVec2 {
     const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_7, 0.569_840_290_998_053_2);
     (0.5 + f64::from(i) * STEP).fract() - 0.5
 }
 
-/// The sums of `samples` at `pixels`. Err where the reference does not know the scene, or it was
-/// stopped.
+/// Draws `samples` at `pixels` and returns their sums.
+///
+/// # Errors
+/// The reference cannot draw the scene, `samples` is empty, or `stop` was set before the last
+/// sample began.
 pub fn sums(
-    subject: &Subject<'_>,
+    request: &ReferenceRequest<'_>,
     pixels: &Pixels,
     samples: Range<u32>,
     stop: &AtomicBool,
-    listener: Listener,
-) -> Result<Sums> {
-    let Subject { of, scene, time_s } = *subject;
-    of.check(scene, time_s)?;
+    on_progress: OnProgress,
+) -> Result<SampleSums> {
+    let ReferenceRequest { kind, scene, time_s } = *request;
+    kind.check(scene, time_s)?;
     let n = samples.len();
-    // Of one sample its parts are told, of several that they are done.
-    let inner: Listener = if n > 1 { &|_, _| () } else { listener };
-    let mut pairs = Pairs::default();
-    let mut each = |draw: &mut dyn FnMut(Sample) -> Drawn| {
-        for i in samples.clone() {
-            // Before, not after: what is finished counts.
+    // A single sample reports progress by its parts, several samples report whole samples.
+    let inner: OnProgress = if n > 1 { &|_, _| () } else { on_progress };
+    with_renderer(kind, (scene, time_s), pixels, inner, |render| {
+        let mut pairs = PairwiseSum::default();
+        for i in samples {
+            // A sample that is finished counts, so the check comes before.
             if stop.load(Ordering::Relaxed) {
                 return Err(Error::Interrupted);
             }
-            pairs.push(of_drawn(&draw(Sample { i, shift: shift(i) })));
+            pairs.push(SampleSums::of_one(&render(PixelSample { i, shift: shift(i) })));
             if n > 1 {
-                listener(Work::Sampling, n);
+                on_progress(RenderStage::Sampling, n);
             }
         }
-        Ok(())
-    };
-    let n_reflections = if let ReferenceKind::Reflections(k) = of { Some(k) } else { None };
-    match of {
-        ReferenceKind::Thin | ReferenceKind::Volume => {
-            let truth =
-                FrameReference::of_with_listener(scene, time_s, &|n| inner(Work::Lighting, n))?;
-            let drawing = if of == ReferenceKind::Thin { Drawing::Thin } else { Drawing::Volume };
-            each(&mut |sample| of_scene_light(scene, &truth, drawing, pixels, sample, inner))?;
-        }
-        ReferenceKind::Model | ReferenceKind::Reflections(_)
-            if scene.lighting.mode == LightingMode::None =>
-        {
-            let truth = FrameReference::unlit(scene, time_s)?;
-            each(&mut |sample| {
-                of_scene_light(scene, &truth, Drawing::Volume, pixels, sample, inner)
-            })?;
-        }
-        ReferenceKind::Model | ReferenceKind::Reflections(_) => {
-            let truth = FrameReference::unlit(scene, time_s)?;
-            let met = Met::of(scene, &truth);
-            let light = ModelLight::new(scene, &met, &truth, n_reflections);
-            let model = Model { scene, truth: &truth, met: &met, light, by_facet: false };
-            let mut discs: Option<Vec<Lit>> = None;
-            each(&mut |sample| {
-                let lit = match discs.take().filter(|_| !model.light.is_random()) {
-                    Some(lit) => lit,
-                    None => model.discs(sample.i, pixels, inner),
-                };
-                let drawn = model.draw(&lit, pixels, sample, inner);
-                discs = Some(lit);
-                drawn
-            })?;
-        }
-    }
-    pairs.finish().ok_or_else(|| Error::usage("no samples: expected one at least"))
+        pairs.finish().ok_or_else(|| Error::usage("no samples: expected at least one"))
+    })
 }
 
-/// As files have it.
-pub fn shown(rgba: &[[f64; 4]]) -> Vec<f32> {
+/// Converts a picture to the f32 values that files hold.
+pub fn to_f32(rgba: &[[f64; 4]]) -> Vec<f32> {
     rgba.iter().flatten().map(|v| *v as f32).collect()
 }
 
-fn of_drawn(drawn: &Drawn) -> Sums {
-    let mut values = Vec::with_capacity(N_VALUES * drawn.rgba.len());
-    for (rgba, doubt) in drawn.rgba.iter().zip(&drawn.doubts) {
-        let squares = rgba.iter().map(|v| v * v).sum();
-        values.extend_from_slice(rgba);
-        values.extend([squares, doubt.quadrature, doubt.chance * doubt.chance]);
+impl SampleSums {
+    fn of_one(drawn: &RenderedPixels) -> SampleSums {
+        let mut values = Vec::with_capacity(N_VALUES * drawn.rgba.len());
+        for (rgba, error) in drawn.rgba.iter().zip(&drawn.errors) {
+            let squares = rgba.iter().map(|v| v * v).sum();
+            values.extend_from_slice(rgba);
+            values.extend([squares, error.quadrature, error.chance * error.chance]);
+        }
+        SampleSums { n_samples: 1, values }
     }
-    Sums { n_samples: 1, values }
-}
 
-impl Sums {
-    fn add(mut self, other: &Sums) -> Sums {
+    fn add(mut self, other: &SampleSums) -> SampleSums {
         self.values.iter_mut().zip(&other.values).for_each(|(a, b)| *a += b);
         self.n_samples += other.n_samples;
         self
     }
 
-    /// The mean, and what it may be off.
-    pub fn mean(&self) -> Mean {
+    /// Returns the mean of the samples with its error estimate.
+    pub fn mean(&self) -> MeanPicture {
         let n = f64::from(self.n_samples);
         let rgba = |v: &[f64]| [v[0] / n, v[1] / n, v[2] / n, v[3] / n];
         let error = |v: &[f64]| {
             let of_mean: f64 = rgba(v).iter().map(|c| c * c).sum();
-            // Of all channels together: no channel's alone is greater. Samples are spread more
-            // evenly than by chance, and so the mean is nearer than this.
+            // The spread of all channels together bounds that of each. Samples are spread more
+            // evenly than random ones, so the mean is more accurate than this.
             let spread = ((v[4] / n - of_mean).max(0.0) / (n - 1.0).max(1.0)).sqrt();
             v[5] / n + spread.max(v[6].sqrt() / n)
         };
         let pixels = || self.values.chunks_exact(N_VALUES);
-        Mean {
+        MeanPicture {
             rgba: pixels().map(rgba).collect(),
             own_error: root_mean_square(pixels().map(error)),
         }
     }
 
-    /// Numbers of f64 in little-endian order.
+    /// Returns the values as f64 in little-endian order.
     pub fn bytes(&self) -> Vec<u8> {
         self.values.iter().flat_map(|v| v.to_le_bytes()).collect()
     }
 
-    /// From [`Sums::bytes`]; none of another length.
-    pub fn from_bytes(bytes: &[u8], n_pixels: usize, n_samples: u32) -> Option<Sums> {
+    /// Reads sums from [`SampleSums::bytes`]; `None` if the length does not match.
+    pub fn from_bytes(bytes: &[u8], n_pixels: usize, n_samples: u32) -> Option<SampleSums> {
         let value = |b: &[u8]| b.try_into().map(f64::from_le_bytes).ok();
         let is_whole = bytes.len() == 8 * N_VALUES * n_pixels;
         let values =
             is_whole.then(|| bytes.chunks_exact(8).map(value).collect::<Option<Vec<f64>>>())??;
-        Some(Sums { n_samples, values })
+        Some(SampleSums { n_samples, values })
     }
 }
 
-/// Sums of neighbouring ranges of samples, added as one fixed tree of pairs: (0 + 1) + (2 + 3) and
-/// so on. Ranges whose length is a power of two, and that begin at a multiple of it, are nodes of
-/// that tree; so a whole put together from them in order has the bits of a whole that was never
-/// cut. What rounding adds grows with the tree's height, not with the samples.
+/// Sum of neighbouring ranges of samples as one fixed tree of pairs: (0 + 1) + (2 + 3), and so on.
+/// Ranges whose length is a power of two, and that begin at a multiple of it, are nodes of that
+/// tree. A sum put together from ranges in order therefore has the same bits as one that was never
+/// cut. Rounding grows with the tree's height, not with the number of samples.
 #[derive(Debug, Default)]
-pub struct Pairs {
-    /// Each shorter than the one before it.
-    open: Vec<Sums>,
+pub struct PairwiseSum {
+    /// Sums of complete subtrees, each shorter than the one before it.
+    open: Vec<SampleSums>,
 }
 
-impl Pairs {
-    /// The next range. All have one length, a power of two; the last may be shorter.
-    pub fn push(&mut self, mut next: Sums) {
+impl PairwiseSum {
+    /// Adds the next range. All ranges have one length, a power of two; the last may be shorter.
+    pub fn push(&mut self, mut next: SampleSums) {
         while let Some(last) = self.open.pop_if(|last| last.n_samples == next.n_samples) {
             next = last.add(&next);
         }
         self.open.push(next);
     }
 
-    /// All of them; none where there was none.
-    pub fn finish(mut self) -> Option<Sums> {
+    /// Returns the sum of all ranges; `None` if there were none.
+    pub fn finish(mut self) -> Option<SampleSums> {
         let mut all = self.open.pop()?;
         while let Some(before) = self.open.pop() {
             all = before.add(&all);
@@ -208,16 +184,16 @@ mod tests {
     use super::*;
     use crate::model::philox::{philox4x32_10, uniform};
 
-    fn sample(i: u32) -> Sums {
+    fn sample(i: u32) -> SampleSums {
         // Of magnitudes so different that another order of additions shows.
         let words = philox4x32_10([7, 7], [i, 0, 0, 0]).map(uniform);
         let values = (0..N_VALUES)
             .map(|k| (words[k % 4] - 0.5) * 10f64.powi((words[(k + 1) % 4] * 17.0) as i32));
-        Sums { n_samples: 1, values: values.collect() }
+        SampleSums { n_samples: 1, values: values.collect() }
     }
 
-    fn summed(parts: impl Iterator<Item = Sums>) -> Sums {
-        let mut pairs = Pairs::default();
+    fn summed(parts: impl Iterator<Item = SampleSums>) -> SampleSums {
+        let mut pairs = PairwiseSum::default();
         parts.for_each(|part| pairs.push(part));
         pairs.finish().unwrap()
     }
@@ -265,21 +241,21 @@ mod tests {
     fn means_and_their_errors_by_hand() {
         // Red 1 and 3: mean 2, squares 10, variance of the mean ((10/2) - 4)/1 = 1. Quadrature
         // 0.25.
-        let of = |red: f64, chance: f64| Sums {
+        let of = |red: f64, chance: f64| SampleSums {
             n_samples: 1,
             values: vec![red, 0.0, 0.0, 0.0, red * red, 0.25, chance * chance],
         };
         let two = of(1.0, 0.0).add(&of(3.0, 0.0));
-        assert_eq!(two.mean(), Mean { rgba: vec![[2.0, 0.0, 0.0, 0.0]], own_error: 1.25 });
+        assert_eq!(two.mean(), MeanPicture { rgba: vec![[2.0, 0.0, 0.0, 0.0]], own_error: 1.25 });
         // One sample has its own standard error alone; equal ones have what their paths say:
         // sqrt(0.5)/2 · 0.6.
         assert_eq!(of(1.0, 0.5).mean().own_error, 0.75);
         let equal = of(1.0, 0.6).add(&of(1.0, 0.6)).mean().own_error;
         assert!((equal - 0.25 - 0.6 / 2f64.sqrt()).abs() < 1e-15, "{equal}");
         let bytes = two.bytes();
-        assert_eq!(Sums::from_bytes(&bytes, 1, 2), Some(two));
+        assert_eq!(SampleSums::from_bytes(&bytes, 1, 2), Some(two));
         assert_eq!(
-            (Sums::from_bytes(&bytes, 2, 2), Sums::from_bytes(&bytes[1..], 1, 2)),
+            (SampleSums::from_bytes(&bytes, 2, 2), SampleSums::from_bytes(&bytes[1..], 1, 2)),
             (None, None)
         );
     }

@@ -1,38 +1,58 @@
-//! One ray through overlapping blobs, piece by piece: what has a closed form in closed form, the
-//! rest by Gauss–Kronrod.
+//! Integration along one ray through overlapping blobs, piece by piece: the part with a closed form
+//! in closed form, the rest by Gauss–Kronrod.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use glam::DVec3;
 use libm::erfc;
 
-use super::Passed;
 use crate::model::cloud::SQRT_TAU;
 
-/// A piece may be so many σ of the narrowest blob in it long before the rules are asked: over 3 σ a
-/// Gaussian has a third of a bend a point of the rule of 7, which so cannot miss it.
+/// Greatest length of a piece for the rules, σ of its narrowest blob. Over 3 σ the rule of 7 has
+/// three points for each bend of a Gaussian, so it cannot miss one.
 const RESOLVED_SIGMAS: f64 = 3.0;
-/// And so deep: e^{−τ} falls to 2 %, and the first of the rules' points (at 0.4 % and 2.5 % of the
-/// piece) see its beginning.
+/// Greatest optical depth of a piece for the rules. e^{−τ} falls to 2 %, and the rules' first
+/// points (at 0.4 % and 2.5 % of the piece) see its beginning.
 const RESOLVED_DEPTH: f64 = 4.0;
-/// Halvings: below 2⁻⁴⁸ of a range view depths have no digits left to tell a piece's ends apart by.
+/// Greatest number of halvings. Below 2⁻⁴⁸ of a range, view depths cannot tell a piece's ends
+/// apart.
 const MAX_LEVEL: u32 = 48;
-/// Least share of a ray's accuracy that a piece is held to, so that narrow pieces do not chase
-/// their own rounding.
+/// Least share of a ray's tolerance for a piece, so that narrow pieces do not chase their own
+/// rounding.
 const LEAST_SHARE: f64 = 1e-6;
-/// Of a piece's share what may be lost to blobs that its points do not look at.
+/// Share of a piece's tolerance for blobs that its points neglect.
 const SHARE_OF_FAINT: f64 = 0.1;
 
-/// What a ray gathers.
+/// A blob along a ray. Lengths are view depths.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Ray {
+pub(super) struct RayBlob {
+    /// Foot of its centre on the ray.
+    pub center: f64,
+    /// Standard deviation along the ray: σ/|d|.
+    pub width: f64,
+    /// τ of the whole line.
+    pub depth: f64,
+    /// Radiance of the blob.
+    pub radiance: DVec3,
+    /// Beginning of the blob: less than `OMITTED` of optical depth lies before it, all blobs
+    /// together.
+    pub from: f64,
+    /// End of the blob.
+    pub to: f64,
+}
+
+/// Integral along a ray.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RayIntegral {
+    /// Emitted light that reaches the eye.
     pub color: DVec3,
-    /// Optical depth of all of it.
+    /// Optical depth.
     pub tau: f64,
+    /// Estimated error of the colour, greatest channel.
     pub error: f64,
 }
 
-/// A blob over one piece.
+/// A blob within a piece.
 #[derive(Debug, Clone, Copy)]
 struct Active {
     i: usize,
@@ -40,14 +60,14 @@ struct Active {
     below: f64,
     /// Optical depth within the piece.
     tau: f64,
-    /// Its radiance above the piece's mean.
+    /// Its radiance minus the piece's mean.
     excess: DVec3,
 }
 
-/// Scratch that rays share.
+/// Integrator with scratch memory that rays share.
 #[derive(Debug, Default)]
-pub(super) struct March {
-    /// Blobs of the pieces from the whole ray down to the one at hand, one list after the other.
+pub(super) struct RayIntegrator {
+    /// Blobs of the pieces from the whole ray down to the current one, one list after the other.
     lists: Vec<usize>,
     active: Vec<Active>,
 }
@@ -58,14 +78,14 @@ struct Piece {
     a: f64,
     b: f64,
     level: u32,
-    /// Its blobs, among [`March::lists`].
+    /// Start of its blobs in [`RayIntegrator::lists`].
     first: usize,
 }
 
-impl March {
-    /// `tolerance`: the error that all pieces share.
-    pub fn integrate(&mut self, passed: &[Passed], tolerance: f64) -> Ray {
-        let mut ray = Ray { color: DVec3::ZERO, tau: 0.0, error: 0.0 };
+impl RayIntegrator {
+    /// Integrates a ray to the error `tolerance`, which all pieces share.
+    pub fn integrate(&mut self, passed: &[RayBlob], tolerance: f64) -> RayIntegral {
+        let mut ray = RayIntegral { color: DVec3::ZERO, tau: 0.0, error: 0.0 };
         let a = passed.iter().map(|p| p.from).fold(f64::INFINITY, f64::min);
         let b = passed.iter().map(|p| p.to).fold(f64::NEG_INFINITY, f64::max);
         if a < b {
@@ -77,7 +97,13 @@ impl March {
         ray
     }
 
-    fn visit(&mut self, passed: &[Passed], piece: Piece, accuracy: (f64, f64), ray: &mut Ray) {
+    fn visit(
+        &mut self,
+        passed: &[RayBlob],
+        piece: Piece,
+        accuracy: (f64, f64),
+        ray: &mut RayIntegral,
+    ) {
         let Piece { a, b, level, first } = piece;
         let own = self.lists.len();
         for k in first..own {
@@ -90,7 +116,7 @@ impl March {
         let through = (-ray.tau).exp();
         let (tolerance, length) = accuracy;
         let share = tolerance * ((b - a) / length).max(LEAST_SHARE);
-        // What the blobs' order can change within the piece, at most.
+        // Greatest effect of the blobs' order within the piece.
         let bound =
             through * self.active.iter().map(|k| k.tau * k.excess.abs().max_element()).sum::<f64>();
         let found = if bound <= share {
@@ -126,9 +152,9 @@ impl March {
         self.lists.truncate(own);
     }
 
-    /// Fills `active` with the blobs listed from `first` on, over [a, b]; their mean radiance and
-    /// optical depth there.
-    fn look(&mut self, passed: &[Passed], a: f64, b: f64, first: usize) -> (DVec3, f64) {
+    /// Fills `active` with the blobs listed from `first` on, over [a, b]. Returns their mean
+    /// radiance and optical depth.
+    fn look(&mut self, passed: &[RayBlob], a: f64, b: f64, first: usize) -> (DVec3, f64) {
         self.active.clear();
         let (mut tau, mut weighted) = (0.0, DVec3::ZERO);
         for &i in &self.lists[first..] {
@@ -138,7 +164,7 @@ impl March {
             let own = p.depth * (at(b) - from);
             tau += own;
             weighted += own * p.radiance;
-            // The points inside count from where the blob begins, or the piece.
+            // The rule's points count from the beginning of the blob or the piece.
             self.active.push(Active { i, below: from, tau: own, excess: p.radiance });
         }
         let mean = if tau > 0.0 { weighted / tau } else { DVec3::ZERO };
@@ -146,8 +172,8 @@ impl March {
         (mean, tau)
     }
 
-    /// Takes out of `active` blobs that are faint: as light they are their share of the `bound`, as
-    /// shadow their optical depth times all of it. What that may change.
+    /// Removes faint blobs from `active` and returns their greatest effect: as light their share of
+    /// the `bound`, as shadow their optical depth times all of it.
     fn leave_out_faint(&mut self, through: f64, bound: f64, share: f64) -> f64 {
         let faint = SHARE_OF_FAINT * share / self.active.len().max(1) as f64;
         let mut left_out = 0.0;
@@ -160,9 +186,9 @@ impl March {
         left_out
     }
 
-    /// ∫ Σ β_j (L_j − L̄) e^{−τ} over [a, b], where τ is `tau` before it, and what the two rules
-    /// differ by.
-    fn quadrature(&self, passed: &[Passed], (a, b): (f64, f64), tau: f64) -> (DVec3, f64) {
+    /// Returns ∫ Σ β_j (L_j − L̄) e^{−τ} over [a, b], where τ is `tau` before it, and the
+    /// difference of the two rules.
+    fn quadrature(&self, passed: &[RayBlob], (a, b): (f64, f64), tau: f64) -> (DVec3, f64) {
         let half = 0.5 * (b - a);
         let at = |x: f64| self.source(passed, 0.5 * (a + b) + half * x, tau);
         let middle = at(0.0);
@@ -177,8 +203,8 @@ impl March {
         (half * kronrod, half * (kronrod - gauss).abs().max_element())
     }
 
-    /// Σ β_j (L_j − L̄) e^{−τ} at view depth z.
-    fn source(&self, passed: &[Passed], z: f64, tau: f64) -> DVec3 {
+    /// Returns Σ β_j (L_j − L̄) e^{−τ} at view depth z.
+    fn source(&self, passed: &[RayBlob], z: f64, tau: f64) -> DVec3 {
         let (mut tau, mut sum) = (tau, DVec3::ZERO);
         for k in &self.active {
             let p = &passed[k.i];
@@ -195,14 +221,14 @@ impl March {
     }
 }
 
-/// Share of the unit normal distribution below `x`, with all digits where it is small: in front of
-/// a dense blob.
+/// Returns the share of the unit normal distribution below `x`, accurate where it is small, in
+/// front of a dense blob.
 fn below(x: f64) -> f64 {
     0.5 * erfc(-x * FRAC_1_SQRT_2)
 }
 
 /// Gauss–Kronrod (7, 15) as in QUADPACK (Piessens et al. 1983), dqk15: positive nodes from the
-/// outermost on, the weights of both rules, the middle's last. Every second node is Gauss's.
+/// outermost on, the weights of both rules, the middle's last. Every second node is a Gauss node.
 const NODES: [f64; 7] = [
     0.991_455_371_120_812_6,
     0.949_107_912_342_758_5,
@@ -235,8 +261,8 @@ mod tests {
 
     #[test]
     fn the_rules_are_exact_to_their_degrees() {
-        // Gauss's 7 points to degree 13, Kronrod's 15 to degree 22 (by symmetry 23), and no
-        // farther.
+        // Gauss's 7 points are exact to degree 13, Kronrod's 15 to degree 22 (by symmetry 23), and
+        // no further.
         let rule = |weights: &dyn Fn(usize) -> f64, middle: f64, power: i32| {
             let sides: f64 = (0..7).map(|i| 2.0 * weights(i) * NODES[i].powi(power)).sum();
             sides + if power == 0 { middle } else { 0.0 }

@@ -1,15 +1,14 @@
-//! The volume against cases with a closed form, against thin sprites where they are the same, and
-//! against plain sums.
+//! The volume against closed forms, against thin sprites where both agree, and against plain sums.
 
 use glam::DVec3;
 
 use super::*;
 use crate::model::camera::Pose;
 use crate::model::cloud::SQRT_TAU;
-use crate::reference::sprites;
+use crate::reference::sprites::{self, Sprites};
 
-/// Eye at the origin, looking along −z. Of one pixel or of three by three the middle one's ray is
-/// the axis.
+/// Eye at the origin, looking along −z. The middle pixel's ray is the axis for one pixel and for
+/// three by three.
 fn view(n: u32) -> View {
     View {
         width: n,
@@ -33,7 +32,7 @@ fn one_pixel(blobs: &[Blob], colors: &[DVec3], behind: OpaquePixel) -> Pixel {
     render(&view(1), &[behind], blobs, colors)[0]
 }
 
-/// What the middle pixel shows of blobs before nothing.
+/// The middle pixel of blobs before an empty background.
 fn alone(blobs: &[Blob], colors: &[DVec3]) -> Pixel {
     one_pixel(blobs, colors, OpaquePixel::EMPTY)
 }
@@ -68,7 +67,7 @@ fn one_blob_is_one_minus_e_to_the_minus_tau() {
 }
 
 #[test]
-fn an_eye_inside_sees_what_lies_before_it() {
+fn an_eye_inside_sees_the_part_in_front() {
     // From the centre on half of it; from 1 σ behind the centre the share below +1 σ,
     // 0.8413447460685429. The near plane is at 1e-3: less by 1e-3/0.4 of a σ, of the density there.
     let near = |x: f64| 1e-3 / 0.4 * (-0.5 * x * x).exp() / SQRT_TAU;
@@ -104,23 +103,27 @@ fn concentric_blobs_mix_their_colours_by_their_extinction() {
 
 #[test]
 fn far_apart_blobs_are_thin_sprites() {
-    // More than 8 σ of both between them: what overlaps is below 1e-14.
+    // More than 8 σ of both lie between them, so the overlap is below 1e-14.
     let blobs =
         [blob(4.0, 0.2, 0.8), blob(8.0, 0.25, 1.7), blob(20.0, 0.6, 3.0), blob(30.0, 0.5, 0.02)];
     let colors = [RED, BLUE, COLOR, DVec3::ONE];
-    let thin = sprites::render(&view(3), &blobs, &colors, &[3, 2, 1, 0]);
+    let thin = |order: &[u32]| {
+        let sprites = Sprites { blobs: &blobs, radiance: &colors, order, factor: None };
+        sprites::render(&view(3), &sprites)
+    };
+    let sorted = thin(&[3, 2, 1, 0]);
     let thick = render(&view(3), &[OpaquePixel::EMPTY; 9], &blobs, &colors);
-    for (a, b) in thick.iter().zip(&thin) {
+    for (a, b) in thick.iter().zip(&sorted) {
         assert_is(*a, DVec3::from_slice(b), b[3], a.error);
         assert!(a.error < 4e-6);
     }
-    // The other way round they are not: what is compared is the order too.
-    let wrong = sprites::render(&view(3), &blobs, &colors, &[0, 1, 2, 3]);
+    // In reverse order they differ, so the comparison covers the order.
+    let wrong = thin(&[0, 1, 2, 3]);
     assert!((wrong[4][0] - thick[4].color[0]).abs() > 0.1);
 }
 
 #[test]
-fn a_surface_within_a_blob_hides_its_half() {
+fn a_surface_within_a_blob_hides_half_of_it() {
     let behind = OpaquePixel { color: [0.5, 0.25, 1.0, 1.0], depth: 3.0, ..OpaquePixel::EMPTY };
     let through = f64::exp(-0.6);
     let expected = (1.0 - through) * RED + through * DVec3::new(0.5, 0.25, 1.0);
@@ -129,8 +132,8 @@ fn a_surface_within_a_blob_hides_its_half() {
     assert_is(hidden, DVec3::new(0.5, 0.25, 1.0), 1.0, 1e-11);
 }
 
-/// The definition by the midpoint rule in `n` steps from the near plane to `end`, from the
-/// extinction alone: no erf.
+/// Integrates the definition by the midpoint rule in `n` steps from the near plane to `end`, from
+/// the extinction alone.
 fn by_steps(blobs: &[Blob], colors: &[DVec3], ray: DVec3, end: f64, n: u32) -> (DVec3, f64) {
     let (near, length) = (view(1).near, ray.length());
     let step = (end - near) / f64::from(n);
@@ -153,7 +156,7 @@ fn by_steps(blobs: &[Blob], colors: &[DVec3], ray: DVec3, end: f64, n: u32) -> (
     (color, -f64::exp_m1(-tau))
 }
 
-/// `n` blobs that overlap, of many sizes, densities and colours: from sin alone.
+/// `n` overlapping blobs of many sizes, densities and colours, from sines alone.
 fn crowd(n: u32, scale: f64) -> (Vec<Blob>, Vec<DVec3>) {
     let lot = |k: u32, m: u32| (f64::from(k * 7 + m) * 12.9898).sin().abs();
     let one = |k| {
@@ -170,7 +173,7 @@ fn crowd(n: u32, scale: f64) -> (Vec<Blob>, Vec<DVec3>) {
 }
 
 #[test]
-fn overlapping_blobs_are_what_small_steps_make_of_them() {
+fn overlapping_blobs_agree_with_small_steps() {
     for (n, scale) in [(2, 2.0), (40, 0.2), (40, 5.0)] {
         let (blobs, colors) = crowd(n, scale);
         let view = view(3);
@@ -179,7 +182,7 @@ fn overlapping_blobs_are_what_small_steps_make_of_them() {
             let ray = view.ray(k % 3, k / 3);
             let (fine, alpha) = by_steps(&blobs, &colors, ray, 9.0, 60_000);
             let (coarse, _) = by_steps(&blobs, &colors, ray, 9.0, 30_000);
-            // The rule is of second order: the fine one is off by a third of what they differ by.
+            // The rule is of second order: the fine result is off by a third of their difference.
             let unsure = (fine - coarse).abs().max_element();
             assert!(unsure < 1e-6, "{unsure:e}");
             assert_is(*pixel, fine, alpha, pixel.error + unsure);
@@ -190,8 +193,8 @@ fn overlapping_blobs_are_what_small_steps_make_of_them() {
 
 #[test]
 fn dense_blobs_around_the_eye_are_resolved() {
-    // τ = 10⁶ on either side: light comes from the first hundred-thousandth of σ, and what it is
-    // made of is what is at the near plane: κ g of the red one over that of both.
+    // τ = 10⁶ on either side: light comes from the first hundred-thousandth of σ. Its mixture is
+    // that at the near plane: κ g of the red blob over that of both.
     let (red, blue) = (blob(0.3, 0.4, 1e6), blob(-0.2, 0.4, 2e6));
     let density = |b: &Blob| b.kappa * (-0.5 * ((b.position.z + 1e-3) / b.sigma).powi(2)).exp();
     let share = density(&red) / (density(&red) + density(&blue));
@@ -202,7 +205,7 @@ fn dense_blobs_around_the_eye_are_resolved() {
 }
 
 #[test]
-fn what_is_no_blob_is_not_there() {
+fn degenerate_blobs_are_not_drawn() {
     let nothing =
         [blob(3.0, 0.5, 0.0), Blob { sigma: 0.0, ..blob(3.0, 0.5, 1.0) }, blob(-30.0, 0.5, 1.0)];
     assert_is(alone(&nothing, &[COLOR; 3]), DVec3::ZERO, 0.0, 0.0);

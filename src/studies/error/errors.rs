@@ -4,7 +4,7 @@
 use super::records::PictureError;
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::picture::errors;
-use crate::reference::picture::pixels::Pixels;
+use crate::reference::picture::Pixels;
 use crate::studies::provenance::Figure;
 
 /// Parts of a picture along its longer side. What a blob is off by it is off by all over its disc:

@@ -12,8 +12,7 @@ use super::records::{Configuration, Front};
 use super::turns::{Time, Turn, n_turns, order, timed};
 use crate::error::{Error, Result};
 use crate::model::scene::Scene;
-use crate::reference::picture::kind::Reference;
-use crate::reference::picture::pixels::Pixels;
+use crate::reference::picture::{Pixels, Reference};
 use crate::timing::names::Setting;
 use crate::timing::sweep::Axis;
 

@@ -13,12 +13,10 @@ use crate::frame::stage::Bed;
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::stats::median;
 use crate::model::scene::{LightingMode, Scene};
-use crate::reference::picture::kind::{Drawn, ReferenceKind, Sample, of_scene_light};
-use crate::reference::picture::model_light::reflections_of;
-use crate::reference::picture::model_picture::of_model;
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::stages::FrameReference;
-use crate::reference::picture::whole::{Drawing, Listener, Work};
+use crate::reference::picture::{
+    BlobModel, FrameReference, ModelDrawing, OnProgress, PixelSample, Pixels, ReferenceKind,
+    RenderStage, RenderedPixels, n_reflections, render_lit_scene, render_model,
+};
 use crate::studies::error::errors::{RESOLVED, picture_error};
 use crate::studies::error::players::{Frames, Players};
 use crate::studies::error::run::Subject;
@@ -68,7 +66,7 @@ impl Chain {
 
 impl Setup<'_> {
     /// The ledger so far as it came.
-    pub fn run(&self, made: Provenance, listener: Listener) -> Result<Ledger> {
+    pub fn run(&self, made: Provenance, listener: OnProgress) -> Result<Ledger> {
         let on_device = self.device_steps();
         let mut players = Players::new(self.bed, self.frames);
         let scenes: Vec<Arc<Scene>> = std::iter::once(self.scene.clone())
@@ -119,12 +117,12 @@ impl Setup<'_> {
         i: usize,
         scene: &Scene,
         chain: &mut Chain,
-        listener: Listener,
+        listener: OnProgress,
     ) -> Result<()> {
         let (time_s, pixels) = (self.frames.time_s, self.pixels);
-        let scene = &ReferenceKind::of_scene(scene);
+        let scene = &ReferenceKind::without_approximations(scene);
         let truth =
-            FrameReference::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
+            FrameReference::with_progress(scene, time_s, &|n| listener(RenderStage::Lighting, n))?;
         let is_lit = scene.lighting.mode != LightingMode::None;
         let mut by_device = truth.clone();
         if is_lit {
@@ -134,10 +132,17 @@ impl Setup<'_> {
             // As it is, it is exact: what it should be is told by the rows below.
             by_device.second_error = Vec::new();
         }
-        let draw = |truth: &FrameReference, drawing: Drawing| {
-            Shown::of(of_scene_light(scene, truth, drawing, pixels, Sample::CENTER, listener))
+        let draw = |truth: &FrameReference, drawing: BlobModel| {
+            Shown::of(render_lit_scene(
+                scene,
+                truth,
+                drawing,
+                pixels,
+                PixelSample::CENTER,
+                listener,
+            ))
         };
-        chain.add("drawing", words("f32", "f64"), false, draw(&by_device, Drawing::Thin));
+        chain.add("drawing", words("f32", "f64"), false, draw(&by_device, BlobModel::Thin));
         if self.is_stopped() {
             return Ok(());
         }
@@ -146,7 +151,7 @@ impl Setup<'_> {
                 "thin sprites",
                 words("sprites", "volume"),
                 false,
-                draw(&by_device, Drawing::Volume),
+                draw(&by_device, BlobModel::Volume),
             );
         }
         if !is_lit || self.is_stopped() {
@@ -163,16 +168,16 @@ impl Setup<'_> {
         truth: &FrameReference,
         by_device: &FrameReference,
         chain: &mut Chain,
-        listener: Listener,
+        listener: OnProgress,
     ) -> Result<()> {
         let (time_s, pixels) = (self.frames.time_s, self.pixels);
         let draw = |truth: &FrameReference| {
-            Shown::of(of_scene_light(
+            Shown::of(render_lit_scene(
                 scene,
                 truth,
-                Drawing::Volume,
+                BlobModel::Volume,
                 pixels,
-                Sample::CENTER,
+                PixelSample::CENTER,
                 listener,
             ))
         };
@@ -189,7 +194,7 @@ impl Setup<'_> {
             words("f32", "f64")
         };
         chain.add("first reflection", of_first, false, draw(&first));
-        if reflections_of(scene) > 1 {
+        if n_reflections(scene) > 1 {
             chain.add(
                 "second reflection",
                 words("pairs in f32", "areas in f64"),
@@ -197,11 +202,12 @@ impl Setup<'_> {
                 draw(truth),
             );
         }
-        let k = reflections_of(scene);
+        let k = n_reflections(scene);
         let mut model =
             |name: &str, [from, to]: [String; 2], by_facet: bool, n: u32| -> Result<()> {
                 if !self.is_stopped() {
-                    let drawn = of_model(scene, time_s, Some(n), by_facet, pixels, listener)?;
+                    let how = ModelDrawing { n_reflections: n, by_facet };
+                    let drawn = render_model(how, scene, time_s, pixels, listener)?;
                     chain.add(name, [from, to], false, Shown::of(drawn));
                 }
                 Ok(())
@@ -310,7 +316,7 @@ impl Setup<'_> {
 }
 
 impl Shown {
-    fn of(drawn: Drawn) -> Shown {
+    fn of(drawn: RenderedPixels) -> Shown {
         let own_error = drawn.own_error();
         Shown { rgba: drawn.rgba, own_error }
     }

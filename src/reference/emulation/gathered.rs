@@ -1,23 +1,28 @@
-//! What a receiver gathers, and what an f32 evaluation may make of it.
+//! Light gathered by a receiver, with bounds on its f32 evaluation.
 
 use glam::DVec3;
 
-use super::doubt::Decision;
+use crate::reference::bounded::Decision;
 
-/// What a receiver gathers.
+/// Light gathered by a receiver.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Gathered {
+    /// I_i, W m⁻².
     pub indirect: DVec3,
     /// Σ Λ G V S of the receiver's lobe.
     pub(super) glossy: DVec3,
+    /// L2 toward the eye, W m⁻² sr⁻¹.
     pub second: DVec3,
+    /// Number of cells that were too wide at the last level.
     pub n_unresolved: f64,
-    /// What rounding may change of I_i and L2 (before K_d and K_s), and what decisions within
-    /// rounding may.
+    /// Bound on the change of I_i and L2 (before K_d and K_s) by rounding and by the decisions that
+    /// it may turn.
     pub(super) error: [DVec3; 2],
+    /// Bound on the error of I_i.
     pub indirect_error: DVec3,
+    /// Bound on the error of L2.
     pub second_error: DVec3,
-    /// Of n_unresolved.
+    /// Bound on the error of `n_unresolved`.
     pub n_doubted: f64,
 }
 
@@ -31,7 +36,7 @@ impl Gathered {
         self.n_doubted += b.n_doubted;
     }
 
-    /// `self`, in doubt whether it is not `b`.
+    /// Returns `self` where rounding may select `b` instead.
     pub(super) fn or(mut self, b: &Gathered) -> Gathered {
         self.error[0] += (self.indirect - b.indirect).abs() + b.error[0];
         self.error[1] += (self.glossy - b.glossy).abs() + b.error[1];
@@ -39,13 +44,13 @@ impl Gathered {
         self
     }
 
-    /// `is` where `d`, else `other`; both where rounding may turn it.
-    pub(super) fn by(
+    /// Returns `is` if `d` is true, else `other`; evaluates both if rounding may turn `d`.
+    pub(super) fn choose(
         d: Decision,
         is: impl Fn() -> Gathered,
         other: impl Fn() -> Gathered,
     ) -> Gathered {
-        match (d.taken, d.sure) {
+        match (d.is_true, d.is_sure) {
             (true, true) => is(),
             (false, true) => other(),
             (true, false) => is().or(&other()),

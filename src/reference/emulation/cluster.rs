@@ -1,78 +1,76 @@
-//! Clusters of facets that send as one, and the gather that opens them: model.md §11 "tree".
+//! Clusters of facets that send light as one: model.md §11 "tree".
 
-mod sight;
-
-pub use sight::positive_part;
-
+use std::f64::consts::FRAC_1_PI;
 use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
-use super::doubt::Known;
+use super::exchange::Exchange;
+use super::roundings::{ROUNDINGS, U};
 use super::source::Sender;
-use super::*;
 use crate::model::tree::Tree;
+use crate::reference::bounded::Bounded;
 
-/// Facets below a node as one. What each number is known to stands beside it.
+/// The facets below a node as one emitter. Beside each number stands a bound on its error.
 #[derive(Debug, Clone)]
-struct Cluster {
-    position: DVec3,
-    moved: f64,
-    normal: DVec3,
-    turned: f64,
-    radius: Known,
-    area: f64,
-    moments: DMat3,
-    moments_error: f64,
-    /// Σ of the facets' diffuse fluxes, RGB.
-    flux: DVec3,
-    flux_error: DVec3,
-    /// By light Σ A g.
-    lights: Vec<Known>,
+pub(super) struct Cluster {
+    pub(super) position: DVec3,
+    pub(super) moved: f64,
+    pub(super) normal: DVec3,
+    pub(super) turned: f64,
+    pub(super) radius: Bounded,
+    pub(super) area: f64,
+    pub(super) moments: DMat3,
+    pub(super) moments_error: f64,
+    /// Sum of the facets' diffuse fluxes, RGB.
+    pub(super) flux: DVec3,
+    pub(super) flux_error: DVec3,
+    /// Σ A g by light.
+    pub(super) lights: Vec<Bounded>,
 }
 
 /// The trees over the facets of all regions.
 pub struct Clusters {
-    theta: f64,
-    n_nodes: Vec<u32>,
-    nodes: Vec<Cluster>,
-    /// Facet of each node that is one.
-    facets: Vec<usize>,
-    /// By region its nodes, the root first.
-    regions: Vec<Range<usize>>,
+    pub(super) theta: f64,
+    pub(super) n_nodes: Vec<u32>,
+    pub(super) nodes: Vec<Cluster>,
+    /// Facet of every leaf.
+    pub(super) facets: Vec<usize>,
+    /// Nodes of every region, the root first.
+    pub(super) regions: Vec<Range<usize>>,
 }
 
 impl Clusters {
-    fn children(&self, node: usize) -> impl Iterator<Item = usize> {
+    pub(super) fn children(&self, node: usize) -> impl Iterator<Item = usize> {
         children(&self.n_nodes, node)
     }
 }
 
-/// The nodes right below one.
+/// Returns the children of a node.
 fn children(n_nodes: &[u32], node: usize) -> impl Iterator<Item = usize> {
     let end = node + n_nodes[node] as usize;
     let next = move |from: usize| (from < end).then_some(from);
     std::iter::successors(next(node + 1), move |c| next(c + n_nodes[*c] as usize))
 }
 
-/// x xᵀ.
-fn square(x: DVec3) -> DMat3 {
+/// Returns x xᵀ.
+pub(super) fn square(x: DVec3) -> DMat3 {
     DMat3::from_cols(x * x.x, x * x.y, x * x.z)
 }
 
-fn trace(m: &DMat3) -> f64 {
+pub(super) fn trace(m: &DMat3) -> f64 {
     m.x_axis.x + m.y_axis.y + m.z_axis.z
 }
 
-fn sum_of(channels: DVec3, error: DVec3) -> Known {
-    Known {
+fn sum_of(channels: DVec3, error: DVec3) -> Bounded {
+    Bounded {
         value: channels.element_sum(),
         error: error.element_sum() + 3.0 * U * channels.element_sum(),
     }
 }
 
 impl Exchange<'_> {
-    /// The trees of clusters over `order`, the facet of each place.
+    /// Builds the trees of clusters over `order`, the facet of each place.
     pub fn clusters(&self, order: &[u32], senders: &[Sender], theta: f64) -> Clusters {
         let mut tree = Tree::default();
         let regions: Vec<_> = (0..self.regions.len())
@@ -110,20 +108,13 @@ impl Exchange<'_> {
         }
     }
 
-    /// I_i and L2 of facet `j` from clusters.
-    pub fn gather_from(&self, j: usize, senders: &[Sender], clusters: &Clusters) -> Gathered {
-        self.received(j, senders, |view, e| {
-            let root = (!clusters.regions[e].is_empty()).then_some(clusters.regions[e].start);
-            root.into_iter().map(|node| view.of_node(j, clusters, e, node)).collect()
-        })
-    }
-
-    /// A facet as what clusters are made of.
+    /// Returns a facet as a leaf.
     fn leaf(&self, i: usize, sender: &Sender) -> Cluster {
         let (facet, radius) = (&self.facets[i], self.radius(i));
         let kd = facet.area * FRAC_1_PI * self.regions[facet.i_region].brdf.kd * facet.color;
-        let lights: Vec<Known> = sender.lights.iter().map(|l| l.mean.scaled(facet.area)).collect();
-        let by = |of: &dyn Fn(&Known) -> f64| -> DVec3 {
+        let lights: Vec<Bounded> =
+            sender.lights.iter().map(|l| l.mean.scaled(facet.area)).collect();
+        let by = |of: &dyn Fn(&Bounded) -> f64| -> DVec3 {
             self.lights
                 .iter()
                 .zip(&sender.lights)
@@ -138,7 +129,7 @@ impl Exchange<'_> {
             moved: 0.0,
             normal: facet.normal,
             turned: 0.0,
-            radius: Known { value: radius, error: ROUNDINGS * U * radius },
+            radius: Bounded { value: radius, error: ROUNDINGS * U * radius },
             area: facet.area,
             moments,
             moments_error: ROUNDINGS * U * trace(&moments),
@@ -148,16 +139,16 @@ impl Exchange<'_> {
         }
     }
 
-    /// The cluster of nodes of one region.
+    /// Merges nodes of one region.
     fn merged(&self, below: &[&Cluster]) -> Cluster {
-        let fluxes: Vec<Known> = below.iter().map(|c| sum_of(c.flux, c.flux_error)).collect();
-        let shines = fluxes.iter().copied().fold(Known::NOTHING, Known::plus).is_positive();
-        let areas = below.iter().map(|c| Known { value: c.area, error: ROUNDINGS * U * c.area });
-        let weights = if shines.taken { fluxes } else { areas.collect() };
-        let total = weights.iter().copied().fold(Known::NOTHING, Known::plus);
+        let fluxes: Vec<Bounded> = below.iter().map(|c| sum_of(c.flux, c.flux_error)).collect();
+        let shines = fluxes.iter().copied().fold(Bounded::ZERO, Bounded::plus).is_positive();
+        let areas = below.iter().map(|c| Bounded { value: c.area, error: ROUNDINGS * U * c.area });
+        let weights = if shines.is_true { fluxes } else { areas.collect() };
+        let total = weights.iter().copied().fold(Bounded::ZERO, Bounded::plus);
         let inverse = if total.value > 0.0 { 1.0 / total.value } else { 0.0 };
-        // By share of the whole; where it may be another's weights that count, as much as there is.
-        let off = |k: usize| match total.value > total.error && shines.sure {
+        // Error of a weight as a share of the whole; 1 if rounding may choose the other weights.
+        let off = |k: usize| match total.value > total.error && shines.is_sure {
             true => weights[k].error / (total.value - total.error),
             false => 1.0,
         };
@@ -171,7 +162,7 @@ impl Exchange<'_> {
         let moved = all().map(|(k, c)| off(k) * c.position.distance(position)).sum::<f64>()
             + most(&|c| c.moved)
             + ROUNDINGS * U * self.reach;
-        // Of a surface it is the plane's.
+        // All facets of a surface have the plane's normal.
         let is_one = below.iter().all(|c| c.normal == below[0].normal && c.turned == 0.0);
         let spread: f64 = all().map(|(k, c)| off(k) * c.normal.distance(normal)).sum();
         let turned = if is_one { 0.0 } else { spread + most(&|c| c.turned) + ROUNDINGS * U };
@@ -189,7 +180,7 @@ impl Exchange<'_> {
             moved,
             normal: if is_one { below[0].normal } else { normal },
             turned,
-            radius: Known {
+            radius: Bounded {
                 value: radius,
                 error: moved + most(&|c| c.moved + c.radius.error) + 8.0 * U * radius,
             },
@@ -201,8 +192,8 @@ impl Exchange<'_> {
             flux: below.iter().map(|c| c.flux).sum(),
             flux_error: below.iter().map(|c| c.flux_error * grown + c.flux * (4.0 * U)).sum(),
             lights: (0..self.lights.len())
-                .map(|l| below.iter().map(|c| c.lights[l]).fold(Known::NOTHING, Known::plus))
-                .map(|sum| Known { error: sum.error + 4.0 * U * sum.value, ..sum })
+                .map(|l| below.iter().map(|c| c.lights[l]).fold(Bounded::ZERO, Bounded::plus))
+                .map(|sum| Bounded { error: sum.error + 4.0 * U * sum.value, ..sum })
                 .collect(),
         }
     }

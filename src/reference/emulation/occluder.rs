@@ -1,40 +1,43 @@
-//! The shadows of rectangles on balls, and which rectangles come into question: model.md §11
-//! "second", *Rims*.
+//! Shadows of rectangles on balls, and the rectangles that can matter: model.md §11 "second",
+//! *Rims*.
 
 use std::f64::consts::SQRT_2;
 
 use glam::DVec3;
 
-use super::doubt::{Decision, Known};
-use crate::reference::area::visibility::Source;
-use crate::reference::occlude::{IN_PLANE, Rectangle};
+use super::roundings::U;
+use crate::reference::bounded::{Bounded, Decision};
+use crate::reference::occlude::{IN_PLANE, Rectangle, Source};
 
-/// What unit vectors, their products and quotients are known to.
-pub const OF_UNITS: f64 = 8.0 * super::U;
-/// No divisor is less: what it divides ends beyond all bounds, in either sense.
+/// Error of unit vectors, their products and quotients.
+pub const OF_UNITS: f64 = 8.0 * U;
+/// Least magnitude of a divisor.
 const LEAST: f64 = 1e-30;
 
-/// The ball about a facet or cluster; `slack`: what the distance of its middle from a plane is
-/// known to.
+/// The ball about a facet or cluster.
 #[derive(Debug, Clone, Copy)]
 pub struct Ball {
+    /// Centre.
     pub at: DVec3,
-    pub radius: Known,
+    /// Radius.
+    pub radius: Bounded,
+    /// Error of the centre's distance from a plane.
     pub slack: f64,
 }
 
-/// How a rectangle lies in the way to a ball.
+/// Position of a rectangle in the way to a ball.
 #[derive(Debug, Clone, Copy)]
 pub struct Shadow {
-    /// The ball's middle is hidden.
+    /// Whether the ball's centre is hidden.
     pub hidden: Decision,
-    /// A rim runs through it.
-    pub torn: Decision,
-    /// h, the share of it that is hidden.
-    pub share: Known,
+    /// Whether a shadow edge crosses the ball.
+    pub crossed: Decision,
+    /// h, the hidden share of the ball.
+    pub share: Bounded,
 }
 
-/// Signs of a plane's side that may be found where it is `raw`, known to `slack`; the law's first.
+/// Returns the possible signs of a plane's side at distance `raw`, known to `slack`; the exact one
+/// first.
 pub fn signs(raw: f64, tolerance: f64, slack: f64) -> Vec<f64> {
     let law = if raw.abs() > tolerance { raw.signum() } else { 0.0 };
     let possible = [
@@ -47,14 +50,14 @@ pub fn signs(raw: f64, tolerance: f64, slack: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The plane's side of `p`, and its signs.
+/// Returns the signed distance of `p` from the plane, and its possible signs.
 pub fn sides(r: &Rectangle, p: DVec3, slack: f64) -> (f64, Vec<f64>) {
     let o = p - r.center;
     let raw = r.normal.dot(o);
     (raw, signs(raw, IN_PLANE * o.abs().element_sum(), slack))
 }
 
-/// The same of where light or sight comes from.
+/// Returns the same for a source of light or sight.
 pub fn sides_of(r: &Rectangle, source: Source, slack: f64) -> (f64, Vec<f64>) {
     match source {
         Source::At(p) => sides(r, p, slack),
@@ -65,9 +68,9 @@ pub fn sides_of(r: &Rectangle, source: Source, slack: f64) -> (f64, Vec<f64>) {
     }
 }
 
-/// Where the way to `q` meets the plane; known to what; and how much larger than the ball its image
-/// is there.
-fn foot(source: Source, q: DVec3, a: f64, b: f64, slack: f64) -> (DVec3, f64, Known) {
+/// Returns where the way to `q` meets the plane, the error of that point, and how much larger than
+/// the ball its image is there.
+fn foot(source: Source, q: DVec3, a: f64, b: f64, slack: f64) -> (DVec3, f64, Bounded) {
     match source {
         Source::At(p) => {
             let (d, length) = (q - p, q.distance(p));
@@ -75,46 +78,46 @@ fn foot(source: Source, q: DVec3, a: f64, b: f64, slack: f64) -> (DVec3, f64, Kn
             let (t, slant) = (a / apart, length / apart.abs());
             let t_error = slack * (a.abs() + b.abs()) / (apart * apart);
             let slant_error = (2.0 * slant + 1.0) * slack / apart.abs();
-            let stretch = Known { value: slant.max(1.0), error: slant_error };
+            let stretch = Bounded { value: slant.max(1.0), error: slant_error };
             (
                 p + d * t,
                 slack + length * t_error,
-                Known { value: t.abs(), error: t_error }.times(stretch),
+                Bounded { value: t.abs(), error: t_error }.times(stretch),
             )
         }
         Source::Toward(w) => {
             let slope = if a.abs() < LEAST { LEAST } else { a };
             let moved = slack + slack / slope.abs() + b.abs() * OF_UNITS / (slope * slope);
-            let stretch = Known { value: 1.0 / slope.abs(), error: OF_UNITS / (slope * slope) };
+            let stretch = Bounded { value: 1.0 / slope.abs(), error: OF_UNITS / (slope * slope) };
             (q - w * (b / slope), moved, stretch)
         }
     }
 }
 
-/// The shadow of `r` on a ball.
+/// Returns the shadow of `r` on a ball.
 pub fn shadow(r: &Rectangle, source: Source, ball: &Ball) -> Shadow {
     let Ball { at: q, radius, slack } = *ball;
     let ((a, of_a), (b, of_b)) = (sides_of(r, source, slack), sides(r, q, slack));
     let (foot, moved, stretch) = foot(source, q, a, b, slack);
     let o = foot - r.center;
     let beyond = |axis: DVec3| o.dot(axis).abs() / axis.length() - axis.length();
-    let m = Known { value: beyond(r.u).max(beyond(r.v)), error: moved };
+    let m = Bounded { value: beyond(r.u).max(beyond(r.v)), error: moved };
     let reach = stretch.times(radius);
     let apart = Decision::of(of_a.iter().flat_map(|x| of_b.iter().map(move |y| x * y < 0.0)));
-    // From within its plane a rectangle hides nothing.
+    // A rectangle hides nothing from a source in its plane.
     let parts = Decision::of(of_a.iter().map(|x| *x != 0.0));
     let near = Decision::above(radius.value, b.abs(), slack + radius.error);
-    let across = Known { value: m.value.abs(), ..m };
-    let torn = parts
+    let across = Bounded { value: m.value.abs(), ..m };
+    let crossed = parts
         .and(apart.and(Decision::greater(reach, across)).or(near.and(Decision::greater(reach, m))));
     let half = (SQRT_2 * reach.value).max(f64::MIN_POSITIVE);
     let ramp = |m: f64| (0.5 - m / half).clamp(0.0, 1.0);
     let off = m.error + reach.error / SQRT_2;
-    let share = Known::between(ramp(m.value + off), ramp(m.value), ramp(m.value - off));
+    let share = Bounded::between(ramp(m.value + off), ramp(m.value), ramp(m.value - off));
     Shadow {
-        hidden: apart.and(Decision::greater(m, Known::NOTHING).not()),
-        torn,
-        share: share.where_or(apart, Known::NOTHING),
+        hidden: apart.and(Decision::greater(m, Bounded::ZERO).not()),
+        crossed,
+        share: share.select(apart, Bounded::ZERO),
     }
 }
 
@@ -122,19 +125,19 @@ fn corners(r: &Rectangle) -> [DVec3; 4] {
     [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| r.center + x * r.u + y * r.v)
 }
 
-/// Face k of the pyramid over `rim`: what is within is on the positive side of its normal; and its
-/// edges' lengths.
+/// Returns the inward normal of face k of the pyramid over `rim`, and the lengths of its edges.
 fn face(rim: &[DVec3; 4], k: usize, middle: DVec3) -> (DVec3, [f64; 2]) {
     let (a, b) = (rim[k], rim[(k + 1) % 4]);
     let plane = a.cross(b);
     (plane * plane.dot(middle).signum(), [a.length(), b.length()])
 }
 
-/// Whether the pyramid from `p` over `r` may hold a point of `e` behind `r`: no face of it, nor
-/// `r`'s plane, has all of `e`'s corners outside.
+/// Returns whether the pyramid from `p` over `r` may hold a point of `e` behind `r`: neither a face
+/// nor `r`'s plane has all of `e`'s corners outside.
 pub fn meets(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
     let (rim, far) = (corners(r).map(|c| c - p), corners(e).map(|c| c - p));
-    // All of `far` below 0 of a plane through `p`, corners and normal known as their products are.
+    // All of `far` lies below 0 of a plane through `p`; corners and normal err as their products
+    // do.
     let outside = |k: usize| {
         let (inward, [a, b]) = face(&rim, k, r.center - p);
         let below = |c: &DVec3| {
@@ -153,12 +156,11 @@ pub fn meets(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
     out.not().and(far.iter().map(behind).fold(Decision::NO, Decision::or))
 }
 
-/// Planes through a point hold what they are said to hold by this share of the lengths that make
-/// them up.
+/// Margin of a plane through a point, as a share of the lengths that make it up.
 const TRUST: f64 = 1e-5;
 
-/// Whether `r` alone hides all of `e` from `p`: its corners are within the pyramid from `p` over
-/// `r`, and beyond `r`.
+/// Returns whether `r` alone hides all of `e` from `p`: its corners are within the pyramid from `p`
+/// over `r`, and beyond `r`.
 pub fn hides_all(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
     let (rim, far) = (corners(r).map(|c| c - p), corners(e).map(|c| c - p));
     let inside = |k: usize| {

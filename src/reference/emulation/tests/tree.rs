@@ -1,9 +1,9 @@
-//! Clusters by numbers worked by hand.
+//! Clusters by values worked by hand.
 
 use super::*;
-use crate::reference::second::tree::positive_part;
+use crate::reference::emulation::cluster_view::positive_part;
 
-/// Over the facets as they stand: no test here has more than a few, or asks where they lie.
+/// Gathers from a tree over the facets in their given order.
 fn through_a_tree(exchange: &Exchange, theta: f64) -> Gathered {
     let senders = exchange.senders();
     let order: Vec<u32> = (0..exchange.facets.len() as u32).collect();
@@ -23,9 +23,9 @@ fn the_positive_part_of_a_normal_distribution() {
 }
 
 #[test]
-fn four_quarters_of_a_rectangle_are_the_rectangle() {
-    // Off the axis and turned, so that every term counts. Half axes ¼ and ⅛, of a quarter ⅛ and
-    // 1/16: second moments of a quarter about the middle are (⅛)² (⅓ + 1) = (¼)²/3.
+fn a_cluster_of_quarters_equals_the_rectangle() {
+    // Off the axis and turned, so that every term counts. Half axes are ¼ and ⅛, a quarter's ⅛ and
+    // 1/16. Second moments of a quarter about the middle are (⅛)² (⅓ + 1) = (¼)²/3.
     let ceiling = |n| {
         plane(DVec3::new(1.0, 2.0, -0.5), 0.25 * DVec3::new(0.8, 0.6, 0.0), 0.125 * DVec3::Z, n)
     };
@@ -49,9 +49,10 @@ fn four_quarters_of_a_rectangle_are_the_rectangle() {
 }
 
 #[test]
-fn a_cloud_s_cluster_spreads_about_its_mean() {
-    // Two discs 2a apart, ten above, their normals 60° to either side of down: mean normal ½ long,
-    // variance (1 − ¼)/3. Seen along its axis: M = a² x xᵀ, N = a²/100, w·Nw = 0 and n_j·N = 0.
+fn a_clouds_cluster_spreads_about_its_mean() {
+    // Two discs 2a apart, ten above, their normals 60° to either side of down: the mean normal is ½
+    // long, the variance (1 − ¼)/3. Seen along the axis M = a² x xᵀ, N = a²/100, w·Nw = 0 and n_j·N
+    // = 0.
     let a = 0.1;
     let tilt = |s: f64| DVec3::new(s * 0.75f64.sqrt(), -0.5, 0.0);
     let cloud = |s: f64| disc(DVec3::new(s * a, 10.0, 0.0), tilt(s), 0.01, 1);
@@ -60,7 +61,7 @@ fn a_cloud_s_cluster_spreads_about_its_mean() {
     scene.regions.pop();
     scene.pairings = pairings(&[], 2);
     let found = through_a_tree(&scene.exchange(&[GLOW], &[0.0; 3]), 1.0).indirect.x;
-    // Under GLOW a facet's g is ½ + ½ n·up of no light and the constant 1: its L = 1.
+    // Under GLOW a facet's g is ½ + ½ n·up of no light and the constant 1, so its L = 1.
     let spread = a * a / 100.0;
     let form = positive_part(0.5, 0.25) * positive_part(1.0, spread / 3.0) - 2.0 * 0.5 * spread;
     assert!((found / (0.02 * form / 100.0) - 1.0).abs() < 1e-12, "{found} {form}");

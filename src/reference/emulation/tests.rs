@@ -1,16 +1,24 @@
-//! Numbers worked by hand, and the integrals over the areas.
+//! Values worked by hand, and integrals over the areas.
 
 mod edges;
 mod rooms;
 mod tree;
 
-use glam::UVec3;
+use std::f64::consts::{FRAC_1_PI, PI};
 
+use glam::{DVec3, UVec3};
+
+use super::roundings::U;
 use super::*;
 use crate::model::basis::N_NODES;
-use crate::model::pairings::pairings;
+use crate::model::grid::GridSpec;
+use crate::model::light::Light;
+use crate::model::material::Brdf;
+use crate::model::pairings::{Pairing, pairings};
+use crate::model::scene::Pairs;
 use crate::model::surface::Surface;
 use crate::reference::area::{Accuracy, AreaScene, Receiver};
+use crate::reference::occlude::Rectangle;
 
 const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::ONE, cell: 1.0, low: DVec3::ZERO };
 const PAIRS: Pairs = Pairs { size: 0.5, levels: 6, steps: 16 };
@@ -20,7 +28,7 @@ fn matte(kd: f64) -> Brdf {
     Brdf { kd: DVec3::splat(kd), ks: DVec3::ZERO, ns: 1.0 }
 }
 
-/// What an exchange needs besides its lights.
+/// Facets, regions and pairings of an exchange.
 struct Scene {
     facets: Vec<Facet>,
     regions: Vec<Region>,
@@ -43,7 +51,7 @@ impl Scene {
         }
     }
 
-    /// Only the first `n` surfaces have facets: others stand in the way and send nothing.
+    /// Keeps the facets of the first `n` surfaces. The others only hide.
     fn with_facets_of(mut self, n: usize) -> Scene {
         self.facets.retain(|f| f.i_region < n);
         self
@@ -57,7 +65,7 @@ impl Scene {
         Scene { facets: facets.to_vec(), regions, pairings: pairings(&[], facets.len()) }
     }
 
-    /// `through`: of both transmittances.
+    /// Returns the exchange, with `through` for both transmittances.
     fn exchange<'a>(&'a self, lights: &'a [Light], through: &'a [f64]) -> Exchange<'a> {
         Exchange {
             facets: &self.facets,
@@ -93,23 +101,23 @@ fn plane(center: DVec3, u: DVec3, v: DVec3, n: u32) -> Surface {
     Surface { center, u, v, i_material: 0, subdivide: [n, n] }
 }
 
-/// A facet that sees up from the origin.
+/// A small facet at the origin that faces up.
 fn eye_on_the_floor() -> Surface {
     plane(DVec3::ZERO, 1e-3 * DVec3::Z, 1e-3 * DVec3::X, 1)
 }
 
 #[test]
 fn two_discs_face_to_face() {
-    // Area π one above the other: 1/(1 + 1), times L = 1 of a white one under irradiance π, times A
-    // = π.
+    // Area π one above the other: 1/(1 + 1), times L = 1 of a white disc under irradiance π, times
+    // A = π.
     let facets = [disc(DVec3::ZERO, DVec3::Y, PI, 0), disc(DVec3::Y, DVec3::NEG_Y, PI, 1)];
     let sun = [Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::splat(PI) }];
     let scene = Scene::of_discs(&facets);
     let up = scene.gather(&sun, 1.0, 1);
     assert!((up.indirect.x - PI / 2.0).abs() < 1e-15 && (up.second.x - 0.5).abs() < 1e-15);
-    // The other one is lit from behind.
+    // The other disc is lit from behind.
     assert_eq!(scene.gather(&sun, 1.0, 0).indirect, DVec3::ZERO);
-    // Turned by 60° each about one axis the cosines are ½.
+    // Turned by 60° each about one axis, the cosines are ½.
     let tilted = DVec3::new(0.0, 0.5, 0.75f64.sqrt());
     let scene =
         Scene::of_discs(&[disc(DVec3::ZERO, tilted, 1e-6, 0), disc(DVec3::Y, -tilted, 1e-6, 1)]);
@@ -124,7 +132,7 @@ fn of_a_ceiling() -> f64 {
 }
 
 #[test]
-fn a_ceiling_has_its_form_factor_and_a_blocker_takes_its_share() {
+fn a_ceiling_has_its_form_factor_and_a_blocker_removes_its_share() {
     let ceiling = |n| plane(DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, n);
     let found = |surfaces: &[Surface]| {
         Scene::of_surfaces(surfaces, matte(1.0))
@@ -133,24 +141,24 @@ fn a_ceiling_has_its_form_factor_and_a_blocker_takes_its_share() {
             .indirect
             .x
     };
-    // The ceiling faces down: half of nothing above, and the constant share: L = 1. Second
+    // The ceiling faces down: it gets nothing from above and the constant share, so L = 1. Second
     // derivatives leave (1/8)^4.
     let open = found(&[eye_on_the_floor(), ceiling(8)]);
     assert!((open / (PI * of_a_ceiling()) - 1.0).abs() < 3e-4, "{open}");
-    // Of one facet, as wide as its distance, 4 × 4 points: of the second derivatives a disc leaves
-    // 4 (u·w)²/d² along each axis, u·w = 3/8·1/8 for parts at the edge.
+    // One facet as wide as its distance is evaluated at 4 × 4 points. A disc neglects second
+    // derivatives of 4 (u·w)²/d² along each axis, u·w = 3/8·1/8 for parts at the edge.
     let points = found(&[eye_on_the_floor(), ceiling(1)]);
     assert!((points / open - 1.0).abs() < 1e-2, "{points} {open}");
-    // An edge through the axis, and one at x = 1/40, whose shadow at 1/20 runs through a part of a
-    // facet: it takes what the strip between has, by values in the middles of parts: cos⁴ is 1 −
-    // 2x² there, x = 1/8 of one facet.
+    // An edge through the axis, and one at x = 1/40, whose shadow at 1/20 crosses a part of a
+    // facet. The edge's move removes the strip between, by values at the centres of parts: cos⁴ is
+    // 1 − 2x² there, x = 1/8 of one facet.
     for n in [1, 8] {
         let all = found(&[eye_on_the_floor(), ceiling(n)]);
         let with = |x: f64| {
             let blocker = plane(DVec3::new(3.0 + x, 0.5, 0.0), 3.0 * DVec3::X, 9.0 * DVec3::Z, 1);
             found(&[eye_on_the_floor(), ceiling(n), blocker])
         };
-        // What is torn is looked at closely: by discs of 1/32² in place of the facet's mean.
+        // Facets that an edge crosses are divided: discs of 1/32² replace the facet's mean.
         assert!((with(0.0) / all - 0.5).abs() < 1e-5, "{n}: {}", with(0.0) / all);
         let strip = plane(DVec3::new(0.025, 1.0, 0.0), 0.025 * DVec3::X, 0.5 * DVec3::Z, 16);
         let strip = found(&[eye_on_the_floor(), strip]);
@@ -160,10 +168,10 @@ fn a_ceiling_has_its_form_factor_and_a_blocker_takes_its_share() {
 }
 
 #[test]
-fn a_whole_is_seen_as_far_as_its_ball() {
-    // Half axes 1/100 at distance 2, seen past an edge half way: m = 1/500 in the blocker's plane,
-    // where the ball's radius is √2/200: hidden by ½ − m·100 = 0.3. As wide as 1/100 of the
-    // distance it is torn but not looked at closely.
+fn an_undivided_facet_is_hidden_by_the_share_of_its_ball() {
+    // Half axes 1/100 at distance 2, seen past an edge half way. m = 1/500 in the blocker's plane,
+    // where the ball's radius is √2/200: the hidden share is ½ − m·100 = 0.3. As wide as 1/100 of
+    // the distance the facet is not divided.
     let facet = plane(2.0 * DVec3::Y, 0.01 * DVec3::X, 0.01 * DVec3::Z, 1);
     let found = |x: f64| {
         let blocker = plane(DVec3::new(1.0 + x, 1.0, 0.0), DVec3::X, DVec3::Z, 1);
@@ -179,7 +187,7 @@ fn a_whole_is_seen_as_far_as_its_ball() {
 }
 
 #[test]
-fn a_corner_is_that_of_the_areas() {
+fn a_corner_agrees_with_the_area_reference() {
     let floor = plane(DVec3::ZERO, DVec3::Z, DVec3::X, 8);
     let wall = plane(DVec3::new(0.0, 1.0, -1.0), DVec3::X, DVec3::Y, 8);
     let sun =
@@ -189,16 +197,16 @@ fn a_corner_is_that_of_the_areas() {
     for j in [0, 7, 27, 63, 64, 91, 120] {
         let at = Receiver::new(scene.facets[j].position, scene.facets[j].normal, matte(0.5));
         let e = truth.second(&at, at.normal, &Accuracy::relative(1e-7));
-        // Wholes are at most half as wide as their distance: fourth order of ½·½, some 3 parts in a
-        // thousand. Parts, at most 3/8 and some nearer a half, are discs: 4 (u·w)²/d² = 4/16² of
-        // them at their widest.
+        // Undivided facets are at most half as wide as their distance: fourth order of ½·½, some 3
+        // parts in a thousand. Parts, at most 3/8 and some nearer a half, are discs: 4 (u·w)²/d² =
+        // 4/16² at their widest.
         let off = (scene.gather(&sun, 1.0, j).indirect.x / e.irradiance.x - 1.0).abs();
         assert!(off < 1.5e-2, "{j} {off}");
     }
 }
 
 #[test]
-fn what_lies_in_a_plane_hides_nothing() {
+fn rectangles_in_a_plane_hide_nothing_of_it() {
     let ceiling = plane(DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, 2);
     let found = |more: &[Surface]| {
         let surfaces = [&[eye_on_the_floor(), ceiling], more].concat();
@@ -206,39 +214,38 @@ fn what_lies_in_a_plane_hides_nothing() {
     };
     let alone = found(&[]);
     assert!(alone.indirect.x > 0.0);
-    // Over half of the ceiling, in its plane and within f32's rounding of it; and in the receiver's
-    // plane.
+    // A rectangle over half of the ceiling, in its plane and within f32's rounding of it; and one
+    // in the receiver's plane.
     for off in [0.0, 1e-7, -1e-7] {
         let lies = plane(DVec3::new(0.5, 1.0 + off, 0.0), 0.5 * DVec3::X, DVec3::Z, 1);
-        // It only has the ceiling looked at closely: wholes half as wide as their distance are
-        // right to some 3 parts in a thousand.
+        // The rectangle only causes the ceiling to be divided; undivided facets half as wide as
+        // their distance are right to some 3 parts in a thousand.
         assert!((found(&[lies]).indirect.x / alone.indirect.x - 1.0).abs() < 3e-3, "{off}");
         let wall = plane(DVec3::new(off, 0.5, 0.0), DVec3::Y, DVec3::Z, 1);
         let clear = (found(&[wall]).indirect.x / alone.indirect.x - 1.0).abs();
-        // Through the receiver's own place there is no side from which it could hide; its shadow of
-        // the sky has the ceiling looked at by its parts.
+        // A rectangle through the receiver has no side from which it could hide. Its shadow of the
+        // sky causes the ceiling to be divided.
         assert!(clear < 3e-3, "{off}: {clear}");
     }
-    // A thousandth before the ceiling it hides half, less what is seen past its edge: a hundredth
-    // of the half width.
+    // A thousandth before the ceiling the rectangle hides half, less the part seen past its edge: a
+    // hundredth of the half width.
     let before = plane(DVec3::new(0.5, 0.999, 0.0), 0.5 * DVec3::X, DVec3::Z, 1);
     assert!((found(&[before]).indirect.x / alone.indirect.x - 0.5).abs() < 1e-3);
 }
 
 #[test]
-fn what_is_too_wide_at_the_last_level_is_counted() {
-    // A receiver 1/50 below a ceiling of width 1: 50 times its distance; quartered it is 4 × 25.
+fn cells_too_wide_at_the_last_level_are_counted() {
+    // A receiver 1/50 below a ceiling of width 1 is 50 times too near; quartered it is 4 × 25.
     let ceiling = plane(0.02 * DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, 1);
     let scene = Scene::of_surfaces(&[eye_on_the_floor(), ceiling], matte(1.0));
     let found = |levels| {
         let pairs = Pairs { levels, ..PAIRS };
         at(&Exchange { pairs, ..scene.exchange(&[GLOW], &[0.0; 2]) }, 0)
     };
-    // Quarters' centres are at 0.354: half a width over that is 1.41, no wider than 1.5 in all
-    // four.
+    // Quarters' centres are at 0.354: half a width over that is 1.41, below 1.5 for all four.
     assert_eq!([0, 1].map(|l| found(l).n_unresolved), [1.0, 0.0]);
     assert_eq!(found(6).n_doubted, 0.0);
-    // At pair_size 1/8 quarters are cut again: of 16 the innermost four at 0.177 are 1.41 wide,
+    // At pair_size 1/8 quarters are divided again. Of 16 the innermost four at 0.177 are 1.41 wide,
     // those at the edges' middle (1/8, 3/8) 0.63 and the corners 0.47, all more than 3/8.
     let pairs = Pairs { size: 0.125, levels: 2, ..PAIRS };
     let fine = at(&Exchange { pairs, ..scene.exchange(&[GLOW], &[0.0; 2]) }, 0);
@@ -246,9 +253,9 @@ fn what_is_too_wide_at_the_last_level_is_counted() {
 }
 
 #[test]
-fn lobes_are_met_within_their_reach_and_ask_for_narrow_cells() {
-    // 0.3 wide at distance 1, the receiver's half vector `alpha` off its normal; or the emitter's,
-    // by a sun.
+fn lobes_within_reach_divide_wide_cells() {
+    // 0.3 wide at distance 1, with the receiver's half vector `alpha` off its normal; or the
+    // emitter's, by a sun.
     let ceiling = plane(DVec3::Y, 0.15 * DVec3::X, 0.15 * DVec3::Z, 1);
     let count = |i_glossy: usize, ns: f64, alpha: f64| {
         let mut scene = Scene::of_surfaces(&[eye_on_the_floor(), ceiling], matte(1.0));
@@ -261,8 +268,8 @@ fn lobes_are_met_within_their_reach_and_ask_for_narrow_cells() {
         at(&Exchange { eye, pairs, ..scene.exchange(&sun, &[1.0; 2]) }, 0).n_unresolved
     };
     for i in [0, 1] {
-        // 4.5·½/√56.25 is 0.3: of a cell more is asked for from there on. Met is what is nearer
-        // than 0.75·0.3 + 4/√100 = 0.625, a chord of 0.6357.
+        // 4.5·½/√56.25 is 0.3, so that cells are divided from there on. A lobe is met nearer than
+        // 0.75·0.3 + 4/√100 = 0.625, a chord of 0.6357.
         assert_eq!([56.0, 56.5].map(|ns| count(i, ns, 0.0)), [0.0, 1.0], "{i}");
         assert_eq!([0.63, 0.64].map(|alpha| count(i, 100.0, alpha)), [1.0, 0.0], "{i}");
     }

@@ -1,26 +1,19 @@
-//! The f64 reference on hand-worked and published numbers. Rooms small enough are tested in their
-//! own file.
+//! Particles from boxes, and the bound on their f32 evaluation.
 
-use glam::{DVec2, DVec3};
-use half::f16;
+use super::one_box;
+use glam::DVec3;
 use nimbus::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, mean_radius};
-use nimbus::model::camera::Pose;
-use nimbus::model::cloud::{SQRT_TAU, box_kappa};
-use nimbus::model::film::FilmFormat;
-use nimbus::reference::Blob;
 use nimbus::reference::generate::{
-    Acceptance, decision_margin, fold, generate_box, generate_particle, is_inside, offset, radius,
-    uniforms,
+    Acceptance, decision_margin, fold, generate_box, generate_particle, is_inside, uniforms,
 };
 use nimbus::reference::rounding::{U_F32, particle_bound};
-use nimbus::reference::sprites::{Rounding, View, alpha, render, render_with_bound};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 const FORMS: [Form; 2] = [Form::Centred, Form::Printed];
 
 /// The boxes of the paper's Table 2 in the order of the file: count, extents, centre, R_max.
 fn paper_boxes() -> Vec<CloudBox> {
-    let text = include_str!("../scenes/cubes-554.dat");
+    let text = include_str!("../../scenes/cubes-554.dat");
     let rows = text
         .lines()
         .skip(2)
@@ -32,15 +25,6 @@ fn paper_boxes() -> Vec<CloudBox> {
         radius_max: v[7],
     })
     .collect()
-}
-
-fn one_box(n_particles: u32, extent: DVec3, radius_max: f64) -> CloudBox {
-    CloudBox { n_particles, extent, center: DVec3::ZERO, radius_max }
-}
-
-/// Numbers in [0, 1) for the tests' own choices.
-fn lots(i: u32) -> [f64; 4] {
-    uniforms(0x7e57, 0, i, 0)
 }
 
 #[test]
@@ -60,7 +44,7 @@ fn a_particle_worked_by_hand() {
         0.5,
         0,
     );
-    // 16 digits and some ten roundings of numbers below 8.
+    // 16 digits, and some ten roundings of numbers below 8.
     let expected = DVec3::new(1.2012904103575917, 0.7691475461587762, 1.5784238024958326);
     assert!((p.position - expected).length() < 1e-14, "{}", p.position);
     assert_eq!((p.n_attempts, p.folded), (1, false));
@@ -70,7 +54,7 @@ fn a_particle_worked_by_hand() {
     // 3.428321058021832, which was found by a scan of 10⁶ steps: its error is below 1e-12.
     assert!((p.radius - 1.564123895265403).abs() < 1e-11);
     assert!((p.sigma - p.radius * 0.5 / 3.0).abs() < 1e-15);
-    // Printed, box 6 × 10 × 8: y repeats z.
+    // In the printed form y repeats z; box 6 × 10 × 8.
     let printed = generate_particle(
         &one_box(1, DVec3::new(6.0, 10.0, 8.0), 2.0),
         0,
@@ -139,7 +123,7 @@ fn a_needle_ends_at_its_bound_and_is_folded() {
         Acceptance::of(&particles),
         Acceptance { n_attempts: 50 * 64, n_accepted: 0, n_folded: 50 }
     );
-    // A point moves nothing: sin 0 everywhere, and the centre is inside.
+    // A box without extent moves nothing: sin 0 everywhere, and the centre is inside.
     let point = generate_box(&one_box(3, DVec3::ZERO, 0.0), 0, 1, Form::Centred, 1.0, 1.0);
     assert!(point.iter().all(|p| p.n_attempts == 1 && p.position == DVec3::ZERO && p.kappa == 0.0));
     assert_eq!(Acceptance::of(&[]).rate(), None);
@@ -147,8 +131,8 @@ fn a_needle_ends_at_its_bound_and_is_folded() {
 
 #[test]
 fn folding_mirrors_at_the_faces() {
-    // By hand, h = 2: 3 is one beyond the face and comes back to 1; 7 passes both and lands on 1 …
-    // (period 8).
+    // By hand, h = 2: 3 is one beyond the face and is folded to 1; 7 passes both faces and lands on
+    // 1 … (period 8).
     let cases = [
         (0.0, 0.0),
         (2.0, 2.0),
@@ -179,11 +163,11 @@ fn radii_have_their_mean_and_positions_their_symmetry() {
             let variance = (0..particles.len()).map(|i| (f(i) - mean).powi(2)).sum::<f64>() / n;
             (mean, (variance / n).sqrt())
         };
-        // Five standard errors: a chance of 6e-7 a comparison, and the seed is fixed.
+        // Five standard errors have a probability of 6e-7 a comparison, and the seed is fixed.
         let (mean, error) = mean_of(&|i| particles[i].radius);
         assert!((mean - mean_radius(form, 2.1)).abs() < 5.0 * error);
         if form == Form::Centred {
-            // X, Y → −X, −Y turns P_x, P_y and both swirls around and leaves Z: x and y are
+            // X, Y → −X, −Y reverses P_x, P_y and both swirls and leaves Z, so that x and y are
             // symmetric together. z is not, because acceptance along x depends on the sign of Z.
             for axis in 0..2 {
                 let (mean, error) = mean_of(&|i| particles[i].position[axis]);
@@ -241,15 +225,15 @@ impl InF32<'_> {
 #[test]
 fn f32_evaluations_stay_within_their_bound() {
     let good = |x: f32| f64::from(x).sin() as f32;
-    // The worst that the assumptions allow, its signs taken from the argument's bits.
+    // The greatest error that the assumptions allow, with signs taken from the argument's bits.
     let poor = |x: f32| {
         let sign = |bit: u32| if x.to_bits() >> bit & 1 == 0 { 1.0 } else { -1.0 };
         let x = f64::from(x);
         let moved = (x + sign(0) * 2.0 * U_F32 * x.abs()).sin();
-        // Rounding to f32 is up to 2⁻²⁵ of the 2⁻²² allowed, or of small ones one of seven units.
+        // Rounding to f32 is up to 2⁻²⁵ of the 2⁻²² allowed, or one of seven units for small sines.
         (moved + sign(1) * U_F32 * (6.0 * moved.abs()).min(3.5)) as f32
     };
-    // The paper's boxes accept before the bound on attempts; one so thin mostly folds.
+    // The paper's boxes accept before the bound on attempts; such a thin box mostly folds.
     let mut boxes = paper_boxes();
     boxes.push(one_box(0, DVec3::new(7.4, 0.03, 2.9), 2.0));
     for (form, sine) in
@@ -285,179 +269,7 @@ fn f32_evaluations_stay_within_their_bound() {
              other {n_other}, folded {n_folded} of {n}"
         );
         assert!(median < 1000.0 && n_folded > 100);
-        // The bounds are some 1e-6 of boxes of size 1, with a few attempts each.
+        // The bounds are some 1e-6 for boxes of size 1 with a few attempts each.
         assert!(n_other <= n_undecided && f64::from(n_undecided) < 1e-3 * f64::from(n));
     }
-}
-
-fn view(width: u32, height: u32) -> View {
-    let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
-    View {
-        width,
-        height,
-        pose,
-        fov_y_rad: FRAC_PI_2,
-        near: 0.1,
-        cutoff: 3.0,
-        threshold: 0.0,
-        smallest: 0.0,
-        shift: DVec2::ZERO,
-    }
-}
-
-/// Blobs before the camera, far to near, and a radiance each.
-fn scattered(n: u32, nearest: f64) -> (Vec<Blob>, Vec<DVec3>) {
-    let blob = |i: u32| {
-        let [a, b, c, d] = lots(2 * i);
-        let depth = nearest + 8.0 * f64::from(n - i) / f64::from(n);
-        let position = DVec3::new((2.0 * a - 1.0) * depth, (2.0 * b - 1.0) * depth, -depth);
-        Blob { aspect: 1.0, position, sigma: 0.1 + c, kappa: 0.4 * d }
-    };
-    let color = |i: u32| DVec3::from_slice(&lots(2 * i + 1)[..3]);
-    ((0..n).map(blob).collect(), (0..n).map(color).collect())
-}
-
-#[test]
-fn one_blob_at_two_pixels() {
-    let blob = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.6 };
-    let color = DVec3::new(0.2, 0.5, 2.0);
-    let image = render(&view(5, 3), &[blob], &[color], &[0]);
-    // Centre pixel: b = 0, τ = √(2π)κσ. Column 3 of the middle row: direction (2·3.5/5 − 1)·5/3 =
-    // 2/3 to the right of forward, b = 3·(2/3)/√(1 + 4/9) = 6/√13, e^{−b²/2} = e^{−18/13}.
-    for (i, tau) in [(7, 0.6 * SQRT_TAU), (8, 0.6 * SQRT_TAU * (-18.0f64 / 13.0).exp())] {
-        let a = 1.0 - (-tau).exp();
-        let expected = [0.2 * a, 0.5 * a, 2.0 * a, a];
-        assert!((0..4).all(|k| (image[i][k] - expected[k]).abs() < 1e-15), "{i}");
-    }
-    // The eye moved and the particle with it: the same picture. Up on the image is up in the scene.
-    let mut moved = view(5, 3);
-    moved.pose.position = DVec3::X;
-    let raised = Blob { position: blob.position + DVec3::X + DVec3::Y, ..blob };
-    let image = render(&moved, &[raised], &[color], &[0]);
-    assert!(image[2][3] > image[12][3]);
-    assert!((alpha(blob.deepest()) + (-0.6 * SQRT_TAU).exp_m1()).abs() < 1e-15);
-}
-
-#[test]
-fn what_is_behind_near_or_absent_is_not_drawn() {
-    let zeros = vec![[0.0; 4]; 15];
-    let at = |z| Blob { aspect: 1.0, position: DVec3::Z * z, sigma: 1.0, kappa: 0.6 };
-    for z in [3.0, 0.0, -0.0999, f64::NAN] {
-        assert_eq!(render(&view(5, 3), &[at(z)], &[DVec3::ONE], &[0]), zeros);
-    }
-    assert_eq!(render(&view(5, 3), &[], &[], &[]), zeros);
-    assert_ne!(render(&view(5, 3), &[at(-0.1)], &[DVec3::ONE], &[0]), zeros);
-    // Beyond three σ nothing: b = 3·(4/5·5/3)/√(1 + 16/9) = 2.4 at column 4.
-    let image = render(&view(5, 3), &[Blob { sigma: 0.79, ..at(-3.0) }], &[DVec3::ONE], &[0]);
-    assert_eq!(image[9], [0.0; 4]);
-    assert!(
-        render(&view(5, 3), &[Blob { sigma: 0.81, ..at(-3.0) }], &[DVec3::ONE], &[0])[9][3] > 0.0
-    );
-}
-
-#[test]
-fn equal_colors_hide_the_order_and_equal_layers_multiply() {
-    let (blobs, _) = scattered(60, 0.5);
-    let color = DVec3::new(0.3, 0.6, 0.9);
-    let view = view(24, 16);
-    let forth: Vec<u32> = (0..60).collect();
-    let back: Vec<u32> = (0..60).rev().collect();
-    let a = render(&view, &blobs, &[color; 60], &forth);
-    let b = render(&view, &blobs, &[color; 60], &back);
-    // C = c(1 − T) whatever the order; 60 layers of a few roundings of numbers below 1.
-    for (a, b) in a.iter().zip(&b) {
-        assert!((0..4).all(|k| (a[k] - b[k]).abs() < 1e-13) && (a[2] - 0.9 * a[3]).abs() < 1e-13);
-    }
-    let layer = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.1 };
-    let image = render(&view, &[layer; 7], &[color; 7], &[0, 1, 2, 3, 4, 5, 6]);
-    let one = render(&view, &[layer], &[color], &[0]);
-    assert!(
-        image
-            .iter()
-            .zip(&one)
-            .all(|(n, one)| (n[3] - (1.0 - (1.0 - one[3]).powi(7))).abs() < 1e-14)
-    );
-}
-
-/// The pixel's layers by the definition, without rectangles: α and radiance of every blob, far to
-/// near.
-fn layers(view: &View, blobs: &[Blob], radiance: &[DVec3], i: u32, j: u32) -> Vec<(f64, DVec3)> {
-    let d = view.ray(i, j);
-    let seen =
-        blobs.iter().zip(radiance).filter(|(b, _)| b.position.dot(view.pose.forward) >= view.near);
-    let lines = seen.map(|(blob, l)| (blob.along(blob.position, d), *l));
-    lines
-        .filter(|(line, _)| line.off <= view.cutoff)
-        .map(|(line, l)| (alpha(line.tau()), l))
-        .collect()
-}
-
-#[test]
-fn no_rectangle_is_too_small() {
-    // Many of these reach beside or behind the eye.
-    let (blobs, radiance) = scattered(300, 0.05);
-    let view = view(40, 30);
-    let order: Vec<u32> = (0..300).collect();
-    let image = render(&view, &blobs, &radiance, &order);
-    for (pixel, k) in image.iter().zip(0..) {
-        let composed = layers(&view, &blobs, &radiance, k % 40, k / 40)
-            .iter()
-            .fold((DVec3::ZERO, 0.0), |(c, a), &(alpha, l)| {
-                (alpha * l + (1.0 - alpha) * c, alpha + (1.0 - alpha) * a)
-            });
-        // The same operations in the same order.
-        assert_eq!((DVec3::from_slice(pixel), pixel[3]), composed);
-    }
-}
-
-#[test]
-fn half_float_targets_stay_within_their_bound() {
-    let (blobs, radiance) = scattered(600, 0.5);
-    let view = view(40, 30);
-    let order: Vec<u32> = (0..600).collect();
-    const ALPHA: f64 = 1e-4;
-    let rounding = Rounding::of(FilmFormat::Rgba16f, ALPHA, 0.0);
-    let (image, bounds) = render_with_bound(&view, &blobs, &radiance, &order, &rounding);
-    assert_eq!(image, render(&view, &blobs, &radiance, &order));
-    let mut ratios = Vec::new();
-    for k in 0..1200 {
-        let mut stored = [0.0; 4];
-        for (i, &(alpha, l)) in layers(&view, &blobs, &radiance, k % 40, k / 40).iter().enumerate()
-        {
-            // α off by as much as allowed, its sign by lot.
-            let alpha = alpha * (1.0 + ALPHA * (2.0 * lots(i as u32)[0].round() - 1.0));
-            for (c, s) in stored.iter_mut().zip([l.x, l.y, l.z, 1.0]) {
-                *c = f16::from_f64(alpha * s + (1.0 - alpha) * *c).to_f64();
-            }
-        }
-        for c in 0..4 {
-            let actual = (stored[c] - image[k as usize][c]).abs();
-            assert!(actual <= bounds[k as usize][c], "pixel {k} channel {c}");
-            ratios.push(bounds[k as usize][c] / actual.max(1e-30));
-        }
-    }
-    ratios.sort_by(f64::total_cmp);
-    println!(
-        "half float: bound/actual least {:.2}, median {:.1}",
-        ratios[0],
-        ratios[ratios.len() / 2]
-    );
-    assert!(ratios[ratios.len() / 2] < 1000.0);
-}
-
-#[test]
-fn a_sprites_edge_may_fall_either_way() {
-    // b = 2.4 at column 4 (see above): the cut at 3σ lies 1e-7 inside, then outside.
-    for sigma in [0.8 * (1.0 - 1e-7), 0.8 * (1.0 + 1e-7)] {
-        let blob = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma, kappa: 0.6 };
-        let bound = |edge| {
-            let rounding = Rounding::of(FilmFormat::Rgba32f, 0.0, edge);
-            render_with_bound(&view(5, 3), &[blob], &[DVec3::ONE], &[0], &rounding).1[9][3]
-        };
-        let step = alpha(blob.deepest() * (-0.5 * (2.4 / sigma).powi(2)).exp());
-        assert!(bound(1e-8) < 1e-6 && (bound(1e-6) - step).abs() < 1e-6);
-    }
-    let kappa = box_kappa(&one_box(1, DVec3::ONE, 2.0), Form::Centred, 1.0, 1.0);
-    assert!(kappa > 0.0 && radius(Form::Printed, 2.0, 0.0) == 0.0);
-    assert_eq!(offset(DVec3::ONE, Form::Centred, [0.5; 3]), DVec3::ZERO);
 }

@@ -1,47 +1,51 @@
-//! What a rectangle hides of a cell's parts: model.md §11 "second", *Edges*. Functions that are
-//! positive behind it and within its edges, linear over the cell, as ramps along each part.
+//! Coverage of a cell's parts by a rectangle: model.md §11 "second", *Edges*. Five functions,
+//! linear over the cell, are positive behind the rectangle and within its edges; each acts as a
+//! ramp over a part.
 
 use glam::{DVec2, DVec3};
 
-use super::doubt::Known;
-use super::rims::{OF_UNITS, sides_of};
-use crate::reference::area::visibility::Source;
-use crate::reference::occlude::{IN_PLANE, Rectangle};
+use super::occluder::{OF_UNITS, sides_of};
+use crate::reference::bounded::Bounded;
+use crate::reference::occlude::{IN_PLANE, Rectangle, Source};
 
-/// Of a cell's half axes, half a part's sides.
+/// Half a part's side, in the cell's half axes.
 const HALF_PART: f64 = 0.25;
 
-/// A cell: centre and half axes.
+/// A cell as a rectangle.
 #[derive(Debug, Clone, Copy)]
 pub struct Patch {
+    /// Centre.
     pub q: DVec3,
+    /// Half axis along u.
     pub u: DVec3,
+    /// Half axis along v.
     pub v: DVec3,
 }
 
 impl Patch {
+    /// Returns the point at (s, t).
     pub fn point(&self, at: DVec2) -> DVec3 {
         self.q + at.x * self.u + at.y * self.v
     }
 
-    /// (s, t) of the parts' middles.
+    /// Returns (s, t) of the parts' centres.
     pub fn middles() -> impl Iterator<Item = DVec2> {
         let at = |i: u32| 0.5 * f64::from(i) - 0.75;
         (0..16u32).map(move |i| DVec2::new(at(i % 4), at(i / 4)))
     }
 
-    /// In which quarter of the cell a part lies.
+    /// Returns the quarter of the cell that a part lies in.
     pub fn quarter_of(at: DVec2) -> usize {
         usize::from(at.x > 0.0) + 2 * usize::from(at.y > 0.0)
     }
 
-    /// The quarters' middles.
+    /// Returns the quarters' centres.
     pub fn quarters(&self) -> [DVec3; 4] {
         [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)].map(|at| self.point(at.into()))
     }
 }
 
-/// A function linear over a cell, and what it is known to.
+/// A function linear over a cell, with a bound on its error.
 #[derive(Debug, Clone, Copy)]
 struct Linear {
     at_q: f64,
@@ -50,7 +54,7 @@ struct Linear {
 }
 
 impl Linear {
-    /// The share of the part about `at` where it is positive, with `off` more.
+    /// Returns the share of the part about `at` where the function plus `off` is positive.
     fn share(&self, at: DVec2, off: f64) -> f64 {
         let (f, half) = (self.at_q + self.gain.dot(at) + off, HALF_PART * self.gain.length());
         if half > 0.0 {
@@ -64,44 +68,46 @@ impl Linear {
 /// The plane, and two pairs of opposite edges.
 type Five = [Linear; 5];
 
-/// What a rectangle hides of a cell from where it is seen: by the law, and what rounding may make
-/// of it; none where the eye is in its plane.
+/// The part of a cell that a rectangle hides: the exact side first, then the sides that rounding
+/// may select. `None` stands for a source in the rectangle's plane, which hides nothing.
 #[derive(Debug, Clone)]
-pub struct Edges(Vec<Option<Five>>);
+pub struct Coverage(Vec<Option<Five>>);
 
-impl Edges {
-    /// `slack`: what the distance of a point from a plane is known to.
-    pub fn new(r: &Rectangle, source: Source, patch: &Patch, slack: f64) -> Edges {
+impl Coverage {
+    /// Computes the coverage of `patch` seen from `source`. `slack` bounds the error of a point's
+    /// distance from a plane.
+    pub fn new(r: &Rectangle, source: Source, patch: &Patch, slack: f64) -> Coverage {
         let (side, signs) = sides_of(r, source, slack);
         let of =
             |sign: &f64| (*sign != 0.0).then(|| five(r, source, patch, side.abs(), *sign, slack));
-        Edges(signs.iter().map(of).collect())
+        Coverage(signs.iter().map(of).collect())
     }
 
-    /// Whether it hides anything of any part.
-    pub fn is_nothing(&self) -> bool {
-        Patch::middles().all(|at| self.hidden(at).is_nothing())
+    /// Returns whether no part is hidden.
+    pub fn is_zero(&self) -> bool {
+        Patch::middles().all(|at| self.hidden(at).is_zero())
     }
 
-    /// h of the part about `at`.
-    pub fn hidden(&self, at: DVec2) -> Known {
+    /// Returns h, the hidden share of the part about `at`.
+    pub fn hidden(&self, at: DVec2) -> Bounded {
         let by =
             |five: &Option<Five>, off: f64| five.as_ref().map_or(0.0, |five| share(five, at, off));
         let value = by(&self.0[0], 0.0);
         let least = self.0.iter().map(|f| by(f, -1.0)).fold(value, f64::min);
         let most = self.0.iter().map(|f| by(f, 1.0)).fold(value, f64::max);
-        Known::between(least, value, most)
+        Bounded::between(least, value, most)
     }
 }
 
-/// With `off` slacks more.
+/// Returns the hidden share with `off` times the error added to each function.
 fn share(five: &Five, at: DVec2, off: f64) -> f64 {
     let of = |k: usize| five[k].share(at, off * five[k].slack);
     let pair = |k: usize| (of(k) + of(k + 1) - 1.0).max(0.0);
     of(0) * pair(1) * pair(3)
 }
 
-/// `side` |a|, `sign` that of a.
+/// Computes the five functions; `side` is |a| and `sign` that of a, the source's distance from the
+/// plane.
 fn five(r: &Rectangle, source: Source, patch: &Patch, side: f64, sign: f64, slack: f64) -> Five {
     let to_q = patch.q - r.center;
     let (from, is_near) = match source {
@@ -110,7 +116,7 @@ fn five(r: &Rectangle, source: Source, patch: &Patch, side: f64, sign: f64, slac
     };
     let tolerance = IN_PLANE * to_q.abs().element_sum();
     let depth = |x: DVec3| -sign * r.normal.dot(x);
-    // D |w|² ± X, D's constant |a| counted where `x` is a place and not a step.
+    // D |w|² ± X. D's constant |a| counts if `x` is a place, not a step.
     let edge = |w: DVec3, turn: f64, x: DVec3, place: f64| {
         let e = depth(x);
         (place * side + is_near * e) * w.length_squared()
@@ -120,8 +126,8 @@ fn five(r: &Rectangle, source: Source, patch: &Patch, side: f64, sign: f64, slac
         let gain = DVec2::new(f(patch.u, 0.0), f(patch.v, 0.0));
         Linear { at_q: f(to_q, 1.0), gain, slack }
     };
-    // Sides and lengths along w are known to `slack`, unit ways and their slopes to a few
-    // roundings; half of what the gains are known to is the ramp's.
+    // Sides and lengths along w err by `slack`, unit directions and their slopes by a few
+    // roundings. Half of the gains' error goes into the ramp.
     let size = patch.u.length() + patch.v.length();
     let reach = to_q.length() + 2.0 * size;
     let of_edge = |w: DVec3| {

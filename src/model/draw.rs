@@ -1,0 +1,129 @@
+//! How a scene's particles are drawn.
+
+use super::count::Count;
+use super::cutoff::Cutoff;
+use super::resolution::Resolution;
+use super::sort_bits::SortBits;
+
+/// Pipeline that draws the particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DrawPath {
+    /// Quads through the graphics pipeline.
+    Sprites,
+    /// Tiles of pixels in compute.
+    Tiles,
+    /// The faster one at the scene's first frame.
+    Auto,
+}
+
+impl DrawPath {
+    /// Names in scene files.
+    pub const NAMES: [(&'static str, DrawPath); 3] =
+        [("sprites", DrawPath::Sprites), ("tiles", DrawPath::Tiles), ("auto", DrawPath::Auto)];
+}
+
+/// Whether distant particles are drawn from an impostor picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Impostors {
+    /// Every particle is drawn in every frame.
+    Off,
+    /// Distant particles are drawn once and reused while the error stays small.
+    On,
+    /// The faster one over the scene's first frames.
+    Auto,
+}
+
+impl Impostors {
+    /// Names in scene files.
+    pub const NAMES: [(&'static str, Impostors); 3] =
+        [("off", Impostors::Off), ("on", Impostors::On), ("auto", Impostors::Auto)];
+}
+
+/// Whether particles that no pixel shows are left out before the sort. The picture is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cull {
+    /// All particles are sorted and drawn.
+    Off,
+    /// Particles that no pixel shows are left out.
+    On,
+    /// The faster one at the scene's first frame.
+    Auto,
+}
+
+impl Cull {
+    /// Names in scene files.
+    pub const NAMES: [(&'static str, Cull); 3] =
+        [("on", Cull::On), ("off", Cull::Off), ("auto", Cull::Auto)];
+}
+
+/// Greatest number of chunks that sprites are drawn in.
+pub const MAX_CHUNKS: u32 = 256;
+
+/// Order in which sprites are drawn, and whether opaque pixels are skipped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Chunks {
+    /// This many chunks, near to far, skipping pixels that are opaque after each chunk; 0 draws far
+    /// to near without skipping.
+    Of(u32),
+    /// The fastest one at the scene's first frame.
+    Auto,
+}
+
+/// Drawing settings of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Draw {
+    /// Pipeline that draws the particles.
+    pub path: DrawPath,
+    /// Whether distant particles are drawn from impostors.
+    pub impostors: Impostors,
+    /// Greatest predicted error of an impostor, pixels.
+    pub impostor_error: f64,
+    /// Resolution of the picture that the particles are drawn into.
+    pub resolution: Resolution,
+    /// Greatest root mean square change of the picture by all settings that "auto" chooses
+    /// together.
+    pub error: f64,
+    /// Chunks of the path "sprites".
+    pub chunks: Chunks,
+    /// Radius at which sprites end, σ.
+    pub cutoff: f64,
+    /// Optical depth below which sprites end.
+    pub threshold: Cutoff,
+    /// Whether particles that no pixel shows are left out.
+    pub cull: Cull,
+    /// Width in pixels of σ below which particles are left out. It needs culling.
+    pub smallest: Cutoff,
+    /// Width of the sort keys.
+    pub sort_bits: SortBits,
+    /// Law of the number of drawn particles; `None` draws all.
+    pub count: Option<Count>,
+    /// Seed of the texture pool.
+    pub texture_seed: u32,
+    /// Number of particles of all clouds made from boxes together; 0 takes the files' numbers.
+    pub n_particles: u32,
+}
+
+impl Draw {
+    /// Returns the settings with every "auto" replaced by the choice that changes nothing.
+    pub fn exact(self) -> Draw {
+        let least = |l: Cutoff| Cutoff::At(l.bound());
+        Draw {
+            path: if self.path == DrawPath::Auto { DrawPath::Sprites } else { self.path },
+            chunks: if self.chunks == Chunks::Auto { Chunks::Of(0) } else { self.chunks },
+            cull: if self.cull == Cull::Auto { Cull::On } else { self.cull },
+            threshold: least(self.threshold),
+            smallest: least(self.smallest),
+            resolution: if self.resolution == Resolution::Auto {
+                Resolution::Full
+            } else {
+                self.resolution
+            },
+            impostors: if self.impostors == Impostors::Auto {
+                Impostors::Off
+            } else {
+                self.impostors
+            },
+            ..self
+        }
+    }
+}

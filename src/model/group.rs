@@ -1,0 +1,87 @@
+//! Groups of particles that share an origin.
+
+use glam::DVec3;
+
+/// A run of consecutive particles that share an origin: a box, or a whole particle list. Positions
+/// relative to that origin keep their accuracy in f32 wherever the origin lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Group {
+    /// Index of the cloud.
+    pub i_cloud: usize,
+    /// Index of the first particle.
+    pub i_first: u32,
+    /// Number of particles.
+    pub n_particles: u32,
+    /// Origin of the group's positions, relative to the cloud's.
+    pub center: DVec3,
+    /// Centre of the cloud's growth, relative to its origin.
+    pub cloud_center: DVec3,
+    /// Point that its facets face away from, relative to the cloud's origin.
+    pub facing_from: DVec3,
+    /// Lengths over those at time 0; 1 unless returned by [`Group::grown`].
+    pub scale: f64,
+    /// Bound on positions: they lie within center ± half_extent.
+    pub half_extent: DVec3,
+    /// Bound on σ along x and z.
+    pub sigma_max: f64,
+    /// Bound on σ along y.
+    pub sigma_y_max: f64,
+    /// Mean σ along x and z.
+    pub sigma_mean: f64,
+    /// Least, mean and greatest aspect: σ along y over σ along x and z.
+    pub aspects: [f64; 3],
+    /// Greatest peak extinction.
+    pub kappa_max: f64,
+    /// Greatest mass κ (2π)^{3/2} σ² σ_y of a blob.
+    pub mass_max: f64,
+    /// Greatest displacement by the cloud's gusts.
+    pub gust_reach: f64,
+}
+
+impl Group {
+    /// Returns a bound on σ along every axis.
+    pub fn sigma_bounds(&self) -> DVec3 {
+        DVec3::new(self.sigma_max, self.sigma_y_max, self.sigma_max)
+    }
+
+    /// Returns a bound on σ in every direction.
+    pub fn sigma_widest(&self) -> f64 {
+        self.sigma_bounds().max_element()
+    }
+
+    /// Returns whether some blob is not a ball.
+    pub fn has_ellipsoids(&self) -> bool {
+        self.n_particles > 0 && self.aspects != [1.0; 3]
+    }
+
+    /// Returns the group when its cloud has grown to `scale`. Every place x moves to c + s (x − c),
+    /// c the cloud's centre; lengths grow by s, κ is the same. At scale 1 the group is unchanged to
+    /// the bit.
+    pub fn grown(&self, scale: f64) -> Group {
+        if scale == 1.0 {
+            return *self;
+        }
+        Group {
+            center: self.cloud_center + scale * (self.center - self.cloud_center),
+            scale,
+            half_extent: scale * self.half_extent,
+            sigma_max: scale * self.sigma_max,
+            sigma_y_max: scale * self.sigma_y_max,
+            sigma_mean: scale * self.sigma_mean,
+            mass_max: scale.powi(3) * self.mass_max,
+            ..*self
+        }
+    }
+}
+
+/// Divides n places into `n_runs` (at most `n`) runs [first, end): [⌊g n/G⌋, ⌊(g+1) n/G⌋).
+pub fn runs(n: u64, n_runs: u64) -> impl Iterator<Item = (u64, u64)> {
+    // The product fits u64, since both counts fit u32.
+    let bound = move |g: u64| g * n / n_runs;
+    (0..n_runs).map(move |g| (bound(g), bound(g + 1)))
+}
+
+/// Returns a bound on the mass of every blob of `groups`.
+pub fn max_blob_mass(groups: &[Group]) -> f64 {
+    groups.iter().filter(|g| g.n_particles > 0).map(|g| g.mass_max).fold(0.0, f64::max)
+}

@@ -1,0 +1,84 @@
+//! Settings of a scene's lighting.
+
+use super::basis::Sampling;
+use super::sums::Sums;
+
+/// Reflections that are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LightingMode {
+    /// None: particles show their own colours.
+    None,
+    /// The first reflection, C (15).
+    First,
+    /// The first and the second reflection, C (15) and (16).
+    TwoReflection,
+}
+
+impl LightingMode {
+    /// Names in scene files.
+    pub const NAMES: [(&'static str, LightingMode); 3] = [
+        ("none", LightingMode::None),
+        ("first", LightingMode::First),
+        ("two-reflection", LightingMode::TwoReflection),
+    ];
+}
+
+/// Method of the second reflection's gather.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Gather {
+    /// The faster one at the scene's number of facets.
+    Auto,
+    /// Every pair of facets.
+    Exact,
+    /// Clusters of facets, opened where they are large compared with their distance.
+    Tree,
+}
+
+impl Gather {
+    /// Names in scene files.
+    pub const NAMES: [(&'static str, Gather); 3] =
+        [("auto", Gather::Auto), ("exact", Gather::Exact), ("tree", Gather::Tree)];
+}
+
+/// Lighting settings of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lighting {
+    /// Reflections that are computed.
+    pub mode: LightingMode,
+    /// Number of cells along the density grid's longest axis.
+    pub grid: u32,
+    /// March step toward a light, in cells.
+    pub step: f64,
+    /// g: share of τ that light passes by scattering forward.
+    pub forward: f64,
+    /// N_b: number of bases, the diffuse one included (model.md §6).
+    pub bases: u32,
+    /// Spacing of the lobes that the basis is made from.
+    pub sampling: Sampling,
+    /// Range of n_s that the basis is made for.
+    pub exponents: [f64; 2],
+    /// Method of the second reflection's gather.
+    pub gather: Gather,
+    /// θ: radius over distance above which clusters are opened.
+    pub theta: f64,
+    /// Greatest number of facets of a cloud; `None` makes one facet a particle.
+    pub facets_per_cloud: Option<u32>,
+    /// Accuracy of pairs of facets.
+    pub pairs: Pairs,
+    /// Formation of long sums.
+    pub sums: Sums,
+}
+
+/// Greatest number of divisions of an emitter: it is 2¹⁶ times smaller then.
+pub const MAX_PAIR_LEVELS: u32 = 16;
+
+/// Accuracy with which a pair of facets is evaluated (model.md §7).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pairs {
+    /// pair_size: an emitter is quartered while it is wider than this share of its distance.
+    pub size: f64,
+    /// Greatest number of divisions of an emitter.
+    pub levels: u32,
+    /// Greatest number of steps of the march through the density grid between two facets.
+    pub steps: u32,
+}

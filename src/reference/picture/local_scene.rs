@@ -1,0 +1,63 @@
+//! A scene's solids and lights at one time, relative to the lighting origin.
+
+use glam::DVec3;
+
+use crate::model::light::Light;
+use crate::model::material::Brdf;
+use crate::model::scene::Scene;
+use crate::model::surface::Surface;
+use crate::reference::area::DiscFacet;
+use crate::reference::facets::Facet;
+use crate::reference::terrain;
+
+/// Surfaces, ground, lights and materials at one time; positions relative to the lighting origin.
+#[derive(Debug, Clone)]
+pub(super) struct LocalScene {
+    /// Surfaces.
+    pub surfaces: Vec<Surface>,
+    /// Lights.
+    pub lights: Vec<Light>,
+    /// Material of every region: surfaces, ground, clouds.
+    brdfs: Vec<Brdf>,
+    /// Facets of the ground, one a point.
+    pub ground: Vec<Facet>,
+}
+
+impl LocalScene {
+    /// Collects the solids and lights of `scene` relative to `origin`.
+    pub fn new(scene: &Scene, origin: DVec3, time_s: f64) -> LocalScene {
+        let terrains = scene.terrains.iter().zip(scene.surfaces.len() as u32..);
+        let brdf = |i: usize| scene.region_material(i).at(time_s);
+        LocalScene {
+            surfaces: surfaces(scene, origin),
+            lights: scene.lights.iter().map(|l| l.relative_to(origin)).collect(),
+            brdfs: (0..scene.n_regions()).map(brdf).collect(),
+            ground: terrains.flat_map(|(t, region)| terrain::facets(t, origin, region)).collect(),
+        }
+    }
+
+    /// Materials of the surfaces.
+    pub fn surface_brdfs(&self) -> &[Brdf] {
+        &self.brdfs[..self.surfaces.len()]
+    }
+
+    /// K_d of every region.
+    pub fn kd(&self) -> Vec<DVec3> {
+        self.brdfs.iter().map(|brdf| brdf.kd).collect()
+    }
+
+    /// Returns `facet` of a particle or of the ground as the area reference takes it.
+    pub fn disc(&self, facet: &Facet, color: DVec3) -> DiscFacet {
+        DiscFacet {
+            position: facet.position,
+            normal: facet.normal,
+            area: facet.area,
+            kd: self.brdfs[facet.region as usize].kd * color,
+        }
+    }
+}
+
+/// Returns the scene's surfaces relative to `origin`.
+pub(super) fn surfaces(scene: &Scene, origin: DVec3) -> Vec<Surface> {
+    scene.surfaces.iter().map(|s| Surface { center: s.center - origin, ..*s }).collect()
+}

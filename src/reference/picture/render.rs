@@ -1,0 +1,127 @@
+//! Reference pictures through the centres of their pixels.
+
+use std::sync::OnceLock;
+use std::time::Instant;
+
+use super::background::{opaque_pixels, view};
+use super::frame::FrameReference;
+use super::kind::ReferenceKind;
+use super::pixels::Pixels;
+use super::progress::{OnProgress, RenderStage};
+use super::renderer::{check_scene, with_renderer};
+use super::scene_light::{BlobModel, PixelSample, brightest, render_lit_scene};
+use super::sprites::{drawn_blobs, textures};
+use crate::error::Result;
+use crate::model::scene::Scene;
+use crate::reference::sprites::Factor;
+use crate::reference::threshold::{self, Omitted};
+
+/// A reference picture at some pixels, with an estimate of its own error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reference {
+    /// Premultiplied linear RGBA, in the order of the pixels.
+    pub rgba: Vec<[f64; 4]>,
+    /// Root mean square of the pixels' error estimates.
+    pub own_error: f64,
+    /// Description of that estimate.
+    pub accuracy: String,
+    /// Time to compute the picture.
+    pub seconds: f64,
+    /// The part of that time that grows with the number of pixels.
+    pub pixels_s: f64,
+}
+
+impl ReferenceKind {
+    /// Draws `scene` at `time_s` through the centres of `pixels`, without the approximations of
+    /// its drawing.
+    ///
+    /// # Errors
+    /// This reference cannot draw the scene ([`ReferenceKind::check`]), or the frame cannot be
+    /// computed.
+    pub fn render(
+        self,
+        scene: &Scene,
+        time_s: f64,
+        pixels: &Pixels,
+        on_progress: OnProgress,
+    ) -> Result<Reference> {
+        let begin = Instant::now();
+        self.check(scene, time_s)?;
+        let scene = &ReferenceKind::without_approximations(scene);
+        let drawing_since = OnceLock::new();
+        let on_progress: OnProgress = &|stage, n| {
+            if stage == RenderStage::Drawing {
+                drawing_since.get_or_init(Instant::now);
+            }
+            on_progress(stage, n);
+        };
+        let drawn = with_renderer(self, (scene, time_s), pixels, on_progress, |render| {
+            Ok(render(PixelSample::CENTER))
+        })?;
+        Ok(Reference {
+            own_error: drawn.own_error(),
+            rgba: drawn.rgba,
+            accuracy: self.accuracy_text(scene, 1),
+            seconds: begin.elapsed().as_secs_f64(),
+            pixels_s: drawing_since.get().map_or(0.0, |since| since.elapsed().as_secs_f64()),
+        })
+    }
+}
+
+/// A whole picture drawn in f64 with the scene's own drawing settings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrawnPicture {
+    /// Premultiplied linear RGBA, row 0 at the top.
+    pub rgba: Vec<[f64; 4]>,
+    /// Greatest error estimate of a pixel's radiance; `None` for thin sprites, whose only error
+    /// is rounding.
+    pub error: Option<f64>,
+    /// Greatest magnitude of a particle's radiance, which the error is compared with.
+    pub brightest: f64,
+    /// Number of particles drawn, in view or not.
+    pub n_particles: usize,
+    /// The most that `draw.threshold` and `draw.smallest` omit from a pixel; nothing for the
+    /// volume.
+    pub omitted: Omitted,
+}
+
+/// Draws the scene at `time_s` in f64 with its own drawing settings and in its own light.
+///
+/// # Errors
+/// The references cannot draw the scene, or the frame cannot be computed.
+pub fn drawn_as_set(
+    scene: &Scene,
+    time_s: f64,
+    model: BlobModel,
+    on_progress: OnProgress,
+) -> Result<DrawnPicture> {
+    check_scene(scene, time_s, model)?;
+    let on_facet = |n| on_progress(RenderStage::Lighting, n);
+    let mut frame = FrameReference::with_progress(scene, time_s, &on_facet)?;
+    // The error of the light is not an error of the drawing.
+    frame.second_error.clear();
+    let pixels = Pixels::all(scene.film.width, scene.film.height);
+    let drawn = render_lit_scene(scene, &frame, model, &pixels, PixelSample::CENTER, on_progress);
+    let picture = DrawnPicture {
+        rgba: drawn.rgba,
+        error: None,
+        brightest: brightest(&frame.particle_radiance(scene)),
+        n_particles: frame.blobs.len(),
+        omitted: Omitted::default(),
+    };
+    if model == BlobModel::Volume {
+        let greatest = drawn.errors.iter().map(|e| e.total()).fold(0.0, f64::max);
+        return Ok(DrawnPicture { error: Some(greatest), ..picture });
+    }
+    let view = view(scene, &frame);
+    let (blobs, order) = drawn_blobs(scene, &frame);
+    let textured = textures(scene, &frame, &view);
+    let of = |j: usize, delta| {
+        textured.as_ref().map_or(1.0, |(pool, splats)| splats[j].factor(pool, delta))
+    };
+    let factor: Option<Factor> = if textured.is_some() { Some(&of) } else { None };
+    let opaque = opaque_pixels(scene, &frame, &view, &pixels);
+    let omitted = threshold::omitted(&view, &opaque, &blobs, factor);
+    let omitted = omitted.into_iter().fold(Omitted::default(), Omitted::most);
+    Ok(DrawnPicture { n_particles: order.len(), omitted, ..picture })
+}

@@ -1,0 +1,142 @@
+//! Light computed once and drawn sample by sample, for every kind of reference.
+
+use glam::DVec3;
+
+use super::frame::FrameReference;
+use super::kind::{ReferenceKind, n_reflections};
+use super::model_light::{ModelLight, ModelScene, RadianceEstimate};
+use super::model_picture::ModelPicture;
+use super::pixels::Pixels;
+use super::progress::{OnProgress, RenderStage};
+use super::scene_light::{BlobModel, PixelSample, RenderedPixels, render_lit_scene};
+use crate::error::{Error, Result};
+use crate::model::scene::{LightingMode, Scene};
+
+impl ReferenceKind {
+    /// Checks that this reference can draw `scene`.
+    ///
+    /// # Errors
+    /// The scene has textures or glossy clouds that the reference does not compute, or reflections
+    /// are asked for where nothing is lit.
+    pub fn check(self, scene: &Scene, time_s: f64) -> Result<()> {
+        check_scene(scene, time_s, self.blob_model())?;
+        if matches!(self, ReferenceKind::Reflections(_))
+            && scene.lighting.mode == LightingMode::None
+        {
+            return Err(Error::usage(format!(
+                "{self}: nothing reflects where lighting.mode is \"none\"; expected thin, \
+                 volume or model"
+            )));
+        }
+        Ok(())
+    }
+
+    /// Returns how this reference composes blobs.
+    fn blob_model(self) -> BlobModel {
+        if self == ReferenceKind::Thin { BlobModel::Thin } else { BlobModel::Volume }
+    }
+}
+
+/// Checks that the references can draw `scene` with that blob model.
+pub(super) fn check_scene(scene: &Scene, time_s: f64, model: BlobModel) -> Result<()> {
+    let textured = scene.clouds.iter().position(|c| !c.texture.is_none());
+    if let Some(i) = textured.filter(|_| model == BlobModel::Volume) {
+        return Err(Error::usage(format!(
+            "cloud {i} is textured, and the volume reference has plain blobs only; expected --set \
+             'cloud.{i}.texture=\"none\"'"
+        )));
+    }
+    if scene.lighting.mode == LightingMode::None {
+        return Ok(());
+    }
+    for (i, cloud) in scene.clouds.iter().enumerate().filter(|(_, c)| c.n_particles() > 0) {
+        let material = &scene.materials[cloud.i_material];
+        if material.at(time_s).ks != DVec3::ZERO {
+            return Err(Error::usage(format!(
+                "cloud {i}: its material \"{}\" has a lobe, and the f64 reference has diffuse \
+                 clouds only; expected ks = [0, 0, 0]",
+                material.name
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Computes the light of `kind` once, then calls `draw` with a function that renders one sample.
+///
+/// # Errors
+/// The frame cannot be computed, or `draw` fails.
+pub(super) fn with_renderer<T>(
+    kind: ReferenceKind,
+    (scene, time_s): (&Scene, f64),
+    pixels: &Pixels,
+    on_progress: OnProgress,
+    draw: impl FnOnce(&mut dyn FnMut(PixelSample) -> RenderedPixels) -> Result<T>,
+) -> Result<T> {
+    let is_model = matches!(kind, ReferenceKind::Model | ReferenceKind::Reflections(_));
+    if is_model && scene.lighting.mode != LightingMode::None {
+        let n = if let ReferenceKind::Reflections(k) = kind { k } else { n_reflections(scene) };
+        let how = ModelDrawing { n_reflections: n, by_facet: false };
+        return with_model(how, (scene, time_s), pixels, on_progress, draw);
+    }
+    let frame = if is_model {
+        FrameReference::unlit(scene, time_s)?
+    } else {
+        let on_facet = |n| on_progress(RenderStage::Lighting, n);
+        FrameReference::with_progress(scene, time_s, &on_facet)?
+    };
+    let model = kind.blob_model();
+    draw(&mut |sample| render_lit_scene(scene, &frame, model, pixels, sample, on_progress))
+}
+
+/// How a picture in the model's own light is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ModelDrawing {
+    /// Number of reflections.
+    pub n_reflections: u32,
+    /// Lights surfaces at their facets and interpolates, instead of at every pixel.
+    pub by_facet: bool,
+}
+
+fn with_model<T>(
+    how: ModelDrawing,
+    (scene, time_s): (&Scene, f64),
+    pixels: &Pixels,
+    on_progress: OnProgress,
+    draw: impl FnOnce(&mut dyn FnMut(PixelSample) -> RenderedPixels) -> Result<T>,
+) -> Result<T> {
+    let frame = FrameReference::unlit(scene, time_s)?;
+    let model = ModelScene::new(scene, &frame);
+    let light = ModelLight::new(scene, &model, &frame, how.n_reflections);
+    let is_random = light.is_random();
+    let picture = ModelPicture {
+        scene,
+        frame: &frame,
+        model: &model,
+        light,
+        by_facet: how.by_facet,
+        pixels,
+        on_progress,
+    };
+    let mut discs: Option<Vec<RadianceEstimate>> = None;
+    draw(&mut |sample| {
+        let lit = discs.take().filter(|_| !is_random).unwrap_or_else(|| picture.discs(sample.i));
+        let drawn = picture.draw(&lit, sample);
+        discs = Some(lit);
+        drawn
+    })
+}
+
+/// Draws a lit scene in the model's own light, through the centres of `pixels`.
+///
+/// # Errors
+/// The camera has no direction at that time, or an animation cannot be read.
+pub fn render_model(
+    how: ModelDrawing,
+    scene: &Scene,
+    time_s: f64,
+    pixels: &Pixels,
+    on_progress: OnProgress,
+) -> Result<RenderedPixels> {
+    with_model(how, (scene, time_s), pixels, on_progress, |render| Ok(render(PixelSample::CENTER)))
+}

@@ -1,0 +1,71 @@
+//! A scene's particles as sprites: which are drawn, in which order, with which textures.
+
+use glam::DVec3;
+
+use super::frame::FrameReference;
+use crate::model::cloud::Group;
+use crate::model::count::MIN_DRAWN;
+use crate::model::scene::Scene;
+use crate::reference::texture::{Pool, SplatTexture, Textured};
+use crate::reference::view::View;
+use crate::reference::{Blob, count, place, sort};
+
+/// Returns the texture pool and every particle's part of it; `None` if no cloud is textured.
+pub(super) fn textures(
+    scene: &Scene,
+    frame: &FrameReference,
+    view: &View,
+) -> Option<(Pool, Vec<SplatTexture>)> {
+    if !scene.is_textured() {
+        return None;
+    }
+    let of_box = |(g, i_box): (&Group, u32)| {
+        let cloud = &scene.clouds[g.i_cloud];
+        let (i_field, strength) = cloud.texture.of_box(i_box);
+        let of = Textured { i_field, strength, seed: cloud.seed, i_box };
+        let first = g.i_first as usize;
+        let blobs = &frame.blobs[first..first + g.n_particles as usize];
+        let splat = |(b, i): (&Blob, u32)| {
+            let z = (b.position - view.pose.position).dot(view.pose.forward);
+            SplatTexture::new(&of, i, z / b.sigma, view.pixel())
+        };
+        blobs.iter().zip(0u32..).map(splat).collect::<Vec<SplatTexture>>()
+    };
+    let boxes = frame.groups.chunk_by(|a, b| a.i_cloud == b.i_cloud);
+    let splats = boxes.flat_map(|boxes| boxes.iter().zip(0u32..).flat_map(of_box)).collect();
+    // The device stores the pool in 16 bits.
+    Some((Pool::new(scene.draw.texture_seed).rounded(), splats))
+}
+
+/// Returns the blobs with κ scaled by the count law, and the order that the drawn ones are drawn
+/// in: far to near by exact view depth, ties by index.
+pub(super) fn drawn_blobs(scene: &Scene, frame: &FrameReference) -> (Vec<Blob>, Vec<u32>) {
+    let weights = weights(scene, frame);
+    let weighed = |(b, w): (&Blob, &f64)| Blob { kappa: b.kappa * w, ..*b };
+    let blobs: Vec<Blob> = frame.blobs.iter().zip(&weights).map(weighed).collect();
+    let positions: Vec<DVec3> = blobs.iter().map(|b| b.position).collect();
+    let depths = sort::depths(frame.state.pose.forward, &positions);
+    let mut order: Vec<u32> =
+        (0..blobs.len() as u32).filter(|&i| weights[i as usize] > 0.0).collect();
+    order.sort_by(|&i, &j| depths[j as usize].total_cmp(&depths[i as usize]));
+    (blobs, order)
+}
+
+/// Factor on every particle's κ, model.md §3.
+fn weights(scene: &Scene, frame: &FrameReference) -> Vec<f64> {
+    let Some(rule) = scene.draw.count else { return vec![1.0; frame.blobs.len()] };
+    let (state, clouds) = (&frame.state, &scene.clouds);
+    let centers = place::cloud_centers(clouds, state.time_s, DVec3::ZERO);
+    let share = |(cloud, center): (_, &DVec3)| {
+        let distance = (state.pose.position - *center).length();
+        let scale = place::scale(cloud, state.time_s);
+        count::printed(distance / rule.d0, scale, rule.a, rule.normalised)
+    };
+    let shares: Vec<f64> = clouds.iter().zip(&centers).map(share).collect();
+    let of_group = |g: &Group| {
+        let (n, share) = (g.n_particles, shares[g.i_cloud].min(1.0));
+        let is_drawn = f64::from(n) * share >= MIN_DRAWN;
+        if is_drawn { count::weights(n, share, rule.conserve) } else { vec![0.0; n as usize] }
+    };
+    frame.groups.iter().flat_map(of_group).collect()
+}

@@ -1,5 +1,5 @@
-//! A virtual display, and hands on its windows: Xvfb and xdotool, which `tools/bootstrap tests`
-//! installs. Missing ones fail.
+//! A virtual display with its keyboard and mouse: Xvfb and xdotool, which `tools/bootstrap tests`
+//! installs. A test fails where they are missing.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -7,6 +7,16 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+/// Waits until `condition` holds. Fails after a minute without it.
+pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !condition() {
+        assert!(begin.elapsed() < Duration::from_secs(60), "no {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// An X server of its own.
 pub struct Display {
     server: Child,
     name: String,
@@ -20,11 +30,11 @@ impl Drop for Display {
 }
 
 impl Display {
-    /// Of its own, on a number that is free.
+    /// Starts a server on a free display number.
     pub fn open() -> Display {
         let mut server = Command::new("Xvfb")
-            // A server that loses its last client begins anew, and whoever comes at that moment is
-            // lost: xdotool comes and goes.
+            // By default the server resets when its last client leaves. xdotool is a new client for
+            // each command, and a client that connects during a reset is lost.
             .args([
                 "-displayfd",
                 "1",
@@ -49,48 +59,43 @@ impl Display {
         &self.name
     }
 
-    /// What xdotool answers.
+    /// Runs xdotool. Returns its output where it succeeds.
     pub fn xdotool(&self, args: &[&str]) -> Option<String> {
         let output = Command::new("xdotool").args(args).env("DISPLAY", &self.name).output();
         let output = output.expect("xdotool: tools/bootstrap tests installs it");
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     }
 
-    /// The window of a process, as soon as it has one.
+    /// Waits for the window of a process, and gives it the keyboard.
     pub fn window_of(&self, pid: u32) -> String {
-        let begin = Instant::now();
-        loop {
+        let mut window = None;
+        wait_for("window", || {
             let found = self.xdotool(&["search", "--onlyvisible", "--pid", &pid.to_string()]);
-            if let Some(window) = found.and_then(|all| all.lines().next().map(str::to_owned)) {
-                return window;
-            }
-            assert!(begin.elapsed() < Duration::from_secs(60), "no window");
-            std::thread::sleep(Duration::from_millis(50));
-        }
+            window = found.and_then(|all| all.lines().next().map(str::to_owned));
+            window.is_some()
+        });
+        let window = window.expect("found");
+        self.xdotool(&["windowfocus", "--sync", &window]).expect("the focus");
+        window
     }
 
-    /// Keys go to it from now on.
-    pub fn focus(&self, window: &str) {
-        self.xdotool(&["windowfocus", "--sync", window]).expect("the focus");
-        // The window is still to hear of it.
-        std::thread::sleep(Duration::from_millis(500));
-    }
-
+    /// Presses and releases a key.
     pub fn key(&self, name: &str) {
         self.xdotool(&["key", "--delay", "30", name]).expect("a key");
     }
 
-    /// Characters, one after the other.
+    /// Types characters, one after the other.
     pub fn types(&self, text: &str) {
         self.xdotool(&["type", "--delay", "30", "--", text]).expect("text");
     }
 
+    /// Returns the title of a window.
     pub fn title(&self, window: &str) -> String {
         self.xdotool(&["getwindowname", window]).unwrap_or_default()
     }
 
-    /// What is seen of a window: columns, rows, and a red, a green and a blue byte a pixel.
-    pub fn seen(&self, window: &str) -> (u32, u32, Vec<u8>) {
+    /// Returns width, height and RGB bytes of a window's content.
+    pub fn pixels(&self, window: &str) -> (u32, u32, Vec<u8>) {
         use x11rb::connection::Connection;
         use x11rb::protocol::xproto::{ConnectionExt, ImageFormat};
         let (connection, _) = x11rb::connect(Some(&self.name)).expect("the display");
@@ -100,7 +105,7 @@ impl Display {
         let image = connection
             .get_image(ImageFormat::Z_PIXMAP, id, 0, 0, width, height, !0)
             .expect("asked");
-        let data = image.reply().expect("what is seen").data;
+        let data = image.reply().expect("the content").data;
         assert_eq!(
             connection.setup().image_byte_order,
             x11rb::protocol::xproto::ImageOrder::LSB_FIRST
@@ -109,12 +114,13 @@ impl Display {
         (u32::from(width), u32::from(height), rgb)
     }
 
+    /// Sets the size of a window, in pixels.
     pub fn resize(&self, window: &str, [width, height]: [u32; 2]) {
         self.xdotool(&["windowsize", window, &width.to_string(), &height.to_string()])
             .expect("a size");
     }
 
-    /// From a place in the window to another with a button held.
+    /// Moves the pointer between two places of the window with a button held.
     pub fn drag(&self, window: &str, button: u32, from: [u32; 2], to: [u32; 2]) {
         let [x, y] = from.map(|v| v.to_string());
         let [to_x, to_y] = to.map(|v| v.to_string());

@@ -17,13 +17,13 @@ use super::snap::Snap;
 use super::viewport::{Viewport, framing};
 use super::{Axis, Editor, numbers};
 use crate::model::camera::Pose;
-use crate::viewer::flight::{Flight, Motion};
+use crate::viewer::fly_camera::{FlyCamera, Motion};
 use hand::Hold;
 
 #[derive(Debug, Clone)]
 pub struct Desk {
     session: Session,
-    flight: Flight,
+    flight: FlyCamera,
     /// What the camera keeps up.
     up: DVec3,
     screen: Screen,
@@ -140,7 +140,7 @@ impl Desk {
     ) -> Desk {
         Desk {
             session,
-            flight: Flight::new(pose, up, target),
+            flight: FlyCamera::new(pose, up, target),
             up: up.normalize_or(DVec3::Y),
             screen,
             metres_per_unit,
@@ -314,7 +314,7 @@ impl Desk {
         let Some((low, high)) = self.editor().bounds() else { return false };
         let (pose, Screen { size_px, fov_y_rad, .. }) = (self.flight.pose(), self.screen);
         let (position, target) = framing(low, high, pose.forward, fov_y_rad, size_px.x / size_px.y);
-        self.flight = Flight::new(&Pose { position, ..pose }, self.up, target);
+        self.flight = FlyCamera::new(&Pose { position, ..pose }, self.up, target);
         true
     }
 
@@ -337,7 +337,7 @@ impl Desk {
         self.session.editor()
     }
 
-    pub fn flight(&self) -> &Flight {
+    pub fn flight(&self) -> &FlyCamera {
         &self.flight
     }
 

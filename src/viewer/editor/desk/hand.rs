@@ -7,7 +7,7 @@ use crate::viewer::editor::action::{Action, DragAction, Modifiers, Select};
 use crate::viewer::editor::handles::Handle;
 use crate::viewer::editor::selection::How;
 use crate::viewer::editor::viewport::{pick_all, pick_rectangle};
-use crate::viewer::flight::Motion;
+use crate::viewer::fly_camera::Motion;
 
 /// What the hand holds.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,4 +1,5 @@
-//! The editor's window: events of the window system to the desk, and what the desk asks for done.
+//! The editor's window: passes events of the window system to the controller, and carries out its
+//! requests.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -8,217 +9,220 @@ use std::time::{Duration, Instant};
 use glam::{DVec2, DVec3};
 use winit::application::ApplicationHandler;
 use winit::dpi::{PhysicalPosition, PhysicalSize};
-use winit::event::{ElementState, KeyEvent, MouseButton, WindowEvent};
+use winit::event::{KeyEvent, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::keyboard::{Key as WinitKey, ModifiersState, NamedKey};
 use winit::window::{Window, WindowId};
 
-use super::panels::{self, Choosing, Shown, Typing};
-use super::render_thread::{Easel, Order, Orders, Told};
+use super::dialogs::FileDialog;
+use super::fields::FieldTexts;
+use super::panel_state::PanelState;
+use super::panels;
+use super::render_thread::{DrawRequests, DrawState, EditRenderer, RenderEvent, RenderLinks};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::box_file;
 use crate::model::camera::Pose;
-use crate::viewer::editor::acceptance::Counted;
-use crate::viewer::editor::desk::{Button, Desk, Held, Input, Screen};
-use crate::viewer::editor::recent::{self, Recent};
-use crate::viewer::editor::scenery::Scenery;
-use crate::viewer::editor::session::{Event, Request, Session, Wish, perform};
-use crate::viewer::editor::shortcuts::{Chord, Key};
-use crate::viewer::editor::state::View;
+use crate::viewer::editor::{
+    BoxAcceptance, Button, Chord, DisplayMode, EditedScene, EditorController, Input, Intent, Key,
+    ModifierKeys, PictureArea, RecentFiles, Request, Session, SessionEvent, default_path, perform,
+};
 use crate::viewer::egui_layer::{EguiLayer, SharedWidgets};
+use crate::viewer::free_path::free_path;
 use crate::viewer::native_window::{RenderThread, event_loop, open_window, wheel_notches};
 
-/// What is edited, and within what.
+/// Options of an editor window.
 pub struct Options {
     pub session: Session,
-    pub scenery: Scenery,
+    pub scene: EditedScene,
     pub choice: DeviceChoice,
-    /// Of the window, in pixels.
+    /// Size of the window in pixels.
     pub size: [u32; 2],
-    /// Whoever sets it closes the window, and nothing is saved.
+    /// Closes the window without saving when set.
     pub stop: &'static AtomicBool,
 }
 
-/// Opens a window and edits until somebody closes it.
+/// Interval between two updates of untouched panels, and between two looks at the stop flag.
+const IDLE_INTERVAL: Duration = Duration::from_millis(250);
+
+/// Opens a window and edits until the user closes it.
+///
+/// # Errors
+/// There is no display, no device can present to it, the device failed, or validation has found a
+/// fault.
 pub fn run(options: Options) -> Result<()> {
-    let events = event_loop::<Told>(
-        "a box file is text that any editor changes, and `nimbus render SCENE -o FILE.png` draws it",
-    )?;
+    let alternative = "a box file is text that any editor changes, and `nimbus render SCENE -o \
+        FILE.png` draws it";
+    let events = event_loop::<RenderEvent>(alternative)?;
     let mut app = App::new(options, events.create_proxy())?;
     let ran = events.run_app(&mut app).map_err(|e| Error::vulkan("window", e));
-    app.orders.change(|order| order.quits = true);
-    // The thread ends before the window that it draws into.
-    let drawn = app.thread.take().map(RenderThread::join);
+    app.close();
+    // The render thread ends before the window that it draws into.
+    let rendered = app.thread.take().map(RenderThread::join);
     drop(app.window.take());
     app.rescue();
-    if let Some(error) = app.failed {
+    if let Some(error) = app.failure {
         return Err(error);
     }
     ran?;
-    drawn.unwrap_or(Ok(()))
+    rendered.unwrap_or(Ok(()))
 }
 
 struct App {
-    desk: Desk,
-    scenery: Scenery,
+    controller: EditorController,
+    scene: EditedScene,
     choice: DeviceChoice,
     size: [u32; 2],
     stop: &'static AtomicBool,
-    orders: Arc<Orders>,
-    face: SharedWidgets,
-    proxy: EventLoopProxy<Told>,
+    requests: Arc<DrawRequests>,
+    widgets: SharedWidgets,
+    proxy: EventLoopProxy<RenderEvent>,
     thread: Option<RenderThread<()>>,
     window: Option<Window>,
     layer: Option<EguiLayer>,
-    held: ModifiersState,
-    typing: Typing,
-    choosing: Option<Choosing>,
-    counted: Vec<Counted>,
-    wrong: Option<String>,
-    recent: Recent,
-    failed: Option<Error>,
-    /// By somebody who was asked about what would be lost.
+    modifiers: ModifiersState,
+    texts: FieldTexts,
+    dialog: Option<FileDialog>,
+    acceptances: Vec<BoxAcceptance>,
+    render_failure: Option<String>,
+    recent: RecentFiles,
+    /// Why the window could not open.
+    failure: Option<Error>,
+    /// The user has closed the window, and was asked about unsaved changes.
     is_closed: bool,
 }
 
-/// So often panels are drawn, and Ctrl-C is looked for, while nobody touches anything.
-const STEADY: Duration = Duration::from_millis(250);
-
 impl App {
-    fn new(options: Options, proxy: EventLoopProxy<Told>) -> Result<App> {
-        let Options { session, scenery, choice, size, stop } = options;
+    fn new(options: Options, proxy: EventLoopProxy<RenderEvent>) -> Result<App> {
+        let Options { session, scene, choice, size, stop } = options;
         let document = session.editor().shared_document();
-        let scene = scenery.scene(&document);
-        let camera = &scene.camera;
-        let nowhere = || Error::usage("the scene's camera looks nowhere at its first frame");
-        let pose = camera.pose(scene.time.start_s).ok_or_else(nowhere)?;
-        let target = camera.keys.first().map_or(DVec3::ZERO, |key| key.target);
-        let origin = scenery.origin();
-        let pose = Pose { position: pose.position - origin, ..pose };
-        let picture = panels::picture_of(size, 1.0);
+        let whole = scene.scene(&document);
+        let camera = &whole.camera;
+        let pose = camera.pose(whole.time.start_s).ok_or_else(|| {
+            Error::usage("the scene's camera has no direction at its first frame")
+        })?;
+        let origin = scene.origin();
+        let target = camera.keys.first().map_or(DVec3::ZERO, |key| key.target) - origin;
+        let local = Pose { position: pose.position - origin, ..pose };
+        let picture = panels::picture_size(size, 1.0);
         let [width, height] = picture.map(f64::from);
-        let screen = Screen {
+        let area = PictureArea {
             size_px: DVec2::new(width, height),
             px_per_point: 1.0,
             fov_y_rad: camera.fov_y_rad,
         };
-        let desk = Desk::new(
-            session,
-            (&pose, camera.up, target - origin),
-            screen,
-            scenery.metres_per_unit(),
-        );
-        let pose = Pose { position: pose.position + origin, ..pose };
-        let orders = Orders::new(Order {
+        let view = (&local, camera.up, target);
+        let controller = EditorController::new(session, view, area, scene.metres_per_unit());
+        let requests = DrawRequests::new(DrawState {
             document,
             pose,
             has_cloud: false,
             size,
             picture,
-            n: 0,
-            quits: false,
+            is_closing: false,
+            version: 0,
         });
         Ok(App {
-            desk,
-            scenery,
+            controller,
+            scene,
             choice,
             size,
             stop,
-            orders: Arc::new(orders),
-            face: SharedWidgets::default(),
+            requests: Arc::new(requests),
+            widgets: SharedWidgets::default(),
             proxy,
             thread: None,
             window: None,
             layer: None,
-            held: ModifiersState::empty(),
-            typing: Typing::default(),
-            choosing: None,
-            counted: vec![],
-            wrong: None,
-            recent: recent::default_place()
-                .map_or_else(Recent::default, |place| Recent::load(&place)),
-            failed: None,
+            modifiers: ModifiersState::empty(),
+            texts: FieldTexts::default(),
+            dialog: None,
+            acceptances: vec![],
+            render_failure: None,
+            recent: default_path().map_or_else(RecentFiles::default, |path| RecentFiles::load(&path)),
+            failure: None,
             is_closed: false,
         })
     }
 
-    /// Where the window ends and nobody was asked, by a device that is lost or by Ctrl-C, what was
-    /// not saved is kept beside the file.
+    fn close(&self) {
+        self.requests.change(|state| state.is_closing = true);
+    }
+
+    /// Saves unsaved changes beside the file, where the window has ended without a question: by a
+    /// lost device or by Ctrl-C.
     fn rescue(&self) {
-        let session = self.desk.session();
+        let session = self.controller.session();
         if self.is_closed || !session.is_dirty() {
             return;
         }
         let path = session.path().unwrap_or(Path::new("cloud.dat"));
-        let free = (1..)
-            .map(|n| path.with_extension(format!("unsaved-{n}.dat")))
-            .find(|path| !path.exists());
-        let Some(free) = free else { return };
-        match box_file::write(&free, session.editor().boxes()) {
-            Ok(()) => eprintln!("what was not saved is in {}", free.display()),
-            Err(error) => eprintln!("what was not saved is lost: {error}"),
+        let path = free_path(|n| path.with_extension(format!("unsaved-{n}.dat")));
+        match box_file::write(&path, session.editor().boxes()) {
+            Ok(()) => eprintln!("unsaved changes were written to {}", path.display()),
+            Err(error) => eprintln!("unsaved changes are lost: {error}"),
         }
     }
 
     fn open(&mut self, events: &ActiveEventLoop) -> Result<()> {
         let (window, surface) = open_window(events, "nimbus", self.size, self.choice.validation)?;
         let proxy = self.proxy.clone();
-        let tell = Box::new(move |told| drop(proxy.send_event(told)));
-        let shared = (self.orders.clone(), self.face.clone());
-        let easel =
-            Easel::new(surface, &self.choice, self.scenery.clone(), shared, (tell, self.stop))?;
-        self.layer = Some(EguiLayer::new(&window, self.face.clone(), STEADY, true));
+        let links = RenderLinks {
+            requests: self.requests.clone(),
+            widgets: self.widgets.clone(),
+            // Sending fails only after the event loop has ended, when no event matters any more.
+            send: Box::new(move |event| drop(proxy.send_event(event))),
+            stop: self.stop,
+        };
+        let renderer = EditRenderer::new(surface, &self.choice, self.scene.clone(), links)?;
+        self.layer = Some(EguiLayer::new(&window, self.widgets.clone(), IDLE_INTERVAL, true));
         let proxy = self.proxy.clone();
-        // Whether it went well is asked when the loop of events has ended.
-        self.thread = Some(RenderThread::start(
-            move || easel.run(),
-            move || drop(proxy.send_event(Told::Ended)),
-        )?);
-        let PhysicalSize { width, height } = window.inner_size();
-        let px_per_point = window.scale_factor();
+        let on_end = move || drop(proxy.send_event(RenderEvent::Ended));
+        self.thread = Some(RenderThread::start(move || renderer.run(), on_end)?);
+        let (size, px_per_point) = (window.inner_size(), window.scale_factor());
         self.window = Some(window);
-        self.resize(width, height, px_per_point);
+        self.resize(size, px_per_point);
         Ok(())
     }
 
-    fn resize(&mut self, width: u32, height: u32, px_per_point: f64) {
-        self.size = [width, height];
-        let [width, height] = panels::picture_of(self.size, px_per_point).map(f64::from);
-        let size_px = DVec2::new(width, height);
-        self.take(Input::Resized { size_px, px_per_point });
+    fn resize(&mut self, size: PhysicalSize<u32>, px_per_point: f64) {
+        self.size = size.into();
+        let [width, height] = panels::picture_size(self.size, px_per_point).map(f64::from);
+        self.handle(Input::Resized { size_px: DVec2::new(width, height), px_per_point });
     }
 
-    /// Has the desk take an input, and does what it asks for.
-    fn take(&mut self, input: Input) {
+    /// Passes an input to the controller, and carries out the requests that follow.
+    fn handle(&mut self, input: Input) {
         let mut inputs = vec![input];
         while let Some(input) = inputs.pop() {
-            let turn = self.desk.after(&input);
-            self.desk = turn.desk;
-            inputs.extend(turn.requests.iter().filter_map(|request| self.perform(request)));
+            let requests = self.controller.handle(&input);
+            inputs.extend(requests.iter().filter_map(|request| self.carry_out(request)));
         }
         if let Some(layer) = &mut self.layer {
             layer.request_update();
         }
-        self.order();
+        self.request_draw();
     }
 
-    fn perform(&mut self, request: &Request) -> Option<Input> {
+    fn carry_out(&mut self, request: &Request) -> Option<Input> {
         match request {
-            Request::ChooseToOpen => self.choosing = Some(Choosing::new(false, None)),
+            Request::ChooseToOpen => self.dialog = Some(FileDialog::open()),
             Request::ChooseToSave => {
-                self.choosing = Some(Choosing::new(true, self.desk.session().path()))
+                self.dialog = Some(FileDialog::save(self.controller.session().path()));
             }
-            // The panel asks it.
+            // The panels show the question.
             Request::Ask(_) => {}
             Request::Quit => {
                 self.is_closed = true;
-                self.orders.change(|order| order.quits = true);
+                self.close();
             }
             Request::Open(_) | Request::Save { .. } => {
                 let event = perform(request)?;
-                if let Event::Opened { path, .. } | Event::Saved { path, .. } = &event {
-                    self.remember(path);
+                if let SessionEvent::Opened { path, .. } | SessionEvent::Saved { path, .. } = &event
+                {
+                    self.recent.push(path);
+                    // A list that cannot be saved only loses recent files.
+                    let _ = default_path().map(|place| self.recent.save(&place));
                 }
                 return Some(Input::Event(event));
             }
@@ -226,158 +230,162 @@ impl App {
         None
     }
 
-    fn remember(&mut self, path: &Path) {
-        self.recent.push(path);
-        if let Some(place) = recent::default_place() {
-            // A list that cannot be kept is no reason to stop.
-            let _ = self.recent.save(&place);
-        }
-    }
-
-    /// Tells the drawing thread what is to be seen.
-    fn order(&self) {
-        let pose = self.desk.flight().pose();
-        let pose = Pose { position: pose.position + self.scenery.origin(), ..pose };
-        let (document, size) = (self.desk.editor().shared_document(), self.size);
-        let picture = self.desk.viewport().size_px.to_array().map(|v| v as u32);
-        let has_cloud = self.desk.editor().settings().view != View::Boxes;
-        self.orders.change(|order| {
-            *order = Order { document, pose, has_cloud, size, picture, ..order.clone() }
+    fn request_draw(&self) {
+        let pose = self.controller.camera().pose();
+        let pose = Pose { position: pose.position + self.scene.origin(), ..pose };
+        let editor = self.controller.editor();
+        let (document, size) = (editor.shared_document(), self.size);
+        let picture = self.controller.viewport().size_px.to_array().map(|v| v as u32);
+        let has_cloud = editor.settings().display != DisplayMode::Boxes;
+        self.requests.change(|state| {
+            *state = DrawState { document, pose, has_cloud, size, picture, ..state.clone() };
         });
     }
 
-    fn held(&self) -> Held {
-        Held {
-            ctrl: self.held.control_key() || self.held.super_key(),
-            shift: self.held.shift_key(),
+    fn keys(&self) -> ModifierKeys {
+        ModifierKeys {
+            ctrl: self.modifiers.control_key() || self.modifiers.super_key(),
+            shift: self.modifiers.shift_key(),
         }
     }
 
-    fn pressed(&mut self, event: &KeyEvent) {
-        if event.state != ElementState::Pressed {
-            return;
-        }
+    fn press(&mut self, event: &KeyEvent) {
         if event.logical_key == WinitKey::Named(NamedKey::Enter) {
-            self.typing.wants_focus = true;
-            self.layer.iter_mut().for_each(EguiLayer::request_update);
-            return;
-        }
-        if let Some(key) = key_of(&event.logical_key) {
-            let Held { ctrl, shift } = self.held();
-            self.take(Input::Chord(Chord { key, ctrl, shift, alt: self.held.alt_key() }));
+            self.texts.wants_focus = true;
+            self.update_panels();
+        } else if let Some(key) = key_of(&event.logical_key) {
+            let (ModifierKeys { ctrl, shift }, alt) = (self.keys(), self.modifiers.alt_key());
+            self.handle(Input::Chord(Chord { key, ctrl, shift, alt }));
         }
     }
 
-    fn show_panels(&mut self) {
+    /// Updates the panels, and handles the inputs that follow.
+    fn update_panels(&mut self) {
         let (Some(layer), Some(window)) = (&mut self.layer, &self.window) else { return };
-        if !layer.is_due() {
-            return;
-        }
-        let shown = Shown {
-            desk: &self.desk,
-            counted: &self.counted,
+        let state = PanelState {
+            controller: &self.controller,
+            acceptances: &self.acceptances,
             recent: self.recent.paths(),
-            wrong: self.wrong.as_deref(),
+            failure: self.render_failure.as_deref(),
         };
-        let (typing, choosing) = (&mut self.typing, &mut self.choosing);
+        let (texts, dialog) = (&mut self.texts, &mut self.dialog);
         let mut inputs = vec![];
+        // egui may run the closure twice, but reports a click once.
         layer.update(window, |ui| {
-            // egui may ask twice, and is clicked in but once.
-            inputs.extend(panels::show(ui, &shown, typing, choosing));
+            inputs.extend(panels::show(ui, &state, texts, dialog));
             None
         });
-        inputs.into_iter().for_each(|input| self.take(input));
-        // What is drawn over the picture has changed, if nothing else.
-        self.orders.change(|_| ());
-        self.name_window();
+        inputs.into_iter().for_each(|input| self.handle(input));
+        // The widgets over the picture have changed.
+        self.requests.change(|_| ());
+        self.update_title();
     }
 
-    fn name_window(&self) {
-        let session = self.desk.session();
+    /// Updates the panels twice: egui moves the focus in one pass and reports the move in the next.
+    /// The next event must find the field that has the focus, however fast the user types.
+    fn settle_focus(&mut self) {
+        self.update_panels();
+        self.update_panels();
+    }
+
+    fn update_title(&self) {
+        let session = self.controller.session();
         let name = session.path().map_or("new cloud".to_owned(), |path| path.display().to_string());
         let mark = if session.is_dirty() { "*" } else { "" };
         self.window.iter().for_each(|window| window.set_title(&format!("{mark}{name} | nimbus")));
     }
 }
 
-impl ApplicationHandler<Told> for App {
+impl ApplicationHandler<RenderEvent> for App {
     fn resumed(&mut self, events: &ActiveEventLoop) {
-        if self.window.is_some() {
-            return;
-        }
-        if let Err(error) = self.open(events) {
-            self.failed = Some(error);
+        if self.window.is_none()
+            && let Err(error) = self.open(events)
+        {
+            self.failure = Some(error);
             events.exit();
         }
     }
 
-    fn user_event(&mut self, events: &ActiveEventLoop, told: Told) {
-        match told {
-            Told::Counted(document, counted) => {
-                if document.is_same(self.desk.editor().document()) {
-                    self.counted = counted;
+    fn user_event(&mut self, events: &ActiveEventLoop, event: RenderEvent) {
+        match event {
+            RenderEvent::Acceptances(document, acceptances) => {
+                if document.is_same(self.controller.editor().document()) {
+                    self.acceptances = acceptances;
                 }
             }
-            Told::Wrong(wrong) => self.wrong = wrong,
-            Told::Ended => events.exit(),
+            RenderEvent::Failure(failure) => self.render_failure = failure,
+            RenderEvent::Ended => events.exit(),
         }
     }
 
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
         if self.stop.load(Ordering::Relaxed) {
-            self.orders.change(|order| order.quits = true);
+            self.close();
         }
-        self.show_panels();
+        if self.layer.as_ref().is_some_and(EguiLayer::is_due) {
+            self.update_panels();
+        }
         let due = self.layer.as_ref().and_then(EguiLayer::due);
-        events.set_control_flow(ControlFlow::WaitUntil(
-            due.unwrap_or_else(|| Instant::now() + STEADY),
-        ));
+        let due = due.unwrap_or_else(|| Instant::now() + IDLE_INTERVAL);
+        events.set_control_flow(ControlFlow::WaitUntil(due));
     }
 
     fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        // Panels know the pointer's place and the open dialog only after an update.
+        if let WindowEvent::MouseInput { .. } = &event {
+            self.update_panels();
+        }
         let (Some(layer), Some(window)) = (&mut self.layer, &self.window) else { return };
-        // Keys are for the field that is typed into, or for nobody else; Tab would take one.
+        // egui has the keys only while text is entered; else Tab would move its focus.
         let is_key = matches!(event, WindowEvent::KeyboardInput { .. });
-        let is_typing = layer.has_keyboard_focus() || self.choosing.is_some();
-        let is_heard = (!is_key || is_typing) && layer.handle(window, &event);
+        let is_typing = layer.has_keyboard_focus() || self.dialog.is_some();
+        let is_consumed = (!is_key || is_typing) && layer.handle(window, &event);
         let px_per_point = window.scale_factor();
         match event {
-            WindowEvent::CloseRequested => self.take(Input::Event(Event::Wish(Wish::Quit))),
-            WindowEvent::Destroyed => self.orders.change(|order| order.quits = true),
-            WindowEvent::Resized(PhysicalSize { width, height }) => {
-                self.resize(width, height, px_per_point)
+            WindowEvent::CloseRequested => {
+                self.handle(Input::Event(SessionEvent::Intend(Intent::Quit)));
             }
-            WindowEvent::ModifiersChanged(held) => self.held = held.state(),
-            WindowEvent::Focused(false) => self.take(Input::FocusLost),
-            // A drag goes on over panels, and ends there.
+            WindowEvent::Destroyed => self.close(),
+            WindowEvent::Resized(size) => self.resize(size, px_per_point),
+            WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
+            WindowEvent::Focused(false) => self.handle(Input::FocusLost),
+            // A drag goes on over the panels, and ends there.
             WindowEvent::CursorMoved { position: PhysicalPosition { x, y }, .. } => {
-                self.take(Input::PointerMoved { pixel: DVec2::new(x, y), held: self.held() });
+                self.handle(Input::PointerMoved { pixel: DVec2::new(x, y), keys: self.keys() });
             }
-            WindowEvent::CursorLeft { .. } => self.take(Input::PointerLeft),
+            WindowEvent::CursorLeft { .. } => self.handle(Input::PointerLeft),
             WindowEvent::MouseInput { state, button, .. } => {
-                let is_down = state == ElementState::Pressed;
-                if let (Some(which), true) = (button_of(button), !is_down || !is_heard) {
-                    // What was typed is for the boxes that were selected while it was.
+                let is_down = state.is_pressed();
+                if let (Some(button), true) = (button_of(button), !is_down || !is_consumed) {
+                    // Entered text belongs to the boxes that were selected before the click.
                     if is_down {
-                        self.typing.take().into_iter().for_each(|typed| self.take(typed));
+                        self.texts.take().into_iter().for_each(|typed| self.handle(typed));
                     }
-                    self.take(Input::Button { which, is_down, held: self.held() });
+                    self.handle(Input::Button { button, is_down, keys: self.keys() });
                 }
             }
-            WindowEvent::MouseWheel { delta, .. } if !is_heard => {
-                self.take(Input::Wheel(wheel_notches(delta)))
+            WindowEvent::MouseWheel { delta, .. } if !is_consumed => {
+                self.handle(Input::Wheel(wheel_notches(delta)));
             }
-            WindowEvent::KeyboardInput { event, .. } if !is_typing => self.pressed(&event),
+            WindowEvent::KeyboardInput { event, .. } if event.state.is_pressed() => {
+                if !is_typing {
+                    self.press(&event);
+                }
+                if is_typing || self.texts.wants_focus || self.dialog.is_some() {
+                    self.settle_focus();
+                }
+            }
             _ => {}
         }
     }
 }
 
-fn button_of(button: MouseButton) -> Option<Button> {
+fn button_of(button: winit::event::MouseButton) -> Option<Button> {
+    use winit::event::MouseButton::{Left, Middle, Right};
     match button {
-        MouseButton::Left => Some(Button::Left),
-        MouseButton::Middle => Some(Button::Middle),
-        MouseButton::Right => Some(Button::Right),
+        Left => Some(Button::Left),
+        Middle => Some(Button::Middle),
+        Right => Some(Button::Right),
         _ => None,
     }
 }
@@ -391,14 +399,4 @@ fn key_of(key: &WinitKey) -> Option<Key> {
         WinitKey::Named(NamedKey::Tab) => Some(Key::Tab),
         _ => None,
     }
-}
-
-/// A box file, or a new one in its place; the scene around it.
-pub fn session_of(path: Option<&Path>) -> Result<Session> {
-    let Some(path) = path else { return Ok(Session::new()) };
-    // What cannot be looked at is no new cloud: reading says why.
-    if path.symlink_metadata().is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound) {
-        return Ok(Session::begun(path));
-    }
-    Ok(Session::opened(path, box_file::read(path)?))
 }

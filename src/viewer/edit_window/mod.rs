@@ -1,10 +1,12 @@
-//! The window of `nimbus edit`.
+//! The window of `nimbus edit`: panels and picture around the [`editor`](super::editor).
 
 mod app;
 mod dialogs;
 mod fields;
+mod panel_state;
 mod panels;
 mod render_thread;
+mod shapes;
 
-pub use app::{Options, run, session_of};
-pub use panels::picture_of;
+pub use app::{Options, run};
+pub use panels::picture_size;

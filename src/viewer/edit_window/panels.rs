@@ -1,92 +1,71 @@
-//! The editor's panels: numbers, the list of boxes, questions and keys; and the sketch of the boxes
-//! behind them. What is clicked or typed becomes the desk's inputs.
+//! The editor's panels: file, numbers, buttons, list of boxes, and status line.
 
-use egui::{
-    Align2, Color32, FontId, Frame, Margin, Panel, Pos2, Rect, RichText, ScrollArea, Stroke, Ui,
-    pos2,
+use egui::{Color32, Frame, Margin, Panel, RichText, ScrollArea, TextStyle, Ui};
+
+use super::dialogs::{self, FileDialog};
+use super::fields::{self, FieldTexts};
+use super::panel_state::PanelState;
+use super::shapes;
+use crate::viewer::editor::{
+    Action, Axis, Command, DisplayMode, Input, SHORTCUTS, ScalingAnchor, Select, SelectionMode,
+    SessionEvent, Setting, mean_rate,
 };
-use glam::DVec2;
 
-pub use super::dialogs::Choosing;
-pub use super::fields::Typing;
-use super::{dialogs, fields};
-use crate::viewer::editor::acceptance::{Counted, mean_rate};
-use crate::viewer::editor::desk::{Desk, Input};
-use crate::viewer::editor::selection::How;
-use crate::viewer::editor::session::Event;
-use crate::viewer::editor::shortcuts::{Command, SHORTCUTS};
-use crate::viewer::editor::sketch::{Color, Shape, sketch};
-use crate::viewer::editor::state::{Scaling, View};
-use crate::viewer::editor::{Action, Axis, Select, Setting};
-
-/// Points.
+/// Width of the panel, points.
 const WIDTH: f32 = 230.0;
-/// And of the line below.
+/// Height of the status line, points.
 const STATUS: f32 = 30.0;
-const BACKGROUND: Color32 = Color32::from_rgb(24, 26, 30);
-const WRONG: Color32 = Color32::from_rgb(240, 110, 100);
-/// Of the list of boxes.
+/// Height of the list of boxes, points.
 const LIST: f32 = 130.0;
+const BACKGROUND: Color32 = Color32::from_rgb(24, 26, 30);
+const ERROR: Color32 = Color32::from_rgb(240, 110, 100);
 
-/// What panels leave of a window of `size` pixels to the picture, at its upper left corner; a pixel
-/// at least.
-pub fn picture_of([width, height]: [u32; 2], px_per_point: f64) -> [u32; 2] {
+/// Returns the size of the picture that the panels leave in a window of `size` pixels, at least one
+/// pixel. The picture is at the upper left corner.
+pub fn picture_size([width, height]: [u32; 2], px_per_point: f64) -> [u32; 2] {
     let less = |n: u32, points: f32| {
         n.saturating_sub((f64::from(points) * px_per_point).round() as u32).max(1)
     };
     [less(width, WIDTH), less(height, STATUS)]
 }
 
-/// What panels show.
-pub struct Shown<'a> {
-    pub desk: &'a Desk,
-    /// Of each box; fewer where the device has not made them yet.
-    pub counted: &'a [Counted],
-    pub recent: &'a [std::path::PathBuf],
-    /// Why the picture is not what is edited.
-    pub wrong: Option<&'a str>,
-}
-
-/// The sketch and all panels, and what is to be done.
+/// Adds the overlay and all panels. Returns the inputs that follow from clicks and typed text.
 pub fn show(
     ui: &mut Ui,
-    shown: &Shown<'_>,
-    typing: &mut Typing,
-    choosing: &mut Option<Choosing>,
+    state: &PanelState<'_>,
+    texts: &mut FieldTexts,
+    dialog: &mut Option<FileDialog>,
 ) -> Vec<Input> {
     let mut inputs = vec![];
-    draw(ui, shown.desk);
+    shapes::draw(ui, state.controller);
     let frame = Frame::new().fill(BACKGROUND).inner_margin(Margin::same(6));
-    Panel::bottom("status")
-        .resizable(false)
-        .exact_size(STATUS)
-        .frame(frame)
-        .show(ui, |ui| status(ui, shown));
-    Panel::right("numbers").resizable(false).exact_size(WIDTH).frame(frame).show(ui, |ui| {
+    let status_line = Panel::bottom("status").resizable(false).exact_size(STATUS).frame(frame);
+    status_line.show(ui, |ui| status(ui, state));
+    let numbers = Panel::right("numbers").resizable(false).exact_size(WIDTH).frame(frame);
+    numbers.show(ui, |ui| {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            file(ui, shown, &mut inputs);
+            file(ui, state, &mut inputs);
             ui.separator();
-            fields::show(ui, shown.desk, typing, &mut inputs);
+            fields::show(ui, state.controller, texts, &mut inputs);
             ui.separator();
-            buttons(ui, shown, &mut inputs);
+            buttons(ui, state, &mut inputs);
             ui.separator();
-            list(ui, shown, &mut inputs);
+            list(ui, state, &mut inputs);
         });
     });
-    dialogs::show(ui, shown, choosing, &mut inputs);
+    dialogs::show(ui, state, dialog, &mut inputs);
     inputs
 }
 
-/// What the keys of a command would do.
+/// Returns the input of a command's first shortcut.
 fn press(command: Command) -> Option<Input> {
     SHORTCUTS.iter().find(|s| s.command == command).map(|s| Input::Chord(s.chord))
 }
 
-/// A button that does what a key does, and says which.
+/// Adds a button for a command. Its tooltip names the shortcut.
 fn button(ui: &mut Ui, text: &str, command: Command, is_enabled: bool, inputs: &mut Vec<Input>) {
-    let shortcut = SHORTCUTS.iter().find(|s| s.command == command);
     let mut response = ui.add_enabled(is_enabled, egui::Button::new(text).small());
-    if let Some(s) = shortcut {
+    if let Some(s) = SHORTCUTS.iter().find(|s| s.command == command) {
         response = response.on_hover_text(format!("{} ({})", s.description, s.chord));
     }
     if response.clicked() {
@@ -94,8 +73,8 @@ fn button(ui: &mut Ui, text: &str, command: Command, is_enabled: bool, inputs: &
     }
 }
 
-fn file(ui: &mut Ui, shown: &Shown<'_>, inputs: &mut Vec<Input>) {
-    let session = shown.desk.session();
+fn file(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
+    let session = state.controller.session();
     let name = session.path().map_or("(no file)".to_owned(), |path| path.display().to_string());
     let mark = if session.is_dirty() { " *" } else { "" };
     ui.label(RichText::new(format!("{name}{mark}")).strong());
@@ -105,152 +84,101 @@ fn file(ui: &mut Ui, shown: &Shown<'_>, inputs: &mut Vec<Input>) {
             ("Open", Command::Open),
             ("Save", Command::Save),
             ("Save as", Command::SaveAs),
+            ("?", Command::Help),
         ] {
             button(ui, text, command, true, inputs);
         }
-        button(ui, "?", Command::Help, true, inputs);
     });
 }
 
-fn buttons(ui: &mut Ui, shown: &Shown<'_>, inputs: &mut Vec<Input>) {
-    let (editor, history) = (shown.desk.editor(), shown.desk.editor().history());
+fn buttons(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
+    let editor = state.controller.editor();
+    let (settings, history) = (editor.settings(), editor.history());
     let has_selection = !editor.selection().is_empty();
     ui.horizontal_wrapped(|ui| {
-        button(ui, "Add", Command::Add, true, inputs);
-        button(ui, "Duplicate", Command::Duplicate, has_selection, inputs);
-        button(ui, "Delete", Command::Delete, has_selection, inputs);
-        button(ui, "Mirror", Command::Mirror, has_selection, inputs);
-        button(ui, "Mirror a copy", Command::MirrorCopy, has_selection, inputs);
-        button(ui, "Frame", Command::Frame, true, inputs);
+        for (text, command, is_enabled) in [
+            ("Add", Command::Add, true),
+            ("Duplicate", Command::Duplicate, has_selection),
+            ("Delete", Command::Delete, has_selection),
+            ("Mirror", Command::Mirror, has_selection),
+            ("Mirror a copy", Command::MirrorCopy, has_selection),
+            ("Frame", Command::Frame, true),
+        ] {
+            button(ui, text, command, is_enabled, inputs);
+        }
     });
     ui.horizontal_wrapped(|ui| {
-        let text = |verb: &str, label: Option<&str>| {
-            label.map_or(verb.to_owned(), |label| format!("{verb} {label}"))
-        };
-        button(
-            ui,
-            &text("Undo", history.undo_label()),
-            Command::Undo,
-            history.n_undo() > 0,
-            inputs,
-        );
-        button(
-            ui,
-            &text("Redo", history.redo_label()),
-            Command::Redo,
-            history.n_redo() > 0,
-            inputs,
-        );
+        for (verb, label, command) in [
+            ("Undo", history.undo_label(), Command::Undo),
+            ("Redo", history.redo_label(), Command::Redo),
+        ] {
+            let text = label.map_or(verb.to_owned(), |label| format!("{verb} {label}"));
+            button(ui, &text, command, label.is_some(), inputs);
+        }
     });
     ui.horizontal(|ui| {
-        let now = editor.settings().view;
-        for (text, view) in [("Boxes", View::Boxes), ("Cloud", View::Cloud), ("Both", View::Both)] {
-            if ui.selectable_label(now == view, text).clicked() {
-                inputs.extend(press(Command::View(view)));
+        use DisplayMode::{Both, Boxes, Cloud};
+        for (text, display) in [("Boxes", Boxes), ("Cloud", Cloud), ("Both", Both)] {
+            if ui.selectable_label(settings.display == display, text).clicked() {
+                inputs.extend(press(Command::Display(display)));
             }
         }
-        let mut snaps = editor.settings().snap.on;
-        if ui.checkbox(&mut snaps, "Snap").clicked() {
+        if ui.checkbox(&mut settings.snap.is_on.clone(), "Snap").clicked() {
             inputs.extend(press(Command::ToggleSnap));
         }
     });
     ui.horizontal(|ui| {
-        let scaling = editor.settings().scaling;
-        let mut is_symmetric = scaling == Scaling::Symmetric;
-        let hover = "an edge that is scaled keeps its middle, or else its other end (held Shift: \
-            the other way)";
-        if ui.checkbox(&mut is_symmetric, "Symmetric").on_hover_text(hover).clicked() {
-            inputs.push(Input::Event(Event::Act(Action::Set(Setting::Scaling(scaling.other())))));
+        let mut is_centred = settings.anchor == ScalingAnchor::Center;
+        let hover = "scaling keeps the centre in place, else the opposite face (Shift inverts)";
+        if ui.checkbox(&mut is_centred, "Symmetric").on_hover_text(hover).clicked() {
+            let action = Action::Set(Setting::Anchor(settings.anchor.toggled()));
+            inputs.push(Input::Event(SessionEvent::Act(action)));
         }
         ui.label("mirror by");
-        for (text, axis) in [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)] {
-            if ui.selectable_label(editor.settings().axis == axis, text).clicked() {
+        for axis in Axis::ALL {
+            if ui.selectable_label(settings.axis == axis, axis.name()).clicked() {
                 inputs.extend(press(Command::Axis(axis)));
             }
         }
     });
 }
 
-fn list(ui: &mut Ui, shown: &Shown<'_>, inputs: &mut Vec<Input>) {
-    let editor = shown.desk.editor();
-    let height = ui.text_style_height(&egui::TextStyle::Body);
-    let n = editor.boxes().len();
-    ScrollArea::vertical().id_salt("boxes").max_height(LIST).auto_shrink([false, true]).show_rows(
-        ui,
-        height,
-        n,
-        |ui, rows| {
-            for i in rows {
-                let rate = shown.counted.get(i).and_then(Counted::rate);
-                let rate =
-                    rate.map_or(String::new(), |rate| format!(", {:.0} % accepted", 100.0 * rate));
-                let text = format!("{i}: {} particles{rate}", editor.boxes()[i].n_particles);
-                if ui.selectable_label(editor.selection().contains(i), text).clicked() {
-                    let held = ui.input(|input| input.modifiers);
-                    let how = match (held.command, held.shift) {
-                        (true, _) => How::Toggle,
-                        (_, true) => How::Add,
-                        _ => How::Replace,
-                    };
-                    inputs.push(Input::Event(Event::Act(Action::Select(Select::Boxes {
-                        boxes: vec![i],
-                        how,
-                    }))));
-                }
+fn list(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
+    let editor = state.controller.editor();
+    let (height, n) = (ui.text_style_height(&TextStyle::Body), editor.boxes().len());
+    let area = ScrollArea::vertical().id_salt("boxes").max_height(LIST).auto_shrink([false, true]);
+    area.show_rows(ui, height, n, |ui, rows| {
+        for i in rows {
+            let rate = state.acceptances.get(i).and_then(|b| b.acceptance.rate());
+            let rate = rate.map_or(String::new(), |r| format!(", {:.0} % accepted", 100.0 * r));
+            let text = format!("{i}: {} particles{rate}", editor.boxes()[i].n_particles);
+            if ui.selectable_label(editor.selection().contains(i), text).clicked() {
+                let keys = ui.input(|input| input.modifiers);
+                let mode = match (keys.command, keys.shift) {
+                    (true, _) => SelectionMode::Toggle,
+                    (_, true) => SelectionMode::Add,
+                    _ => SelectionMode::Replace,
+                };
+                let action = Action::Select(Select::Boxes { boxes: vec![i], mode });
+                inputs.push(Input::Event(SessionEvent::Act(action)));
             }
-        },
-    );
-}
-
-fn status(ui: &mut Ui, shown: &Shown<'_>) {
-    let document = shown.desk.editor().document();
-    ui.horizontal(|ui| {
-        let mut text =
-            format!("{} boxes, {} particles", document.boxes.len(), document.n_particles());
-        if let Some(rate) = mean_rate(shown.counted) {
-            text += &format!(", {:.1} % of attempts accepted", 100.0 * rate);
-        }
-        ui.label(text);
-        if let Some(wrong) = shown.wrong {
-            ui.label(RichText::new(wrong).color(WRONG));
-        } else if let Some(said) = shown.desk.said() {
-            ui.label(RichText::new(said).strong());
         }
     });
 }
 
-/// The boxes as the editor's view has them.
-fn draw(ui: &Ui, desk: &Desk) {
-    let view = desk.viewport();
-    let size = view.size_px / view.px_per_point;
-    let picture = Rect::from_min_size(Pos2::ZERO, egui::vec2(size.x as f32, size.y as f32));
-    let painter = ui.painter_at(picture);
-    let point = |p: DVec2| -> Pos2 {
-        pos2((p.x / view.px_per_point) as f32, (p.y / view.px_per_point) as f32)
-    };
-    let color = |[r, g, b, a]: Color| Color32::from_rgba_unmultiplied(r, g, b, a);
-    let stroke = |s: crate::viewer::editor::sketch::Stroke| {
-        Stroke::new((s.width_px / view.px_per_point) as f32, color(s.color))
-    };
-    for shape in sketch(desk.editor(), &view, desk.pointing()) {
-        match shape {
-            Shape::Polygon { corners, fill, stroke: around } => {
-                let corners = corners.into_iter().map(point).collect();
-                let around = around.map_or(Stroke::NONE, stroke);
-                painter.add(egui::Shape::convex_polygon(corners, color(fill), around));
-            }
-            Shape::Line { from, to, stroke: s } => {
-                painter.line_segment([point(from), point(to)], stroke(s));
-            }
-            Shape::Label { at, text, color: c } => {
-                painter.text(
-                    point(at),
-                    Align2::LEFT_CENTER,
-                    text,
-                    FontId::proportional(12.0),
-                    color(c),
-                );
-            }
+fn status(ui: &mut Ui, state: &PanelState<'_>) {
+    let document = state.controller.editor().document();
+    ui.horizontal(|ui| {
+        let mut text =
+            format!("{} boxes, {} particles", document.boxes.len(), document.n_particles());
+        if let Some(rate) = mean_rate(state.acceptances) {
+            text += &format!(", {:.1} % of attempts accepted", 100.0 * rate);
         }
-    }
+        ui.label(text);
+        if let Some(failure) = state.failure {
+            ui.label(RichText::new(failure).color(ERROR));
+        } else if let Some(message) = state.controller.message() {
+            ui.label(RichText::new(message).strong());
+        }
+    });
 }

@@ -1,8 +1,7 @@
-//! The thread that draws what is edited: a frame where something has changed, of particles that
-//! follow from it alone.
+//! The render thread of the editor: it draws a frame when the document or the view has changed.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
 use crate::error::{Error, Result};
@@ -11,229 +10,228 @@ use crate::gpu::{Instance, PresentMode, Surface};
 use crate::model::camera::Pose;
 use crate::model::film::Film;
 use crate::model::scene::Scene;
-use crate::viewer::editor::acceptance::{Counted, of_statuses};
-use crate::viewer::editor::scenery::Scenery;
-use crate::viewer::editor::{Document, Touched};
+use crate::viewer::editor::{BoxAcceptance, Document, EditedScene, box_acceptances};
 use crate::viewer::egui_layer::SharedWidgets;
 use crate::viewer::posed_player::PosedPlayer;
+use crate::viewer::sync::lock;
 use crate::viewer::window_target::{PictureDraw, WindowTarget};
 
-/// What is to be drawn.
+/// State that the render thread draws.
 #[derive(Debug, Clone)]
-pub struct Order {
+pub struct DrawState {
     pub document: Arc<Document>,
     pub pose: Pose,
-    /// The cloud is shown; its boxes alone are not this thread's.
+    /// Whether the cloud is shown. The boxes are widgets.
     pub has_cloud: bool,
-    /// Of the window, in pixels.
+    /// Size of the window in pixels.
     pub size: [u32; 2],
-    /// Of the part of it that the picture fills, from its upper left corner.
+    /// Size of the picture in pixels, from the window's upper left corner.
     pub picture: [u32; 2],
-    /// Counts the orders: another number is something to do.
-    pub n: u64,
-    pub quits: bool,
+    pub is_closing: bool,
+    /// Counts the changes.
+    pub version: u64,
 }
 
-/// An order, and who waits for the next.
-pub struct Orders {
-    order: Mutex<Order>,
+/// A draw state that the window changes and the render thread waits for.
+pub struct DrawRequests {
+    state: Mutex<DrawState>,
     changed: Condvar,
 }
 
-impl Orders {
-    pub fn new(order: Order) -> Orders {
-        Orders { order: Mutex::new(order), changed: Condvar::new() }
+impl DrawRequests {
+    /// Creates requests that begin with `state`.
+    pub fn new(state: DrawState) -> DrawRequests {
+        DrawRequests { state: Mutex::new(state), changed: Condvar::new() }
     }
 
-    /// Nobody panics while it is held; if somebody did, what is in it is whole all the same.
-    fn lock(&self) -> MutexGuard<'_, Order> {
-        self.order.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Changes what is to be drawn.
-    pub fn change(&self, change: impl FnOnce(&mut Order)) {
-        let mut order = self.lock();
-        change(&mut order);
-        order.n += 1;
+    /// Changes the state, and has it drawn.
+    pub fn change(&self, change: impl FnOnce(&mut DrawState)) {
+        let mut state = lock(&self.state);
+        change(&mut state);
+        state.version += 1;
         self.changed.notify_one();
     }
 
-    /// The order as soon as it is another than number `n`, or some time has passed.
-    fn next(&self, n: u64) -> Order {
-        let is_old = |order: &mut Order| order.n == n;
-        let waited = self.changed.wait_timeout_while(self.lock(), PATIENCE, is_old);
+    /// Waits for another version of the state, for at most [`MAX_WAIT`].
+    fn next(&self, version: u64) -> DrawState {
+        let is_old = |state: &mut DrawState| state.version == version;
+        let waited = self.changed.wait_timeout_while(lock(&self.state), MAX_WAIT, is_old);
         waited.unwrap_or_else(PoisonError::into_inner).0.clone()
     }
 }
 
-/// Somebody may want to end this without an order: Ctrl-C.
-const PATIENCE: Duration = Duration::from_millis(200);
-/// So long nothing is tried where nothing of the window is seen.
-const UNSEEN: Duration = Duration::from_millis(50);
+/// Interval of looks at the stop flag, which Ctrl-C sets.
+const MAX_WAIT: Duration = Duration::from_millis(200);
+/// Delay before another attempt while the window has no visible area.
+const HIDDEN_DELAY: Duration = Duration::from_millis(50);
 
-/// What the thread tells the window.
+/// An event that the render thread sends to the window.
 #[derive(Debug)]
-pub enum Told {
-    /// What became of each box's particles, of this document.
-    Counted(Arc<Document>, Vec<Counted>),
-    /// Why the picture is not what is edited; none where it is again.
-    Wrong(Option<String>),
+pub enum RenderEvent {
+    /// The acceptance of each box of this document.
+    Acceptances(Arc<Document>, Vec<BoxAcceptance>),
+    /// Why the picture does not show the document; `None` when it does again.
+    Failure(Option<String>),
+    /// The thread has ended.
     Ended,
 }
 
-/// What is told where nobody listens any more is lost.
-pub type Tell = Box<dyn Fn(Told) + Send>;
-
-// What lies on the device goes before the pane.
-pub struct Easel {
-    made: Option<Made>,
-    /// The window was told so.
-    is_wrong: bool,
-    pane: WindowTarget,
-    scenery: Scenery,
-    orders: Arc<Orders>,
-    face: SharedWidgets,
-    tell: Tell,
-    stop: &'static AtomicBool,
+/// State that the window and its render thread share.
+pub struct RenderLinks {
+    pub requests: Arc<DrawRequests>,
+    pub widgets: SharedWidgets,
+    /// Sends an event to the window.
+    pub send: Box<dyn Fn(RenderEvent) + Send>,
+    /// Ends the thread when set.
+    pub stop: &'static AtomicBool,
 }
 
-/// What is on the device of a document.
-struct Made {
-    showing: PictureDraw,
-    player: PosedPlayer,
+/// Renders the edited cloud into a window. Fields are dropped in this order.
+pub struct EditRenderer {
+    active: Option<ActiveDocument>,
+    /// The window knows of a failure.
+    has_failed: bool,
+    target: WindowTarget,
+    edited: EditedScene,
+    links: RenderLinks,
+}
+
+/// A document on the device.
+struct ActiveDocument {
+    draw: PictureDraw,
+    scene: PosedPlayer,
     document: Arc<Document>,
-    /// What was drawn last.
+    /// Document and camera of the last frame.
     drawn: Option<(Arc<Document>, Pose)>,
 }
 
-impl Easel {
+impl EditRenderer {
+    /// Opens a device for `surface`.
+    ///
+    /// # Errors
+    /// No device can be opened, or it cannot present to the window.
     pub fn new(
         surface: (Arc<Instance>, Surface),
         choice: &DeviceChoice,
-        scenery: Scenery,
-        (orders, face): (Arc<Orders>, SharedWidgets),
-        (tell, stop): (Tell, &'static AtomicBool),
-    ) -> Result<Easel> {
-        let pane = WindowTarget::open(surface, choice, PresentMode::Fifo)?;
-        Ok(Easel { made: None, is_wrong: false, pane, scenery, orders, face, tell, stop })
+        edited: EditedScene,
+        links: RenderLinks,
+    ) -> Result<EditRenderer> {
+        let target = WindowTarget::open(surface, choice, PresentMode::Fifo)?;
+        Ok(EditRenderer { active: None, has_failed: false, target, edited, links })
     }
 
-    /// Draws until somebody wants no more.
+    /// Renders until the window closes.
+    ///
+    /// # Errors
+    /// The device failed, or validation has found a fault.
     pub fn run(mut self) -> Result<()> {
-        let ended = self.draw();
-        self.pane.finish();
-        let Easel { made, pane, .. } = self;
-        drop(made);
-        let closed = pane.close();
+        let ended = self.render();
+        self.target.finish();
+        let EditRenderer { active, target, .. } = self;
+        drop(active);
+        let closed = target.close();
         ended.and(closed)
     }
 
-    fn draw(&mut self) -> Result<()> {
-        let mut n_done = u64::MAX;
-        let mut is_whole = false;
+    fn render(&mut self) -> Result<()> {
+        let mut version = u64::MAX;
+        let mut is_current = false;
         loop {
-            let order = self.orders.next(n_done);
-            if order.quits || self.stop.load(Ordering::Relaxed) {
+            let state = self.links.requests.next(version);
+            if state.is_closing || self.links.stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            if is_whole && order.n == n_done {
+            if is_current && state.version == version {
                 continue;
             }
-            if !is_whole || self.pane.size() != Some(order.size) {
-                self.forget();
-                if !self.pane.recreate(order.size)? {
-                    std::thread::sleep(UNSEEN);
+            if !is_current || self.target.size() != Some(state.size) {
+                self.target.finish();
+                self.active = None;
+                if !self.target.recreate(state.size)? {
+                    std::thread::sleep(HIDDEN_DELAY);
                     continue;
                 }
             }
-            match self.follow(&order) {
-                Ok(()) if std::mem::take(&mut self.is_wrong) => (self.tell)(Told::Wrong(None)),
+            match self.update(&state) {
+                Ok(()) if std::mem::take(&mut self.has_failed) => {
+                    (self.links.send)(RenderEvent::Failure(None));
+                }
                 Ok(()) => {}
-                // What does not fit is not drawn; what is edited stays.
+                // The document stays, also where it does not fit the device.
                 Err(error @ (Error::Limit { .. } | Error::Usage { .. })) => {
-                    self.is_wrong = true;
-                    (self.tell)(Told::Wrong(Some(error.to_string())));
+                    self.has_failed = true;
+                    (self.links.send)(RenderEvent::Failure(Some(error.to_string())));
                 }
                 Err(error) => return Err(error),
             }
-            is_whole = self.show(&order)?;
-            n_done = order.n;
+            is_current = self.present(&state)?;
+            version = state.version;
         }
     }
 
-    /// What was made for another size goes, once it is shown no more.
-    fn forget(&mut self) {
-        self.pane.finish();
-        self.made = None;
-    }
-
-    /// The order's document with its picture's film.
-    fn scene(&self, order: &Order) -> Arc<Scene> {
-        let mut scene = self.scenery.scene(&order.document);
-        let ([width, height], film) = (order.picture, scene.film);
-        Arc::make_mut(&mut scene).film = Film { width, height, ..film };
-        scene
-    }
-
-    /// Draws the order's document as it is seen, where either is another than it was.
-    fn follow(&mut self, order: &Order) -> Result<()> {
-        let is_new = self.made.is_none();
+    /// Updates the document on the device and draws it, where either has changed.
+    fn update(&mut self, state: &DrawState) -> Result<()> {
+        let is_new = self.active.is_none();
         if is_new {
-            self.made = match self.make(order) {
-                // Panels say why over the background alone.
+            self.active = match self.activate(state) {
+                // An empty cloud lets the panels show the error over the background.
                 Err(error @ Error::Limit { .. }) => {
-                    let seed = order.document.seed;
+                    let seed = state.document.seed;
                     let document = Arc::new(Document { boxes: vec![], seed });
-                    self.made = Some(self.make(&Order { document, ..order.clone() })?);
+                    self.active = Some(self.activate(&DrawState { document, ..state.clone() })?);
                     return Err(error);
                 }
-                made => Some(made?),
+                active => Some(active?),
             };
         }
-        let scene = self.scene(order);
-        let Some(made) = &mut self.made else { return Ok(()) };
-        let is_same = made.document.is_same(&order.document);
+        let scene = self.scene(state);
+        let Some(active) = &mut self.active else { return Ok(()) };
+        let is_same = active.document.is_same(&state.document);
         if !is_same {
-            let groups = self.scenery.groups(&Touched::between(&made.document, &order.document));
-            made.player.player.reshape(&self.pane.bed, scene, &groups)?;
-            made.document = order.document.clone();
+            let boxes = state.document.regenerated_since(&active.document);
+            let groups = self.edited.groups(&boxes);
+            active.scene.player.reshape(&self.target.bed, scene, &groups)?;
+            active.document = state.document.clone();
         }
-        if is_same && !is_new && !order.has_cloud {
+        let is_drawn = active.drawn.as_ref().is_some_and(|(document, pose)| {
+            document.is_same(&state.document) && *pose == state.pose
+        });
+        if is_drawn || is_same && !is_new && !state.has_cloud {
             return Ok(());
         }
-        let wanted = (order.document.clone(), order.pose);
-        if made
-            .drawn
-            .as_ref()
-            .is_some_and(|(document, pose)| document.is_same(&wanted.0) && *pose == wanted.1)
-        {
-            return Ok(());
-        }
-        made.player.step(0, order.pose)?;
-        let renderer = &mut made.player.player.renderer;
-        made.drawn = Some(wanted);
+        active.scene.step(0, state.pose)?;
+        active.drawn = Some((state.document.clone(), state.pose));
         if !is_same || is_new {
-            let statuses = renderer.status(&self.pane.bed.device)?;
-            let boxes = &order.document.boxes;
-            let counted = of_statuses(boxes, self.scenery.statuses(boxes, &statuses));
-            (self.tell)(Told::Counted(order.document.clone(), counted));
+            let statuses = active.scene.player.renderer.status(&self.target.bed.device)?;
+            let boxes = &state.document.boxes;
+            let acceptances = box_acceptances(boxes, self.edited.statuses(boxes, &statuses));
+            let event = RenderEvent::Acceptances(state.document.clone(), acceptances);
+            (self.links.send)(event);
         }
         Ok(())
     }
 
-    fn make(&self, order: &Order) -> Result<Made> {
-        let player = self.pane.bed.player(self.scene(order), true)?;
-        let showing = self.pane.picture_draw(&player.renderer, &player.scene.film)?;
-        let showing = showing.ok_or_else(|| Error::usage("nothing of the window is seen"))?;
-        let player = PosedPlayer::new(player, order.pose);
-        Ok(Made { showing, player, document: order.document.clone(), drawn: None })
+    fn activate(&self, state: &DrawState) -> Result<ActiveDocument> {
+        let player = self.target.bed.player(self.scene(state), true)?;
+        let draw = self.target.picture_draw(&player.renderer, &player.scene.film)?;
+        let draw = draw.ok_or_else(|| Error::usage("the window has no visible area"))?;
+        let scene = PosedPlayer::new(player, state.pose);
+        Ok(ActiveDocument { draw, scene, document: state.document.clone(), drawn: None })
     }
 
-    /// False where the window is another by now.
-    fn show(&mut self, order: &Order) -> Result<bool> {
-        let Some(made) = &mut self.made else { return Ok(false) };
-        let is_drawn = order.has_cloud && made.drawn.is_some();
-        let first = is_drawn.then_some(&mut made.player.player.renderer);
-        self.pane.present(&made.showing, [first, None], None, &self.face)
+    /// Returns the scene with the state's document and size.
+    fn scene(&self, state: &DrawState) -> Arc<Scene> {
+        let mut scene = self.edited.scene(&state.document);
+        let ([width, height], film) = (state.picture, scene.film);
+        Arc::make_mut(&mut scene).film = Film { width, height, ..film };
+        scene
+    }
+
+    /// Presents the last frame. Returns false where the swapchain no longer fits the window.
+    fn present(&mut self, state: &DrawState) -> Result<bool> {
+        let Some(active) = &mut self.active else { return Ok(false) };
+        let is_shown = state.has_cloud && active.drawn.is_some();
+        let renderer = is_shown.then_some(&mut active.scene.player.renderer);
+        self.target.present(&active.draw, [renderer, None], None, &self.links.widgets)
     }
 }

@@ -1,61 +1,68 @@
-//! The scene that a cloud is edited in: that of scenes/cubes-554.toml around a box file alone, or
-//! any that has a cloud made from boxes.
+//! The scene around the edited boxes: scenes/cubes-554.toml by default, or any scene with a cloud made
+//! from boxes.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::document::{Document, Touched};
+use super::document::Document;
 use crate::error::{Error, Result};
 use crate::io::{box_file, scene_file};
 use crate::model::boxes::CloudBox;
 use crate::model::cloud::{Cloud, CloudSource};
 use crate::model::scene::Scene;
 
-/// Film, light, sky, material, and how P's boxes are read.
-const AROUND_A_FILE: &str = include_str!("../../../scenes/cubes-554.toml");
+/// The default scene: film, light, sky, material, and the form of P's boxes.
+const DEFAULT_SCENE: &str = include_str!("../../../scenes/cubes-554.toml");
 
+/// A scene with one cloud that is edited.
 #[derive(Debug, Clone)]
-pub struct Scenery {
+pub struct EditedScene {
     scene: Scene,
-    /// The cloud that is edited.
+    /// Index of the edited cloud.
     i_cloud: usize,
-    /// Groups of the clouds before it.
+    /// Number of particle groups of the clouds before it.
     i_first_group: usize,
 }
 
-impl Scenery {
-    /// For a box file alone, or none.
-    pub fn plain() -> Result<Scenery> {
+impl EditedScene {
+    /// Returns the default scene.
+    ///
+    /// # Errors
+    /// The embedded scene file is not valid.
+    pub fn default_scene() -> Result<EditedScene> {
         let no_boxes = |_: &Path, _: &str| Ok(box_file::format(&[]));
         let loaded = scene_file::parse_beside(
-            AROUND_A_FILE.to_owned(),
+            DEFAULT_SCENE.to_owned(),
             Path::new("edited"),
             &[],
             None,
             &no_boxes,
         )?;
-        Scenery::of(Scene { title: String::new(), ..loaded.scene })
+        EditedScene::new(Scene { title: String::new(), ..loaded.scene })
     }
 
-    /// Of a scene, the first of whose clouds that are made from boxes is edited.
-    pub fn of(mut scene: Scene) -> Result<Scenery> {
+    /// Selects the first cloud of `scene` that is made from boxes.
+    ///
+    /// # Errors
+    /// No cloud is made from boxes.
+    pub fn new(mut scene: Scene) -> Result<EditedScene> {
         let is_of_boxes = |c: &Cloud| matches!(c.source, CloudSource::Boxes { .. });
         let i_cloud = scene.clouds.iter().position(is_of_boxes);
         let i_cloud =
             i_cloud.ok_or_else(|| Error::usage("the scene has no cloud made from boxes"))?;
-        // Counts are what is edited: nothing deals them out anew.
+        // The boxes' own counts are edited, so a total must not redistribute them.
         scene.draw.n_particles = 0;
         let i_first_group = scene.clouds[..i_cloud].iter().map(|c| c.n_groups() as usize).sum();
-        Ok(Scenery { scene, i_cloud, i_first_group })
+        Ok(EditedScene { scene, i_cloud, i_first_group })
     }
 
     fn cloud(&self) -> &Cloud {
         &self.scene.clouds[self.i_cloud]
     }
 
-    /// The scene's own boxes and seed.
+    /// Returns the boxes and the seed of the scene file.
     pub fn document(&self) -> Document {
         let boxes = match &self.cloud().source {
             CloudSource::Boxes { boxes, .. } => boxes.clone(),
@@ -64,8 +71,7 @@ impl Scenery {
         Document { boxes, seed: self.cloud().seed }
     }
 
-    /// With the document's boxes and seed: what differs from that of another document is no more
-    /// than these.
+    /// Returns the scene with the document's boxes and seed.
     pub fn scene(&self, document: &Document) -> Arc<Scene> {
         let mut scene = self.scene.clone();
         let cloud = &mut scene.clouds[self.i_cloud];
@@ -76,25 +82,25 @@ impl Scenery {
         Arc::new(scene)
     }
 
-    /// Numbers of the scene's groups whose particles are to be generated, as `Player::reshape` asks
-    /// for them.
-    pub fn groups(&self, touched: &Touched) -> Vec<usize> {
-        touched.generate.iter().map(|i| self.i_first_group + i).collect()
+    /// Returns the particle groups of the given boxes, as `Player::reshape` takes them.
+    pub fn groups(&self, boxes: &[usize]) -> Vec<usize> {
+        boxes.iter().map(|i| self.i_first_group + i).collect()
     }
 
-    /// Statuses of the edited cloud's particles, of those of all, in order.
+    /// Returns the statuses of the edited cloud's particles, given those of all particles.
     pub fn statuses<'a>(&self, boxes: &[CloudBox], all: &'a [u32]) -> &'a [u32] {
         let before: u64 = self.scene.clouds[..self.i_cloud].iter().map(Cloud::n_particles).sum();
         let n: u64 = boxes.iter().map(|b| u64::from(b.n_particles)).sum();
         all.get(before as usize..(before + n) as usize).unwrap_or_default()
     }
 
-    /// Where the boxes' origin lies in the scene as it begins: what the editor shows of it lies
-    /// around 0.
+    /// Returns the place of the boxes' origin in the scene at its start. The editor shows boxes
+    /// relative to it.
     pub fn origin(&self) -> DVec3 {
         self.cloud().origin_at(self.scene.time.start_s)
     }
 
+    /// Returns the length of a scene unit, m.
     pub fn metres_per_unit(&self) -> f64 {
         self.scene.air.metres_per_unit
     }
@@ -102,30 +108,30 @@ impl Scenery {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::document;
+    use super::super::fixtures::document;
     use super::*;
     use crate::model::scene::LightingMode;
 
     #[test]
-    fn a_file_alone_is_drawn_as_the_papers_cloud_is() {
-        let scenery = Scenery::plain().unwrap();
-        assert!(scenery.document().boxes.is_empty());
+    fn the_default_scene_is_that_of_the_papers_cloud() {
+        let edited = EditedScene::default_scene().unwrap();
+        assert!(edited.document().boxes.is_empty());
         let boxes = box_file::read(Path::new("scenes/cubes-554.dat")).unwrap();
-        let scene = scenery.scene(&Document { boxes, seed: 9 });
+        let scene = edited.scene(&Document { boxes, seed: 9 });
         let whole = scene_file::load(Path::new("scenes/cubes-554.toml"), &[], None).unwrap().scene;
         assert_eq!(*scene, Scene { title: String::new(), ..whole });
     }
 
     #[test]
-    fn a_scene_without_boxes_or_particles_is_a_scene() {
-        let scenery = Scenery::plain().unwrap();
-        let empty = scenery.scene(&document(0));
+    fn a_scene_without_boxes_is_valid() {
+        let edited = EditedScene::default_scene().unwrap();
+        let empty = edited.scene(&document(0));
         assert_eq!((empty.n_particles(), empty.groups().len()), (0, 0));
         assert_ne!(empty.lighting.mode, LightingMode::None);
     }
 
     #[test]
-    fn the_first_cloud_of_boxes_is_edited_and_all_else_stays() {
+    fn only_the_first_cloud_of_boxes_changes() {
         let text = "[[cloud]]\nfrom = 'disc'\nparticles = 7\n[[cloud]]\nfrom = 'boxes'\nfile = \
             'a.dat'\nposition = [1, 2, 3]\n\
                     form = 'printed'\n[[cloud]]\nfrom = 'boxes'\nfile = 'a.dat'\n";
@@ -133,25 +139,25 @@ mod tests {
         let loaded =
             scene_file::parse_beside(text.to_owned(), Path::new("s.toml"), &[], Some(5), &files)
                 .unwrap();
-        let scenery = Scenery::of(loaded.scene.clone()).unwrap();
-        assert_eq!((scenery.document().boxes, scenery.document().seed), (document(2).boxes, 6));
-        assert_eq!(scenery.origin(), DVec3::new(1.0, 2.0, 3.0));
-        let (old, new) = (scenery.document(), Document { seed: 6, ..document(4) });
-        let scene = scenery.scene(&new);
+        let edited = EditedScene::new(loaded.scene.clone()).unwrap();
+        assert_eq!((edited.document().boxes, edited.document().seed), (document(2).boxes, 6));
+        assert_eq!(edited.origin(), DVec3::new(1.0, 2.0, 3.0));
+        let (old, new) = (edited.document(), Document { seed: 6, ..document(4) });
+        let scene = edited.scene(&new);
         assert_eq!(scene.clouds[1].n_groups(), 4);
         assert_eq!(
             (&scene.clouds[0], &scene.clouds[2]),
             (&loaded.scene.clouds[0], &loaded.scene.clouds[2])
         );
-        // One group of the disc before.
-        assert_eq!(scenery.groups(&Touched::between(&old, &new)), [3, 4]);
+        // The disc before has one group.
+        assert_eq!(edited.groups(&new.regenerated_since(&old)), [3, 4]);
         let all: Vec<u32> = (0..200).collect();
         assert_eq!(
-            scenery.statuses(&new.boxes, &all),
+            edited.statuses(&new.boxes, &all),
             (7..7 + 10 + 11 + 12 + 13).collect::<Vec<u32>>()
         );
-        assert!(scenery.statuses(&new.boxes, &all[..20]).is_empty());
+        assert!(edited.statuses(&new.boxes, &all[..20]).is_empty());
         let without = Scene { clouds: loaded.scene.clouds[..1].to_vec(), ..loaded.scene };
-        assert!(Scenery::of(without).is_err());
+        assert!(EditedScene::new(without).is_err());
     }
 }

@@ -1,10 +1,10 @@
-//! Documents that the tests of several files begin with.
+//! Documents and states for tests.
 
 use glam::DVec3;
 
 use super::action::{Action, Edit, Select};
 use super::document::Document;
-use super::selection::How;
+use super::selection::SelectionMode;
 use super::state::Editor;
 use crate::model::boxes::CloudBox;
 
@@ -12,7 +12,7 @@ pub fn unit_box() -> CloudBox {
     CloudBox { n_particles: 10, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 2.0 }
 }
 
-/// Boxes that differ: of 10, 11, 12 … particles, at x = 0, 4, 8 …
+/// Returns boxes of 10, 11, 12 … particles at x = 0, 4, 8 …
 pub fn document(n: u32) -> Document {
     let of = |i: u32| CloudBox {
         n_particles: 10 + i,
@@ -26,10 +26,10 @@ pub fn editor(n: u32) -> Editor {
     Editor::new(document(n).boxes)
 }
 
-/// After actions that are all taken.
+/// Returns the state after actions, none of which may be refused.
 pub fn after(editor: &Editor, actions: &[Action]) -> Editor {
     actions.iter().fold(editor.clone(), |editor, action| match editor.after(action) {
-        Ok((next, _)) => next,
+        Ok(next) => next,
         Err(refusal) => panic!("{action:?}: {refusal}"),
     })
 }
@@ -39,5 +39,5 @@ pub fn edited(editor: &Editor, edit: Edit) -> Editor {
 }
 
 pub fn selected(editor: &Editor, boxes: &[usize]) -> Editor {
-    after(editor, &[Action::Select(Select::Boxes { boxes: boxes.to_vec(), how: How::Replace })])
+    after(editor, &[Action::Select(Select::Boxes { boxes: boxes.to_vec(), mode: SelectionMode::Replace })])
 }

@@ -20,7 +20,7 @@ use nimbus::layout::particle::ParticleRecord;
 use nimbus::model::boxes::CloudBox;
 use nimbus::model::cloud::CloudSource;
 use nimbus::model::scene::Scene;
-use nimbus::viewer::editor::{Document, Touched};
+use nimbus::viewer::editor::Document;
 
 /// A scene of two clouds, of which the first is edited.
 fn scene(more: &str, of_cloud: &str) -> Scene {
@@ -129,10 +129,9 @@ fn after_any_edits_all_is_as_of_a_fresh_player() {
         for i_edit in 0..2 * N_KINDS {
             let before = document.clone();
             let is_same_size = edit(&mut document, i_edit % N_KINDS, &mut random);
-            let touched = Touched::between(&before, &document);
+            let boxes = document.regenerated_since(&before);
             let scene = with(&base, &document);
-            let reshaped =
-                player.reshape(&bed, scene.clone(), &touched.generate).expect("reshaped");
+            let reshaped = player.reshape(&bed, scene.clone(), &boxes).expect("reshaped");
             assert_eq!(
                 reshaped == Reshaped::InPlace,
                 is_same_size,

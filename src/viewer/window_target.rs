@@ -7,8 +7,8 @@ use crate::error::Result;
 use crate::frame::render::Renderer;
 use crate::frame::stage::{Bed, DeviceChoice};
 use crate::gpu::{
-    Buffer, Commands, Instance, MemoryUsage, Overlay, PresentMode, PresentOutcome, Recorder, Surface,
-    Swapchain,
+    Buffer, Commands, Instance, MemoryUsage, Overlay, PresentMode, PresentOutcome, Recorder,
+    Surface, Swapchain,
 };
 use crate::model::film::{Film, ToneMap};
 use crate::passes::present::{self, Compare, Present};

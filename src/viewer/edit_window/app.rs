@@ -139,7 +139,8 @@ impl App {
             dialog: None,
             acceptances: vec![],
             render_failure: None,
-            recent: default_path().map_or_else(RecentFiles::default, |path| RecentFiles::load(&path)),
+            recent: default_path()
+                .map_or_else(RecentFiles::default, |path| RecentFiles::load(&path)),
             failure: None,
             is_closed: false,
         })

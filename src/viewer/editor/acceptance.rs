@@ -26,11 +26,7 @@ pub fn box_acceptances(boxes: &[CloudBox], statuses: &[u32]) -> Vec<BoxAcceptanc
         let n_folded = own.iter().filter(|status| **status & FOLDED != 0).count() as u64;
         let n_attempts = own.iter().map(|status| u64::from(status & !FOLDED)).sum();
         let acceptance = Acceptance { n_attempts, n_accepted: n_generated - n_folded, n_folded };
-        BoxAcceptance {
-            acceptance,
-            n_generated: n_generated as u32,
-            n_particles: b.n_particles,
-        }
+        BoxAcceptance { acceptance, n_generated: n_generated as u32, n_particles: b.n_particles }
     };
     boxes.iter().map(of).collect()
 }

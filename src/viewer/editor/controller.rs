@@ -6,7 +6,6 @@
 use glam::{DVec2, DVec3};
 
 use super::action::{Action, Edit, Setting};
-use super::axis::Axis;
 use super::grid_snap::GridSnap;
 use super::handles::Handle;
 use super::input::{Field, Input};

@@ -107,13 +107,7 @@ pub(super) fn shifted(c: DVec3, offset: DVec3) -> DVec3 {
 
 /// Sets the length of a box along an axis. The face on the side of `sign` moves, and also the other
 /// face where the anchor is the centre.
-pub(super) fn resize(
-    b: &mut CloudBox,
-    axis: Axis,
-    length: f64,
-    anchor: ScalingAnchor,
-    sign: f64,
-) {
+pub(super) fn resize(b: &mut CloudBox, axis: Axis, length: f64, anchor: ScalingAnchor, sign: f64) {
     let k = axis.index();
     let growth = length - b.extent[k];
     if growth == 0.0 {

@@ -39,5 +39,8 @@ pub fn edited(editor: &Editor, edit: Edit) -> Editor {
 }
 
 pub fn selected(editor: &Editor, boxes: &[usize]) -> Editor {
-    after(editor, &[Action::Select(Select::Boxes { boxes: boxes.to_vec(), mode: SelectionMode::Replace })])
+    after(
+        editor,
+        &[Action::Select(Select::Boxes { boxes: boxes.to_vec(), mode: SelectionMode::Replace })],
+    )
 }

@@ -90,7 +90,11 @@ pub fn place_handles(b: &CloudBox, view: &Viewport) -> Vec<PlacedHandle> {
         let half = 0.5 * b.extent[axis.index()];
         for side in Side::BOTH {
             let face = b.center + side.sign() * half * unit;
-            placed.push(PlacedHandle { handle: Handle::ScaleFace(axis, side), from: face, to: face });
+            placed.push(PlacedHandle {
+                handle: Handle::ScaleFace(axis, side),
+                from: face,
+                to: face,
+            });
         }
         let face = b.center + half * unit;
         let point = view.units_per_point(face);
@@ -105,8 +109,9 @@ pub fn place_handles(b: &CloudBox, view: &Viewport) -> Vec<PlacedHandle> {
 
 /// Returns the handle nearest to a pixel within [`REACH_POINTS`].
 pub fn pick_handle(placed: &[PlacedHandle], view: &Viewport, pixel: DVec2) -> Option<Handle> {
-    let distance =
-        |p: &PlacedHandle| Some(distance_to_segment(pixel, view.project(p.from)?, view.project(p.to)?));
+    let distance = |p: &PlacedHandle| {
+        Some(distance_to_segment(pixel, view.project(p.from)?, view.project(p.to)?))
+    };
     let reached = placed.iter().filter_map(|p| Some((p.handle, distance(p)?)));
     let nearest = reached.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (nearest.1 <= REACH_POINTS * view.px_per_point).then_some(nearest.0)

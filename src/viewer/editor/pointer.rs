@@ -221,8 +221,7 @@ impl Pointer {
         let motion = if pans {
             // The target stays under the pointer.
             let view = self.viewport();
-            let units =
-                offset * view.units_per_point(self.camera.target()) / view.px_per_point;
+            let units = offset * view.units_per_point(self.camera.target()) / view.px_per_point;
             let along = DVec3::new(-units.x, units.y, 0.0).normalize_or_zero();
             Motion::Fly { along, seconds: units.length() / self.camera.speed() }
         } else {

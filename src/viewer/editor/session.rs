@@ -245,8 +245,9 @@ impl Session {
 /// Opens or saves a file. Returns `None` for a request that needs a dialog or ends the window.
 pub fn perform(request: &Request) -> Option<SessionEvent> {
     let done = match request {
-        Request::Open(path) => box_file::read(path)
-            .map(|boxes| SessionEvent::Opened { path: path.clone(), boxes }),
+        Request::Open(path) => {
+            box_file::read(path).map(|boxes| SessionEvent::Opened { path: path.clone(), boxes })
+        }
         Request::Save { path, document } => box_file::write(path, &document.boxes)
             .map(|()| SessionEvent::Saved { path: path.clone(), document: document.clone() }),
         Request::Ask(_) | Request::ChooseToOpen | Request::ChooseToSave | Request::Quit => {

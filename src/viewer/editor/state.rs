@@ -108,9 +108,7 @@ impl Editor {
             Setting::Snap(snap) if snap.is_valid() => settings.snap = snap,
             Setting::Snap(snap) => {
                 let step = snap.step;
-                return Err(Refusal(format!(
-                    "grid step: expected a number above 0, found {step}"
-                )));
+                return Err(Refusal(format!("grid step: expected a number above 0, found {step}")));
             }
             Setting::Anchor(anchor) => settings.anchor = anchor,
             Setting::Axis(axis) => settings.axis = axis,

@@ -43,14 +43,14 @@ impl Viewport {
     }
 
     /// Returns a place in view space: right, up and forward of the camera.
-    pub(super) fn to_view(&self, place: DVec3) -> DVec3 {
+    pub(super) fn in_view_space(&self, place: DVec3) -> DVec3 {
         let v = place - self.pose.position;
         DVec3::new(v.dot(self.pose.right), v.dot(self.pose.up), v.dot(self.pose.forward))
     }
 
     /// Returns the pixel of a place; `None` behind the camera.
     pub fn project(&self, place: DVec3) -> Option<DVec2> {
-        self.project_view(self.to_view(place))
+        self.project_view(self.in_view_space(place))
     }
 
     /// Returns the pixel of a place in view space.
@@ -80,7 +80,8 @@ impl Viewport {
 
     /// Returns the scene units of one logical point at the depth of `place`.
     pub fn units_per_point(&self, place: DVec3) -> f64 {
-        2.0 * (0.5 * self.fov_y_rad).tan() * self.to_view(place).z / self.size_px.y * self.px_per_point
+        2.0 * (0.5 * self.fov_y_rad).tan() * self.in_view_space(place).z / self.size_px.y
+            * self.px_per_point
     }
 }
 
@@ -104,7 +105,7 @@ pub fn pick_rectangle(
     let sides = view.sides(corner, opposite);
     // The pyramid is infinite and the box is not, so the pyramid meets a face if it meets the box.
     let is_inside = |b: &CloudBox| {
-        let corners = corners(b).map(|corner| view.to_view(corner));
+        let corners = corners(b).map(|corner| view.in_view_space(corner));
         FACES.iter().any(|face| {
             let polygon = face.iter().map(|i| corners[*i]).collect();
             !sides.iter().fold(polygon, |polygon, side| clipped(polygon, *side)).is_empty()

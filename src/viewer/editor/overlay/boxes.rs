@@ -53,7 +53,11 @@ pub fn draw_solid(editor: &Editor, canvas: &mut Canvas<'_>) {
             false => (GREY, canvas.stroke(OUTLINE, 1.0)),
         };
         if contains_camera(b, canvas) {
-            draw_box_edges(b, canvas, Stroke { color: if mask[i] { color } else { EDGE }, ..outline });
+            draw_box_edges(
+                b,
+                canvas,
+                Stroke { color: if mask[i] { color } else { EDGE }, ..outline },
+            );
             continue;
         }
         faces.extend(front_faces(b, canvas).into_iter().map(|face| {

@@ -72,7 +72,7 @@ impl Canvas<'_> {
 
     /// Returns the visible part of a convex polygon; `None` where it is less than a triangle.
     pub fn polygon(&self, places: &[DVec3]) -> Option<Vec<DVec2>> {
-        let in_view = places.iter().map(|place| self.view.to_view(*place)).collect();
+        let in_view = places.iter().map(|place| self.view.in_view_space(*place)).collect();
         let kept = self.sides.iter().fold(in_view, |polygon, side| clipped(polygon, *side));
         let pixels: Option<Vec<DVec2>> =
             kept.into_iter().map(|v| self.view.project_view(v)).collect();
@@ -81,7 +81,7 @@ impl Canvas<'_> {
 
     /// Returns the visible part of a line.
     pub fn line(&self, from: DVec3, to: DVec3) -> Option<[DVec2; 2]> {
-        let (mut a, mut b) = (self.view.to_view(from), self.view.to_view(to));
+        let (mut a, mut b) = (self.view.in_view_space(from), self.view.in_view_space(to));
         for side in self.sides {
             let (at_a, at_b) = (side.dot(a), side.dot(b));
             match (at_a >= 0.0, at_b >= 0.0) {
@@ -103,7 +103,7 @@ impl Canvas<'_> {
 
     /// Returns whether a sphere may be visible.
     pub fn may_show(&self, center: DVec3, radius: f64) -> bool {
-        let center = self.view.to_view(center);
+        let center = self.view.in_view_space(center);
         self.sides.iter().all(|side| side.dot(center) >= -radius * side.length())
     }
 }

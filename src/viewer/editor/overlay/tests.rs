@@ -1,7 +1,13 @@
 use super::super::action::{Action, DragAction, Setting};
-use super::super::samples::{after, editor, selected, unit_box};
+use super::super::axis::Axis;
+use super::super::fixtures::{after, editor, selected, unit_box};
+use super::super::handles::Handle;
+use super::boxes::{EDGE, MAX_DRAWN, ORANGE, RED, TRANSLUCENT};
+use super::canvas::MARGIN_POINTS;
 use super::*;
+use crate::model::boxes::CloudBox;
 use crate::model::camera::Pose;
+use glam::DVec3;
 
 fn view(position: DVec3, target: DVec3) -> Viewport {
     let forward = (target - position).normalize();
@@ -14,19 +20,23 @@ fn front() -> Viewport {
     view(DVec3::new(5.0, 4.0, 12.0), DVec3::ZERO)
 }
 
-fn shown(editor: &Editor, view: View) -> Editor {
-    after(editor, &[Action::Set(Setting::View(view))])
+fn shown(editor: &Editor, mode: DisplayMode) -> Editor {
+    after(editor, &[Action::Set(Setting::Display(mode))])
 }
 
-/// Fill, stroke and middle of every box's opaque faces, in order.
+/// Returns fill, outline and middle of every box's faces, in order.
 fn faces_of(shapes: &[Shape]) -> Vec<(Color, Stroke, DVec2)> {
     let of = |shape: &Shape| match shape {
-        Shape::Polygon { corners, fill, stroke: Some(stroke) } if !gizmo::is_of_handle(*fill) => {
+        Shape::Polygon { corners, fill, outline: Some(stroke) } if !is_of_handle(*fill) => {
             Some((*fill, *stroke, corners.iter().sum::<DVec2>() / corners.len() as f64))
         }
         _ => None,
     };
     shapes.iter().filter_map(of).collect()
+}
+
+fn is_of_handle(fill: Color) -> bool {
+    gizmo::AXES.contains(&fill) || [gizmo::HIGHLIGHT, gizmo::CENTER].contains(&fill)
 }
 
 fn is_red(fill: &Color) -> bool {
@@ -41,8 +51,8 @@ fn lines_of(shapes: &[Shape], color: Color) -> usize {
 }
 
 #[test]
-fn three_faces_of_a_box_are_seen_and_the_one_to_the_light_is_brightest() {
-    let faces = faces_of(&sketch(&editor(1), &front(), Pointing::default()));
+fn three_faces_of_a_box_show_and_the_one_toward_the_light_is_brightest() {
+    let faces = faces_of(&overlay_shapes(&editor(1), &front(), PointerFeedback::default()));
     assert_eq!(faces.len(), 3);
     let view = front();
     let brightness = |place: DVec3| {
@@ -59,32 +69,35 @@ fn three_faces_of_a_box_are_seen_and_the_one_to_the_light_is_brightest() {
 }
 
 #[test]
-fn the_active_box_is_red_and_what_else_is_selected_has_an_orange_rim() {
+fn the_active_box_is_red_and_other_selected_boxes_have_an_orange_outline() {
     let editor = selected(&editor(3), &[0, 1]);
-    let faces = faces_of(&sketch(
+    let faces = faces_of(&overlay_shapes(
         &editor,
         &view(DVec3::new(4.0, 6.0, 16.0), DVec3::X * 4.0),
-        Pointing::default(),
+        PointerFeedback::default(),
     ));
     let n_red = faces.iter().filter(|(fill, ..)| is_red(fill)).count();
     let n_orange =
         faces.iter().filter(|(fill, stroke, _)| stroke.color == ORANGE && !is_red(fill)).count();
-    // Seen from straight before it the box in the middle shows two faces.
+    // The box in the middle of the view shows two faces.
     assert_eq!((n_red, n_orange), (2, 3));
 }
 
 #[test]
-fn what_is_nearer_is_drawn_later() {
+fn nearer_faces_are_drawn_later() {
     let at = |z: f64| CloudBox { center: DVec3::Z * z, ..unit_box() };
     let editor = Editor::new([3.0, -5.0, 0.0].map(at).to_vec());
-    let faces = faces_of(&sketch(
+    let faces = faces_of(&overlay_shapes(
         &editor,
         &view(DVec3::new(0.2, 0.1, 20.0), DVec3::ZERO),
-        Pointing::default(),
+        PointerFeedback::default(),
     ));
-    // Fronts of the three, which differ in size: by their widths on the picture, as they are drawn.
-    let shapes =
-        sketch(&editor, &view(DVec3::new(0.0, 0.0, 20.0), DVec3::ZERO), Pointing::default());
+    // The front faces, in drawing order, grow with their nearness.
+    let shapes = overlay_shapes(
+        &editor,
+        &view(DVec3::new(0.0, 0.0, 20.0), DVec3::ZERO),
+        PointerFeedback::default(),
+    );
     let widths: Vec<f64> = shapes
         .iter()
         .filter_map(|shape| match shape {
@@ -99,33 +112,33 @@ fn what_is_nearer_is_drawn_later() {
 }
 
 #[test]
-fn each_view_shows_its_own() {
+fn each_display_mode_has_its_own_shapes() {
     let editor = selected(&editor(2), &[1]);
-    let shapes = |view| sketch(&shown(&editor, view), &front(), Pointing::default());
-    let handles_alone = shapes(View::Cloud);
+    let shapes = |mode| overlay_shapes(&shown(&editor, mode), &front(), PointerFeedback::default());
+    let handles_alone = shapes(DisplayMode::Cloud);
     let n_handles = editor.handles(&front()).len();
-    // A square or a line, a head and a letter each, and what the box is called.
+    // A square or a line each, a head and a letter for each arrow, and the box's label.
     assert_eq!(handles_alone.len(), n_handles + 2 * 3 + 1);
     assert!(
-        sketch(
-            &shown(&super::super::samples::editor(2), View::Cloud),
+        overlay_shapes(
+            &shown(&super::super::fixtures::editor(2), DisplayMode::Cloud),
             &front(),
-            Pointing::default()
+            PointerFeedback::default()
         )
         .is_empty()
     );
-    let both = shapes(View::Both);
+    let both = shapes(DisplayMode::Both);
     assert_eq!((lines_of(&both, EDGE), lines_of(&both, RED)), (12, 12));
     let glass =
         both.iter().filter(|s| matches!(s, Shape::Polygon { fill, .. } if fill[3] == TRANSLUCENT));
     assert!(glass.count() >= 2);
-    let boxes = shapes(View::Boxes);
+    let boxes = shapes(DisplayMode::Boxes);
     assert!(boxes.ends_with(&handles_alone) && both.ends_with(&handles_alone));
     assert_eq!((lines_of(&boxes, EDGE), lines_of(&boxes, RED)), (0, 0));
 }
 
 #[test]
-fn handles_lie_where_they_are_found_and_light_up() {
+fn handles_are_drawn_where_they_are_picked_and_are_highlighted() {
     let editor = selected(&editor(1), &[0]);
     let view = front();
     let moves_x = Handle::MoveAxis(Axis::X);
@@ -142,25 +155,27 @@ fn handles_lie_where_they_are_found_and_light_up() {
         };
         shapes.iter().find_map(of).unwrap()
     };
-    assert_eq!(color(&sketch(&editor, &view, Pointing::default())), gizmo::AXES[0]);
-    let hovered = Pointing { hovered: Some(moves_x), ..Pointing::default() };
-    assert_eq!(color(&sketch(&editor, &view, hovered)), gizmo::LIT);
-    // What is held is lit whatever lies under the pointer.
+    assert_eq!(color(&overlay_shapes(&editor, &view, PointerFeedback::default())), gizmo::AXES[0]);
+    let hovered = PointerFeedback { hovered: Some(moves_x), ..PointerFeedback::default() };
+    assert_eq!(color(&overlay_shapes(&editor, &view, hovered)), gizmo::HIGHLIGHT);
+    // The dragged handle is highlighted, whatever is under the pointer.
     let (ray, forward) = (view.ray(ends[0]), view.pose.forward);
     let held = after(&editor, &[Action::Drag(DragAction::Begin { handle: moves_x, ray, forward })]);
-    let other = Pointing { hovered: Some(Handle::MoveView), ..Pointing::default() };
-    assert_eq!(color(&sketch(&held, &view, other)), gizmo::LIT);
-    let rectangle = Pointing { rectangle: Some([DVec2::ZERO, DVec2::ONE]), ..Pointing::default() };
+    let other = PointerFeedback { hovered: Some(Handle::MoveView), ..PointerFeedback::default() };
+    assert_eq!(color(&overlay_shapes(&held, &view, other)), gizmo::HIGHLIGHT);
+    let rectangle = PointerFeedback {
+        rectangle: Some([DVec2::ZERO, DVec2::ONE]),
+        ..PointerFeedback::default()
+    };
     assert_eq!(
-        sketch(&editor, &view, rectangle).len(),
-        sketch(&editor, &view, Pointing::default()).len() + 1
+        overlay_shapes(&editor, &view, rectangle).len(),
+        overlay_shapes(&editor, &view, PointerFeedback::default()).len() + 1
     );
 }
 
-/// From among, within and behind boxes of every size nothing is drawn beyond the margin, and every
-/// polygon is convex and turns one way.
+/// The camera is between, inside and behind boxes of every size.
 #[test]
-fn nothing_flips_wherever_the_eye_is() {
+fn shapes_stay_within_the_margin_and_polygons_are_convex() {
     let mut state = 1u64;
     let mut uniform = || {
         state =
@@ -175,8 +190,8 @@ fn nothing_flips_wherever_the_eye_is() {
             .collect();
         let view = view(place(6.0), place(3.0));
         let editor = selected(&Editor::new(boxes), &[0, 5]);
-        for what in [View::Boxes, View::Both] {
-            let shapes = sketch(&shown(&editor, what), &view, Pointing::default());
+        for what in [DisplayMode::Boxes, DisplayMode::Both] {
+            let shapes = overlay_shapes(&shown(&editor, what), &view, PointerFeedback::default());
             n_shapes += shapes.len();
             shapes.iter().for_each(|shape| check(shape, &view, i));
         }
@@ -185,7 +200,7 @@ fn nothing_flips_wherever_the_eye_is() {
 }
 
 fn check(shape: &Shape, view: &Viewport, i: usize) {
-    // Heads and letters of arrows lie beside their ends.
+    // Heads and letters of arrows extend beyond their ends.
     let most = MARGIN_POINTS + 20.0;
     let within =
         |p: &DVec2| p.cmpge(DVec2::splat(-most)).all() && p.cmple(view.size_px + most).all();
@@ -197,7 +212,7 @@ fn check(shape: &Shape, view: &Viewport, i: usize) {
                 let [a, b, c] = [corners[k], corners[(k + 1) % n], corners[(k + 2) % n]];
                 (b - a).perp_dot(c - b)
             };
-            // Rounding of pixels of some thousand, squared.
+            // Rounding of products of pixel coordinates up to some thousand.
             let (least, most) =
                 (0..n).map(turns).fold((0.0f64, 0.0f64), |(l, m), t| (l.min(t), m.max(t)));
             assert!(least > -1e-6 || most < 1e-6, "{i}: {least} {most} {shape:?}");
@@ -208,19 +223,19 @@ fn check(shape: &Shape, view: &Viewport, i: usize) {
 }
 
 #[test]
-fn a_box_around_the_eye_shows_its_edges_alone() {
+fn a_box_around_the_camera_shows_only_edges() {
     let around = CloudBox { extent: DVec3::new(8.0, 8.0, 40.0), ..unit_box() };
-    let shapes = sketch(
+    let shapes = overlay_shapes(
         &Editor::new(vec![around, unit_box()]),
         &view(DVec3::Z * 5.0, DVec3::ZERO),
-        Pointing::default(),
+        PointerFeedback::default(),
     );
     assert_eq!(faces_of(&shapes).len(), 1);
     assert!(lines_of(&shapes, EDGE) >= 4);
 }
 
 #[test]
-fn of_very_many_boxes_the_nearest_and_the_active_one_are_drawn() {
+fn of_too_many_boxes_the_nearest_and_the_active_one_are_drawn() {
     let at = |i: u32| CloudBox {
         center: DVec3::new(f64::from(i % 100) - 50.0, 0.0, -f64::from(i / 100)),
         ..unit_box()
@@ -228,19 +243,19 @@ fn of_very_many_boxes_the_nearest_and_the_active_one_are_drawn() {
     let boxes: Vec<CloudBox> = (0..20_000).map(at).collect();
     let far = boxes.len() - 50;
     let editor = selected(&Editor::new(boxes), &[far]);
-    let shapes = sketch(
+    let shapes = overlay_shapes(
         &editor,
         &view(DVec3::new(0.0, 60.0, 100.0), DVec3::new(0.0, 0.0, -100.0)),
-        Pointing::default(),
+        PointerFeedback::default(),
     );
     let faces = faces_of(&shapes);
-    assert!(faces.len() > MOST_DRAWN && faces.len() < 4 * MOST_DRAWN, "{}", faces.len());
+    assert!(faces.len() > MAX_DRAWN && faces.len() < 4 * MAX_DRAWN, "{}", faces.len());
     assert!(faces.iter().any(|(fill, ..)| is_red(fill)));
-    // What lies behind costs nothing.
-    let away = sketch(
+    // Boxes behind the camera are not drawn.
+    let away = overlay_shapes(
         &editor,
         &view(DVec3::new(0.0, 0.0, 100.0), DVec3::new(0.0, 0.0, 200.0)),
-        Pointing::default(),
+        PointerFeedback::default(),
     );
     assert!(faces_of(&away).is_empty());
 }

@@ -214,8 +214,8 @@ fn difference(a: &[u8], b: &[u8], width: u32) -> f64 {
 }
 
 const BLOCK: usize = 16;
-/// Largest difference of equal pictures. A driver may place an edge half a pixel elsewhere, which is
-/// 1/32 of a block, and three edges meet in a box's corner. A missing face fills whole blocks.
+/// Largest difference of equal pictures. A driver may place an edge half a pixel elsewhere, which
+/// is 1/32 of a block, and three edges meet in a box's corner. A missing face fills whole blocks.
 const MAX_DIFFERENCE: f64 = 3.0 / 32.0;
 
 #[test]

@@ -129,9 +129,9 @@ fn mirroring_twice_restores_the_document() {
                 after_all(&start, &[mirror.clone(), mirror])
             };
             prop_assert!(twice(MirrorPlane::Zero).document().is_same(start.document()));
-            // Let M bound the selection's coordinates, and u = ε/2. Faces are off by uM, their sum by
-            // 4uM, and the mirrored centre by 5uM. The second sum is off by 14uM, and the restored
-            // centre by 20uM, which is 10 εM.
+            // Let M bound the selection's coordinates, and u = ε/2. Faces are off by uM, their sum
+            // by 4uM, and the mirrored centre by 5uM. The second sum is off by 14uM, and the
+            // restored centre by 20uM, which is 10 εM.
             let chosen = start.selection().boxes().iter().map(|i| start.boxes()[*i]);
             let most =
                 chosen.map(|b| b.center.abs() + 0.5 * b.extent).fold(DVec3::ZERO, DVec3::max);

@@ -217,8 +217,8 @@ fn a_scene_without_a_reference_reports_why() {
 /// The device draws from the camera of the window, and not from that of the scene.
 #[test]
 fn the_devices_picture_has_the_expected_error() {
-    // ROUNDED: a hundred layers of f32, some roundings of 2^-24 each. LIT: the error of light by the
-    // directions of a grid and a basis of a few vectors.
+    // ROUNDED: a hundred layers of f32, some roundings of 2^-24 each. LIT: the error of light by
+    // the directions of a grid and a basis of a few vectors.
     const ROUNDED: f64 = 2e-5;
     const LIT: f64 = 5e-3;
     for (set, most) in [

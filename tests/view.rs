@@ -55,7 +55,7 @@ impl<'a> View<'a> {
         names.iter().for_each(|name| self.display.key(name));
     }
 
-    /// What the program has written to stderr so far.
+    /// Returns the program's stderr so far.
     fn text(&self) -> String {
         std::fs::read_to_string(&self.stderr).unwrap_or_default()
     }

@@ -56,8 +56,8 @@ impl Window<'_> {
         *self.controller.editor().active_box().unwrap().1
     }
 
-    /// Drags the arrow along an axis until the box's coordinate is about `to`. Ctrl snaps to the grid
-    /// of tenths.
+    /// Drags the arrow along an axis until the box's coordinate is about `to`. Ctrl snaps to the
+    /// grid of tenths.
     fn pulls(&mut self, axis: Axis, to: f64) {
         let (view, b) = (self.controller.viewport(), self.active());
         let handles = self.controller.editor().handles(&view);

@@ -8,5 +8,5 @@ mod panels;
 mod render_thread;
 mod shapes;
 
-pub use app::{Options, run};
+pub(crate) use app::{Options, run};
 pub use panels::picture_size;

@@ -16,10 +16,15 @@ use crate::model::boxes::CloudBox;
 pub enum Action {
     /// Changes the document. The change, if any, is one step of the history.
     Edit(Edit),
+    /// Changes the selection.
     Select(Select),
+    /// Begins, continues or ends a drag.
     Drag(DragAction),
+    /// Restores the state before the last step.
     Undo,
+    /// Restores the state after the step that was undone last.
     Redo,
+    /// Changes a setting.
     Set(Setting),
 }
 
@@ -30,6 +35,7 @@ pub enum Edit {
     Add(CloudBox),
     /// Appends copies at the same places and selects them.
     Duplicate,
+    /// Removes the boxes.
     Delete,
     /// Sets the number of particles.
     Count(u32),
@@ -42,10 +48,15 @@ pub enum Edit {
     Center(Axis, f64),
     /// Sets the largest radius of the particles.
     Radius(f64),
+    /// Moves the centres.
     MoveBy(DVec3),
+    /// Mirrors the boxes across a plane.
     Mirror {
+        /// Axis perpendicular to the plane.
         axis: Axis,
+        /// Place of the plane.
         plane: MirrorPlane,
+        /// Use of the images.
         result: MirrorResult,
     },
     /// Sets the cloud's seed, whatever is selected.
@@ -57,13 +68,19 @@ pub enum Edit {
 pub enum Select {
     /// The last of the boxes becomes active.
     Boxes {
+        /// Indices of the boxes.
         boxes: Vec<usize>,
+        /// Effect on the selection before.
         mode: SelectionMode,
     },
+    /// Selects every box; the active box stays active.
     All,
+    /// Selects no box.
     None,
-    /// Selects the box after the active one alone. The list is cyclic; it starts with the first box.
+    /// Selects the box after the active one alone. The list is cyclic; it starts with the first
+    /// box.
     Next,
+    /// Selects the box before the active one alone.
     Previous,
 }
 
@@ -71,7 +88,9 @@ pub enum Select {
 /// the history.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DragAction {
+    /// Takes hold of a handle.
     Begin {
+        /// The handle under the pointer.
         handle: Handle,
         /// Ray through the pointer.
         ray: Ray,
@@ -80,11 +99,14 @@ pub enum DragAction {
     },
     /// Moves the pointer to `ray`.
     To {
+        /// Ray through the pointer.
         ray: Ray,
+        /// Keys that are held.
         modifiers: DragModifiers,
     },
     /// Restricts the drag to an axis; the same axis again lifts the restriction.
     Constrain(Axis),
+    /// Ends the drag where it is.
     End,
     /// Restores the document.
     Cancel,
@@ -93,16 +115,22 @@ pub enum DragAction {
 /// Settings that a held key inverts during a drag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DragModifiers {
+    /// Inverts snapping to the grid.
     pub snap: bool,
+    /// Toggles the scaling anchor.
     pub anchor: bool,
 }
 
 /// A change of one setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Setting {
+    /// Sets what is drawn.
     Display(DisplayMode),
+    /// Sets the grid.
     Snap(GridSnap),
+    /// Sets the anchor of scaling.
     Anchor(ScalingAnchor),
+    /// Sets the axis of mirroring.
     Axis(Axis),
 }
 

@@ -5,8 +5,11 @@ use glam::DVec3;
 /// An axis of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Axis {
+    /// The first axis, to the right.
     X,
+    /// The second axis, upward.
     Y,
+    /// The third axis, toward the default camera.
     Z,
 }
 

@@ -11,6 +11,7 @@ pub const MAX_BOXES: usize = 1 << 18;
 /// The boxes of a cloud, and its seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Document {
+    /// Boxes in the order of the file.
     pub boxes: Vec<CloudBox>,
     /// Seed of the cloud's particles. It belongs to the scene, not to the box file, so a changed
     /// seed is not an unsaved change.
@@ -51,9 +52,10 @@ impl Document {
 
     /// Returns the boxes whose particles must be generated again after a change from `before`.
     ///
-    /// The particles of a box follow from the cloud's seed, the index of the box, and the box. Their
-    /// places relative to the box's centre do not depend on that centre (docs/model.md §1). A box
-    /// that only moves keeps its particles. A deleted box changes the indices of the later ones.
+    /// The particles of a box follow from the cloud's seed, the index of the box, and the box.
+    /// Their places relative to the box's centre do not depend on that centre (docs/model.md §1). A
+    /// box that only moves keeps its particles. A deleted box changes the indices of the later
+    /// ones.
     pub fn regenerated_since(&self, before: &Document) -> Vec<usize> {
         let is_kept = |i: &usize| {
             let was = before.boxes.get(*i);

@@ -1,5 +1,5 @@
-//! The scene around the edited boxes: scenes/cubes-554.toml by default, or any scene with a cloud made
-//! from boxes.
+//! The scene around the edited boxes: scenes/cubes-554.toml by default, or any scene with a cloud
+//! made from boxes.
 
 use std::path::Path;
 use std::sync::Arc;

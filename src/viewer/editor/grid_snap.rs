@@ -5,6 +5,7 @@ use glam::DVec3;
 /// A grid that drags snap to. Typed numbers do not snap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridSnap {
+    /// Whether drags snap.
     pub is_on: bool,
     /// Distance of neighbouring grid lines, scene units.
     pub step: f64,

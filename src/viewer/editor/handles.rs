@@ -10,16 +10,20 @@ use crate::model::boxes::CloudBox;
 /// A side of a box along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Side {
+    /// The side of the smaller coordinate.
     Low,
+    /// The side of the larger coordinate.
     High,
 }
 
 /// A handle that a drag takes hold of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Handle {
+    /// Moves along an axis.
     MoveAxis(Axis),
     /// Moves in the plane through the centre that faces the camera.
     MoveView,
+    /// Moves one face.
     ScaleFace(Axis, Side),
     /// Scales all selected boxes, and their distances, by the pointer's distance from their middle.
     ScaleAll,
@@ -30,8 +34,11 @@ pub enum Handle {
 /// A handle in the scene: a line, or a point where both ends are equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlacedHandle {
+    /// The handle.
     pub handle: Handle,
+    /// Begin of the line.
     pub from: DVec3,
+    /// End of the line.
     pub to: DVec3,
 }
 

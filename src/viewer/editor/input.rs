@@ -11,29 +11,42 @@ use super::shortcuts::Chord;
 /// An input event. Pixels are counted as in [`super::Viewport`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum Input {
+    /// The pointer has moved.
     PointerMoved {
+        /// Place in the picture.
         pixel: DVec2,
+        /// Keys that are held.
         keys: ModifierKeys,
     },
     /// The pointer has left the window. A drag stays in progress.
     PointerLeft,
     /// A press or release of a mouse button. Releases count wherever the pointer is.
     Button {
+        /// The button.
         button: Button,
+        /// Whether it was pressed.
         is_down: bool,
+        /// Keys that are held.
         keys: ModifierKeys,
     },
     /// Notches of the wheel, away from the user.
     Wheel(f64),
+    /// A key was pressed.
     Chord(Chord),
+    /// The picture has another size.
     Resized {
+        /// Width and height in pixels.
         size_px: DVec2,
+        /// Pixels per logical point.
         px_per_point: f64,
     },
+    /// The window has lost the keyboard.
     FocusLost,
     /// Text that was entered into a field of a panel.
     Typed {
+        /// The field.
         field: Field,
+        /// The entered text.
         text: String,
     },
     /// A click in a panel, or the answer to a request.
@@ -43,8 +56,11 @@ pub enum Input {
 /// A button of the mouse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Button {
+    /// Selects and drags.
     Left,
+    /// Moves the camera.
     Middle,
+    /// Moves the camera.
     Right,
 }
 
@@ -53,6 +69,7 @@ pub enum Button {
 pub struct ModifierKeys {
     /// Ctrl, or Command on a Mac.
     pub ctrl: bool,
+    /// Shift.
     pub shift: bool,
 }
 
@@ -76,10 +93,15 @@ impl ModifierKeys {
 /// A number in a panel. A number of a box is that of all selected boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Field {
+    /// The number of particles.
     Count,
+    /// Particles per volume.
     Density,
+    /// The extent along an axis.
     Extent(Axis),
+    /// A coordinate of the centre.
     Center(Axis),
+    /// The largest radius of the particles.
     Radius,
     /// The cloud's seed.
     Seed,

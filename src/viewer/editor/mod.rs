@@ -37,25 +37,29 @@ mod shortcuts;
 mod state;
 mod viewport;
 
-pub use acceptance::{BoxAcceptance, box_acceptances, mean_rate};
 pub use action::{Action, DragAction, DragModifiers, Edit, Select, Setting};
 pub use axis::Axis;
-pub use controller::{EditorController, PointerFeedback};
+pub use controller::EditorController;
 pub use document::Document;
 pub use edited_scene::EditedScene;
 pub use grid_snap::GridSnap;
-pub use handles::{Handle, PlacedHandle, Side};
-pub use history::History;
-pub use input::{Button, Field, Input, MOUSE_HELP, ModifierKeys};
+pub use handles::{Handle, Side};
+pub use input::{Button, Field, Input, ModifierKeys};
 pub use mirror::{MirrorPlane, MirrorResult};
-pub use overlay::{Color, Shape, Stroke, overlay_shapes};
 pub use pointer::PictureArea;
 pub use ray::Ray;
-pub use recent_files::{RecentFiles, default_path};
-pub use refusal::Refusal;
-pub use selection::{Selection, SelectionMode};
+pub use selection::SelectionMode;
 pub use session::{Answer, Intent, Request, Session, SessionEvent, perform};
-pub use settings::{DisplayMode, ScalingAnchor, Settings};
-pub use shortcuts::{Chord, Command, Key, SHORTCUTS, Shortcut, command};
+pub use settings::{DisplayMode, ScalingAnchor};
+pub use shortcuts::{Chord, Key};
 pub use state::Editor;
 pub use viewport::Viewport;
+
+#[cfg(feature = "window")]
+pub(crate) use self::{
+    acceptance::{BoxAcceptance, box_acceptances, mean_rate},
+    input::MOUSE_HELP,
+    overlay::{Color, Shape, Stroke, overlay_shapes},
+    recent_files::{RecentFiles, default_path},
+    shortcuts::{Command, SHORTCUTS},
+};

@@ -14,9 +14,11 @@ use crate::viewer::fly_camera::{FlyCamera, Motion};
 /// The part of the window that the picture fills.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PictureArea {
+    /// Width and height in pixels.
     pub size_px: DVec2,
     /// Pixels per logical point.
     pub px_per_point: f64,
+    /// Vertical field of view, rad.
     pub fov_y_rad: f64,
 }
 

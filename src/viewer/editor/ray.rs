@@ -7,6 +7,7 @@ use crate::model::boxes::CloudBox;
 /// A half line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
+    /// First point.
     pub origin: DVec3,
     /// Unit vector.
     pub direction: DVec3,
@@ -26,8 +27,8 @@ impl Ray {
 
     /// Returns the distance to the box's surface, faces included.
     ///
-    /// From outside the ray hits where it enters. From inside it hits where it leaves, so that a box
-    /// around the camera does not hide the boxes in it.
+    /// From outside the ray hits where it enters. From inside it hits where it leaves, so that a
+    /// box around the camera does not hide the boxes in it.
     ///
     /// *Source*: slab method.
     pub fn hit(&self, b: &CloudBox) -> Option<f64> {

@@ -14,10 +14,13 @@ pub struct Selection {
 /// The effect of a selection on the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SelectionMode {
+    /// Selects the boxes alone.
     Replace,
+    /// Selects the boxes, too.
     Add,
     /// Selects the boxes that are not selected, and deselects the others.
     Toggle,
+    /// Deselects the boxes.
     Remove,
 }
 

@@ -40,29 +40,43 @@ enum Pending {
 /// An action that would lose unsaved changes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Intent {
+    /// Begins a new cloud.
     New,
     /// Opens a file; without a path the user chooses one.
     Open(Option<PathBuf>),
+    /// Closes the window.
     Quit,
 }
 
 /// An event of the session.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SessionEvent {
+    /// An action on the document.
     Act(Action),
+    /// An action that may need a question first.
     Intend(Intent),
+    /// The answer to the question.
     Answer(Answer),
+    /// Saves to the file.
     Save,
+    /// Saves to another file.
     SaveAs,
     /// A dialog's path; `None` where it was cancelled.
     ChosenToOpen(Option<PathBuf>),
+    /// The path to save to; `None` where the dialog was cancelled.
     ChosenToSave(Option<PathBuf>),
+    /// A file was read.
     Opened {
+        /// The file.
         path: PathBuf,
+        /// Its boxes.
         boxes: Vec<CloudBox>,
     },
+    /// A file was written.
     Saved {
+        /// The file.
         path: PathBuf,
+        /// The document as written.
         document: Arc<Document>,
     },
     /// A file could not be opened or saved.
@@ -72,8 +86,11 @@ pub enum SessionEvent {
 /// An answer to [`Request::Ask`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
+    /// Saves to the file.
     Save,
+    /// Loses the changes.
     Discard,
+    /// Drops the intent.
     Cancel,
 }
 
@@ -82,13 +99,20 @@ pub enum Answer {
 pub enum Request {
     /// Asks whether to save changes, and answers by [`SessionEvent::Answer`].
     Ask(Intent),
+    /// Asks for a file to open.
     ChooseToOpen,
+    /// Asks for a file to save to.
     ChooseToSave,
+    /// Reads a file.
     Open(PathBuf),
+    /// Writes a file.
     Save {
+        /// The file.
         path: PathBuf,
+        /// The document as written.
         document: Arc<Document>,
     },
+    /// Closes the window.
     Quit,
 }
 

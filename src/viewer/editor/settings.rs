@@ -21,12 +21,14 @@ pub enum DisplayMode {
     Boxes,
     /// The cloud alone (P, Figs. 4 and 6).
     Cloud,
+    /// Cloud and edges of the boxes.
     Both,
 }
 
 /// The point that stays in place when an edge changes its length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ScalingAnchor {
+    /// The centre of the box.
     #[default]
     Center,
     /// The opposite face; the low face where a length is typed.

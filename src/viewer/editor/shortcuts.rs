@@ -14,19 +14,26 @@ use super::state::Editor;
 pub enum Key {
     /// The character that the key types; letters in lower case.
     Char(char),
+    /// Delete.
     Delete,
+    /// Backspace.
     Backspace,
+    /// Escape.
     Escape,
+    /// Tab.
     Tab,
 }
 
 /// A key with its modifiers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Chord {
+    /// The key.
     pub key: Key,
     /// Ctrl, or Command on a Mac.
     pub ctrl: bool,
+    /// Shift.
     pub shift: bool,
+    /// Alt.
     pub alt: bool,
 }
 
@@ -42,6 +49,7 @@ pub enum Command {
     Redo,
     Add,
     Duplicate,
+    /// Delete.
     Delete,
     SelectAll,
     /// Cancels a drag, or clears the selection.
@@ -151,8 +159,8 @@ impl Chord {
 }
 
 impl Command {
-    /// Returns the command's action on the editor's state; `None` for a command that needs a file, a
-    /// camera or the pointer.
+    /// Returns the command's action on the editor's state; `None` for a command that needs a file,
+    /// a camera or the pointer.
     pub fn action(self, editor: &Editor) -> Option<Action> {
         let is_dragging = editor.dragged_handle().is_some();
         let settings = editor.settings();

@@ -202,8 +202,8 @@ impl Editor {
         self.active_box().map_or_else(Vec::new, |(_, b)| place_handles(b, view))
     }
 
-    /// Returns a box to add at `place`, or at the nearest grid point where snapping is on. It copies
-    /// the active box, if there is one.
+    /// Returns a box to add at `place`, or at the nearest grid point where snapping is on. It
+    /// copies the active box, if there is one.
     pub fn new_box(&self, place: DVec3) -> CloudBox {
         let snap = self.settings.snap;
         let center = if snap.is_on { snap.place(place) } else { place };

@@ -13,8 +13,11 @@ use crate::model::camera::Pose;
 /// (0.5, 0.5).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Viewport {
+    /// Position and axes of the camera.
     pub pose: Pose,
+    /// Vertical field of view, rad.
     pub fov_y_rad: f64,
+    /// Width and height in pixels.
     pub size_px: DVec2,
     /// Pixels per logical point. Sizes of handles are given in points.
     pub px_per_point: f64,
@@ -94,8 +97,8 @@ pub fn pick_all(boxes: &[CloudBox], ray: &Ray) -> Vec<Hit> {
     hits
 }
 
-/// Returns every box with a part inside the rectangle between two pixels, whether or not other boxes
-/// hide it.
+/// Returns every box with a part inside the rectangle between two pixels, whether or not other
+/// boxes hide it.
 pub fn pick_rectangle(
     boxes: &[CloudBox],
     view: &Viewport,

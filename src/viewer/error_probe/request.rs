@@ -18,14 +18,17 @@ use crate::studies::reference_cache;
 /// A view of a scene, and the kind of reference that measures it.
 #[derive(Debug, Clone)]
 pub struct ProbeRequest {
+    /// The scene.
     pub scene: Arc<Scene>,
     /// Position of the camera, in place of the scene's own.
     pub position: DVec3,
     /// Point that the camera looks at.
     pub target: DVec3,
+    /// Time of the scene, s.
     pub time_s: f64,
     /// Width and height of the picture in pixels.
     pub size: [u32; 2],
+    /// Kind of the reference.
     pub kind: ReferenceKind,
 }
 
@@ -64,8 +67,11 @@ impl ProbeRequest {
 /// The reference picture of a view, at some or all of its pixels.
 #[derive(Debug)]
 pub struct ReferencePicture {
+    /// The view.
     pub request: ProbeRequest,
+    /// Pixels of the reference.
     pub pixels: Pixels,
+    /// Values at these pixels.
     pub reference: Reference,
     /// Whether the reference was read from the cache.
     pub from_cache: bool,

@@ -21,6 +21,7 @@ use crate::viewer::sync::lock;
 /// Progress of the reference that is being computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
+    /// Kind of the parts.
     pub work: Work,
     /// Facets or rows that are done.
     pub n_done: usize,

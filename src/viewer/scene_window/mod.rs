@@ -1,6 +1,6 @@
 //! The window of `nimbus view`: fly through a scene, change settings, compare, and measure.
 //!
-//! [`ViewState`] holds what is drawn, and changes by [`Command`]s. The render thread runs the same
+//! [`ViewState`] holds what is drawn, and changes by commands. The render thread runs the same
 //! loops as `bench` and presents each frame. It reports times and errors as a status that the
 //! panels show.
 
@@ -31,11 +31,10 @@ mod timeline;
 mod view_state;
 
 #[cfg(feature = "window")]
-pub use app::{Options, WindowTimes, run};
-pub use commands::{CaptureFormat, Command, Comparison, help};
-#[cfg(feature = "window")]
-pub use frame_loop::LoopTimes;
-pub use knobs::Knob;
-pub use playback::{Playback, Seek};
-pub use scene_source::SceneSource;
-pub use view_state::{Response, Variant, ViewState};
+pub(crate) use self::{
+    app::{Options, WindowTimes, run},
+    commands::help,
+    frame_loop::LoopTimes,
+    scene_source::SceneSource,
+};
+pub use view_state::ViewState;

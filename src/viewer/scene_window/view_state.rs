@@ -23,7 +23,9 @@ pub struct Variant {
 /// State of the scene window.
 #[derive(Debug, Clone)]
 pub struct ViewState {
+    /// The camera of A and B.
     pub camera: FlyCamera,
+    /// The playback position.
     pub playback: Playback,
     /// The scene with its knobs as set. The window replaces the size of its film.
     pub scene: Arc<Scene>,
@@ -37,17 +39,21 @@ pub struct ViewState {
     pub size: [u32; 2],
     /// A picture to save.
     pub capture: Option<CaptureFormat>,
+    /// Whether panels are shown.
     pub has_panels: bool,
     /// The next frame's values are to be counted.
     pub wants_counts: bool,
     /// The settings that A is compared with.
     pub variant: Option<Variant>,
+    /// How A is compared with B.
     pub comparison: Comparison,
+    /// Whether the error is measured.
     pub measures_error: bool,
     /// The next frame's pictures are to be read back.
     pub wants_readback: bool,
     /// Counts changes of the shader files.
     pub n_shader_loads: u64,
+    /// Whether the window is to close.
     pub is_closing: bool,
     held_keys: BTreeSet<&'static str>,
 }

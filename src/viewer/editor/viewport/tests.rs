@@ -85,8 +85,8 @@ fn a_rectangle_picks_the_boxes_that_its_rays_hit() {
         (DVec2::new(0.0, 0.0), DVec2::new(60.0, 600.0)),
     ] {
         let found = pick_rectangle(&boxes, &view, corner, opposite);
-        // Boxes are at least 9 pixels wide, and rays at most 2.5 pixels apart, so a box that reaches
-        // 12 pixels into the rectangle is hit.
+        // Boxes are at least 9 pixels wide, and rays at most 2.5 pixels apart, so a box that
+        // reaches 12 pixels into the rectangle is hit.
         let inwards = 12.0 * (opposite - corner).signum();
         let surely = pick_rectangle(&boxes, &view, corner + inwards, opposite - inwards);
         for (i, b) in boxes.iter().enumerate() {

@@ -11,7 +11,8 @@ fn state() -> ViewState {
     ViewState::new(Arc::new(scene_file::load(&path, &[], None).unwrap().scene), true).unwrap()
 }
 
-/// Runs the panels with `events`. Returns the clicked commands, and every drawn text with its place.
+/// Runs the panels with `events`. Returns the clicked commands, and every drawn text with its
+/// place.
 fn run(
     context: &Context,
     events: Vec<Event>,

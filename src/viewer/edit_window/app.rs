@@ -11,11 +11,12 @@ use winit::application::ApplicationHandler;
 use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{KeyEvent, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
-use winit::keyboard::{Key as WinitKey, ModifiersState, NamedKey};
+use winit::keyboard::{Key, ModifiersState, NamedKey};
 use winit::window::{Window, WindowId};
 
 use super::dialogs::FileDialog;
 use super::fields::FieldTexts;
+use super::keys::{button_of, key_of};
 use super::panel_state::PanelState;
 use super::panels;
 use super::render_thread::{DrawRequests, DrawState, EditRenderer, RenderEvent, RenderLinks};
@@ -24,8 +25,8 @@ use crate::frame::stage::DeviceChoice;
 use crate::io::box_file;
 use crate::model::camera::Pose;
 use crate::viewer::editor::{
-    BoxAcceptance, Button, Chord, DisplayMode, EditedScene, EditorController, Input, Intent, Key,
-    ModifierKeys, PictureArea, RecentFiles, Request, Session, SessionEvent, default_path, perform,
+    BoxAcceptance, Chord, DisplayMode, EditedScene, EditorController, Input, Intent, ModifierKeys,
+    PictureArea, RecentFiles, Request, Session, SessionEvent, default_path, perform,
 };
 use crate::viewer::egui_layer::{EguiLayer, SharedWidgets};
 use crate::viewer::free_path::free_path;
@@ -251,7 +252,7 @@ impl App {
     }
 
     fn press(&mut self, event: &KeyEvent) {
-        if event.logical_key == WinitKey::Named(NamedKey::Enter) {
+        if event.logical_key == Key::Named(NamedKey::Enter) {
             self.texts.wants_focus = true;
             self.update_panels();
         } else if let Some(key) = key_of(&event.logical_key) {
@@ -378,26 +379,5 @@ impl ApplicationHandler<RenderEvent> for App {
             }
             _ => {}
         }
-    }
-}
-
-fn button_of(button: winit::event::MouseButton) -> Option<Button> {
-    use winit::event::MouseButton::{Left, Middle, Right};
-    match button {
-        Left => Some(Button::Left),
-        Middle => Some(Button::Middle),
-        Right => Some(Button::Right),
-        _ => None,
-    }
-}
-
-fn key_of(key: &WinitKey) -> Option<Key> {
-    match key {
-        WinitKey::Character(text) => text.chars().next().map(Key::Char),
-        WinitKey::Named(NamedKey::Delete) => Some(Key::Delete),
-        WinitKey::Named(NamedKey::Backspace) => Some(Key::Backspace),
-        WinitKey::Named(NamedKey::Escape) => Some(Key::Escape),
-        WinitKey::Named(NamedKey::Tab) => Some(Key::Tab),
-        _ => None,
     }
 }

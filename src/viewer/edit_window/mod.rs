@@ -3,6 +3,7 @@
 mod app;
 mod dialogs;
 mod fields;
+mod keys;
 mod panel_state;
 mod panels;
 mod render_thread;

@@ -12,6 +12,7 @@ pub mod editor;
 mod egui_layer;
 pub mod error_probe;
 mod fly_camera;
+#[cfg(feature = "window")]
 mod free_path;
 #[cfg(feature = "window")]
 mod native_window;

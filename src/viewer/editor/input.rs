@@ -110,6 +110,7 @@ pub enum Field {
 }
 
 /// Uses of the mouse, for the list of keys.
+#[cfg(feature = "window")]
 pub const MOUSE_HELP: [(&str, &str); 8] = [
     ("Left", "select a box; again at the same place: the box behind it"),
     ("Shift+Left", "add to the selection"),

@@ -6,9 +6,9 @@
 //! - [`Session`] holds the file: what is open, saved, or about to be lost.
 //! - [`Editor`] holds the [`Document`], the selection, the drag in progress, and the history. It
 //!   changes by an [`Action`].
-//! - [`EditedScene`] is the scene around the edited cloud, and [`overlay_shapes`] returns what is
-//!   drawn over it.
+//! - [`EditedScene`] is the scene around the edited cloud, and `overlay` makes the shapes over it.
 
+#[cfg(feature = "window")]
 mod acceptance;
 mod action;
 mod axis;
@@ -25,9 +25,11 @@ mod history;
 mod input;
 mod mirror;
 pub mod numbers;
+#[cfg(feature = "window")]
 mod overlay;
 mod pointer;
 mod ray;
+#[cfg(feature = "window")]
 mod recent_files;
 mod refusal;
 mod selection;

@@ -76,6 +76,7 @@ pub enum Command {
 pub struct Shortcut {
     pub chord: Chord,
     pub command: Command,
+    #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "only panels list the keys"))]
     pub description: &'static str,
 }
 

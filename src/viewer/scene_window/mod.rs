@@ -23,6 +23,7 @@ mod playback;
 mod render_links;
 #[cfg(feature = "window")]
 mod render_thread;
+#[cfg(feature = "window")]
 mod scene_source;
 #[cfg(feature = "window")]
 mod status;

@@ -106,7 +106,7 @@ impl ViewState {
         self.version += 1;
     }
 
-    /// Handles a key press; keys are named as in [`SHORTCUTS`].
+    /// Handles a key press; keys are named as in `SHORTCUTS`.
     pub fn press(&mut self, key: &str) -> Response {
         if let Some((name, _)) = FLYING_KEYS.iter().find(|(name, _)| *name == key) {
             self.held_keys.insert(name);

@@ -1,6 +1,5 @@
 //! Input by pixels and keys, in a picture of 800 × 600 pixels, 10 units in front of two boxes.
 
-use super::super::action::Select;
 use super::super::axis::Axis;
 use super::super::fixtures::{editor, unit_box};
 use super::super::input::{Button, ModifierKeys};

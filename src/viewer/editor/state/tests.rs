@@ -67,7 +67,7 @@ fn settings_are_not_undone() {
 #[test]
 fn selections_end_with_the_active_box() {
     let select =
-        |boxes: &[usize], how| Action::Select(Select::Boxes { boxes: boxes.to_vec(), how });
+        |boxes: &[usize], mode| Action::Select(Select::Boxes { boxes: boxes.to_vec(), mode });
     let e = after(
         &editor(4),
         &[select(&[2], SelectionMode::Replace), select(&[0], SelectionMode::Toggle)],

@@ -1,5 +1,4 @@
-//! The macrostructure editor without a window: P's two clouds made by hand, and laws over generated
-//! actions.
+//! The editor without its window: P's two clouds made by hand, and laws over generated actions.
 
 #[path = "editor/actions.rs"]
 mod actions;
@@ -18,22 +17,23 @@ use glam::DVec3;
 use nimbus::io::box_file;
 use nimbus::model::boxes::CloudBox;
 use nimbus::viewer::editor::document::is_same;
-use nimbus::viewer::editor::mirror::{Outcome, Plane};
-use nimbus::viewer::editor::session::{Event, Request, Session, perform};
-use nimbus::viewer::editor::{Action, Axis, Document, DragAction, Edit, Editor, Select, Touched};
+use nimbus::viewer::editor::{
+    Action, Axis, Document, DragAction, Edit, Editor, MirrorPlane, MirrorResult, Request, Select,
+    Session, SessionEvent, perform,
+};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// What a refused action leaves is what was there.
+/// Returns the state after an action; a refused action changes nothing.
 fn after(editor: &Editor, action: &Action) -> Editor {
-    editor.after(action).map_or_else(|_| editor.clone(), |(next, _)| next)
+    editor.after(action).unwrap_or_else(|_| editor.clone())
 }
 
 fn after_all(editor: &Editor, actions: &[Action]) -> Editor {
     actions.iter().fold(editor.clone(), |editor, action| after(&editor, action))
 }
 
-/// What the file would have: it tells −0 from 0, and all else apart that bits do.
+/// Returns the text of the file, which distinguishes all bits.
 fn text(boxes: &[CloudBox]) -> String {
     box_file::format(boxes)
 }
@@ -41,7 +41,7 @@ fn text(boxes: &[CloudBox]) -> String {
 const END: Action = Action::Drag(DragAction::End);
 
 #[test]
-fn as_many_undos_as_steps_lead_to_the_first_document_and_redos_to_the_last() {
+fn undoing_all_steps_restores_the_first_document_and_redoing_the_last() {
     let n_steps = std::cell::Cell::new(0);
     check(400, (actions::boxes(), vec(actions::action(), 1..60)), |(boxes, actions)| {
         let first = Editor::new(boxes);
@@ -59,12 +59,12 @@ fn as_many_undos_as_steps_lead_to_the_first_document_and_redos_to_the_last() {
         n_steps.set(n_steps.get() + n);
         Ok(())
     });
-    // Of some 12 000 actions enough were taken for this to mean something.
+    // Enough of some 12 000 actions were steps.
     assert!(n_steps.get() > 1500, "{}", n_steps.get());
 }
 
 #[test]
-fn no_step_stands_where_nothing_differs() {
+fn every_step_changes_the_document() {
     check(300, (actions::boxes(), vec(actions::action(), 1..40)), |(boxes, actions)| {
         let mut editor = after(&after_all(&Editor::new(boxes), &actions), &END);
         while editor.history().n_undo() > 0 {
@@ -77,12 +77,12 @@ fn no_step_stands_where_nothing_differs() {
 }
 
 #[test]
-fn no_actions_make_what_the_reader_refuses_and_touched_names_all_that_changed() {
+fn a_file_holds_every_document_and_regenerated_boxes_are_those_that_changed() {
     let n_refused = std::cell::Cell::new(0);
     check(400, (actions::boxes(), vec(actions::action(), 1..60)), |(boxes, actions)| {
         let mut editor = Editor::new(boxes);
         for action in &actions {
-            let Ok((next, touched)) = editor.after(action) else {
+            let Ok(next) = editor.after(action) else {
                 n_refused.set(n_refused.get() + 1);
                 continue;
             };
@@ -92,7 +92,7 @@ fn no_actions_make_what_the_reader_refuses_and_touched_names_all_that_changed() 
             prop_assert_eq!(text(&read), written);
             let selected = next.selection().boxes();
             prop_assert!(selected.iter().all(|i| *i < next.boxes().len()));
-            check_touched(editor.document(), next.document(), &touched)?;
+            check_regenerated(editor.document(), next.document())?;
             editor = next;
         }
         Ok(())
@@ -100,28 +100,22 @@ fn no_actions_make_what_the_reader_refuses_and_touched_names_all_that_changed() 
     assert!(n_refused.get() > 1000, "{}", n_refused.get());
 }
 
-/// By the definition: a box that keeps its number, the seed and its bits keeps its particles, and
-/// no other does.
-fn check_touched(old: &Document, new: &Document, touched: &Touched) -> Result<(), TestCaseError> {
-    prop_assert_eq!(
-        (touched.n_boxes, touched.is_resized),
-        (new.boxes.len(), old.boxes.len() != new.boxes.len())
-    );
+/// Checks the definition: exactly the boxes that keep index, seed and bits, except the centre, keep
+/// their particles.
+fn check_regenerated(old: &Document, new: &Document) -> Result<(), TestCaseError> {
+    let regenerated = new.regenerated_since(old);
     for (i, b) in new.boxes.iter().enumerate() {
         let was = old.boxes.get(i).filter(|_| old.seed == new.seed);
         let in_place = was.map(|was| CloudBox { center: b.center, ..*was });
-        let keeps_shape = in_place.is_some_and(|was| is_same(&was, b));
-        prop_assert_eq!(touched.generate.contains(&i), !keeps_shape);
-        prop_assert_eq!(
-            touched.moved.contains(&i),
-            keeps_shape && !was.is_some_and(|was| is_same(was, b))
-        );
+        let keeps_particles = in_place.is_some_and(|was| is_same(&was, b));
+        prop_assert_eq!(regenerated.contains(&i), !keeps_particles);
     }
+    prop_assert!(regenerated.iter().all(|i| *i < new.boxes.len()));
     Ok(())
 }
 
 #[test]
-fn mirrored_twice_is_as_it_was() {
+fn mirroring_twice_restores_the_document() {
     let axes = prop_oneof![Just(Axis::X), Just(Axis::Y), Just(Axis::Z)];
     check(
         300,
@@ -131,18 +125,18 @@ fn mirrored_twice_is_as_it_was() {
             let picked = picked.iter().map(|index| index.index(boxes.len())).collect();
             let start = after(&Editor::new(boxes), &actions::select(picked));
             let twice = |plane| {
-                let mirror = Action::Edit(Edit::Mirror { axis, plane, outcome: Outcome::Move });
+                let mirror = Action::Edit(Edit::Mirror { axis, plane, result: MirrorResult::Move });
                 after_all(&start, &[mirror.clone(), mirror])
             };
-            prop_assert!(twice(Plane::Zero).document().is_same(start.document()));
-            // M bounds the selection's coordinates, u = ε/2: faces are off by uM, their sum by 4uM,
-            // what is mirrored by 5uM, the second sum by 14uM, what comes back by 20uM, which is 10
-            // εM.
+            prop_assert!(twice(MirrorPlane::Zero).document().is_same(start.document()));
+            // Let M bound the selection's coordinates, and u = ε/2. Faces are off by uM, their sum
+            // by 4uM, and the mirrored centre by 5uM. The second sum is off by 14uM, and the
+            // restored centre by 20uM, which is 10 εM.
             let chosen = start.selection().boxes().iter().map(|i| start.boxes()[*i]);
             let most =
                 chosen.map(|b| b.center.abs() + 0.5 * b.extent).fold(DVec3::ZERO, DVec3::max);
-            let again = twice(Plane::Middle);
-            // Rounding may carry a box at the very bound beyond it: then the second is refused.
+            let again = twice(MirrorPlane::Middle);
+            // Rounding may carry a box at the limit beyond it, where the second mirror is refused.
             prop_assume!(most.max_element() < 0.9e15);
             for (a, b) in again.boxes().iter().zip(start.boxes()) {
                 let off = (a.center - b.center).abs();
@@ -162,8 +156,8 @@ fn a_mirror_image_lies_across_the_plane() {
         let start = after(&Editor::new(boxes), &Action::Select(Select::All));
         let mirror = Action::Edit(Edit::Mirror {
             axis: Axis::Y,
-            plane: Plane::Zero,
-            outcome: Outcome::Copy,
+            plane: MirrorPlane::Zero,
+            result: MirrorResult::Copy,
         });
         let copied = after(&start, &mirror);
         let (n, old) = (start.boxes().len(), start.boxes());
@@ -183,12 +177,12 @@ fn flipped(c: DVec3) -> DVec3 {
 }
 
 #[test]
-fn duplicated_and_deleted_is_as_it_was() {
+fn duplicating_and_deleting_restores_the_document() {
     check(300, (actions::boxes(), vec(actions::action(), 0..10)), |(boxes, actions)| {
         let start = after(&after_all(&Editor::new(boxes), &actions), &END);
         let twice = after(&start, &Action::Edit(Edit::Duplicate));
         prop_assert_eq!(twice.boxes().len(), start.boxes().len() + start.selection().boxes().len());
-        // Nothing selected is nothing duplicated, and nothing to delete.
+        // Without a selection nothing is duplicated or deleted.
         let back = after(&twice, &Action::Edit(Edit::Delete));
         prop_assert!(back.document().is_same(start.document()));
         Ok(())
@@ -208,7 +202,7 @@ fn a_drag_is_one_step_or_none() {
             let is_changed = !ended.document().is_same(start.document());
             prop_assert_eq!(ended.history().n_undo(), usize::from(is_changed));
             prop_assert!(after(&ended, &Action::Undo).document().is_same(start.document()));
-            // Where it ends says all: the way there says nothing.
+            // The result depends on the end of the path alone.
             let straight =
                 after_all(&start, &[&[begin], &moves[moves.len() - 1..], &[END]].concat());
             let last_taken = held.after(&moves[moves.len() - 1]).is_ok();
@@ -226,7 +220,7 @@ fn a_drag_is_one_step_or_none() {
 }
 
 #[test]
-fn what_is_saved_is_loaded_to_the_bit() {
+fn a_saved_document_is_loaded_bitwise() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("b.dat");
     check(100, (actions::boxes(), vec(actions::action(), 0..30)), |(boxes, actions)| {
@@ -234,22 +228,21 @@ fn what_is_saved_is_loaded_to_the_bit() {
         let saved = perform(&Request::Save { path: path.clone(), document: document.clone() });
         prop_assert_eq!(
             saved,
-            Some(Event::Saved { path: path.clone(), document: document.clone() })
+            Some(SessionEvent::Saved { path: path.clone(), document: document.clone() })
         );
-        let Some(Event::Opened { boxes, .. }) = perform(&Request::Open(path.clone())) else {
+        let Some(SessionEvent::Opened { boxes, .. }) = perform(&Request::Open(path.clone())) else {
             return Err(TestCaseError::fail("not opened"));
         };
         prop_assert_eq!(boxes.len(), document.boxes.len());
         prop_assert!(boxes.iter().zip(&document.boxes).all(|(a, b)| is_same(a, b)));
         Ok(())
     });
-    // Nothing else is left behind.
+    // No temporary file remains.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// What is not touched by hand: a file whose numbers are written as P writes them.
 #[test]
-fn the_numbers_of_boxes_that_were_not_touched_keep_their_bits() {
+fn unchanged_boxes_of_a_file_keep_their_bits() {
     let boxes = box_file::read(Path::new("scenes/cubes-554.dat")).unwrap();
     let moved = Action::Edit(Edit::MoveBy(DVec3::new(0.1, 0.0, 0.0)));
     let editor = after_all(&Editor::new(boxes.clone()), &[actions::select(vec![4]), moved]);
@@ -260,24 +253,24 @@ fn the_numbers_of_boxes_that_were_not_touched_keep_their_bits() {
 }
 
 #[test]
-fn dirty_is_what_differs_from_what_was_saved() {
+fn a_session_is_dirty_where_its_boxes_differ_from_the_saved_ones() {
     let seen = std::cell::RefCell::new([0, 0]);
     let steps =
         vec(prop_oneof![6 => actions::small_action().prop_map(Some), 1 => Just(None)], 1..60);
     check(300, (actions::usual_boxes(), steps), |(boxes, steps)| {
         let mut saved = text(&boxes);
-        let mut session = Session::opened(Path::new("b.dat"), boxes);
+        let mut session = Session::from_file(Path::new("b.dat"), boxes);
         for step in steps {
             let event = match step {
-                Some(action) => Event::Act(action),
+                Some(action) => SessionEvent::Act(action),
                 None => {
                     let document: Arc<Document> = session.editor().shared_document();
                     saved = text(&document.boxes);
-                    Event::Saved { path: "b.dat".into(), document }
+                    SessionEvent::Saved { path: "b.dat".into(), document }
                 }
             };
-            if let Ok(turn) = session.after(&event) {
-                session = turn.session;
+            if let Ok((next, _)) = session.after(&event) {
+                session = next;
             }
             let is_dirty = text(session.editor().boxes()) != saved;
             prop_assert_eq!(session.is_dirty(), is_dirty);

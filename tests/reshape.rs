@@ -1,5 +1,5 @@
-//! A player that goes on with other boxes, as an editor has it: what it holds and draws is what a
-//! fresh one holds and draws, and particles that nothing has changed are not generated.
+//! `Player::reshape`: after a change of boxes a player holds and draws what a new one does, and
+//! generates only the particles that have changed.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -20,9 +20,9 @@ use nimbus::layout::particle::ParticleRecord;
 use nimbus::model::boxes::CloudBox;
 use nimbus::model::cloud::CloudSource;
 use nimbus::model::scene::Scene;
-use nimbus::viewer::editor::{Document, Touched};
+use nimbus::viewer::editor::Document;
 
-/// A scene of two clouds, of which the first is edited.
+/// Returns a scene of two clouds. The first one is edited.
 fn scene(more: &str, of_cloud: &str) -> Scene {
     let text = format!(
         "[film]\nwidth = 40\nheight = 30\nformat = 'rgba32f'\n[camera]\nposition = [0, 0, \
@@ -57,15 +57,16 @@ fn bed() -> Bed {
     Bed::open(&DeviceChoice { validation: true, ..DeviceChoice::default() }).expect("a device")
 }
 
-/// What a player holds and draws, and whether its frame generated anything.
+/// Particles and picture of a player.
 #[derive(Debug, PartialEq)]
-struct Held {
+struct Contents {
     particles: Vec<ParticleRecord>,
     status: Vec<u32>,
     picture: Vec<u8>,
 }
 
-fn held(bed: &Bed, player: &mut Player) -> (Held, bool) {
+/// Draws a frame. Returns the contents, and whether particles were generated.
+fn contents(bed: &Bed, player: &mut Player) -> (Contents, bool) {
     let mut generates = false;
     serial::run(&mut player.game, &mut player.renderer, 0..1, &mut |times, _| {
         generates = times.plan.runs(Pass::Generate);
@@ -75,14 +76,14 @@ fn held(bed: &Bed, player: &mut Player) -> (Held, bool) {
     let particles = player.renderer.particles(&bed.device).expect("particles");
     let status = player.renderer.status(&bed.device).expect("statuses");
     let picture = player.renderer.image_bytes().expect("pixels");
-    (Held { particles, status, picture }, generates)
+    (Contents { particles, status, picture }, generates)
 }
 
-fn fresh(bed: &Bed, scene: &Arc<Scene>) -> Held {
-    held(bed, &mut bed.player(scene.clone(), true).expect("a player")).0
+fn fresh(bed: &Bed, scene: &Arc<Scene>) -> Contents {
+    contents(bed, &mut bed.player(scene.clone(), true).expect("a player")).0
 }
 
-/// Of every kind of edit one, in turn; whether it leaves every box's number of particles as it was.
+/// Applies an edit of one kind. Returns whether every box keeps its number of particles.
 fn edit(document: &mut Document, kind: usize, random: &mut Random) -> bool {
     let n = document.boxes.len();
     let i = (random.word() % n as u64) as usize;
@@ -93,7 +94,7 @@ fn edit(document: &mut Document, kind: usize, random: &mut Random) -> bool {
         1 => b.extent *= DVec3::new(within(0.3, 2.0), within(0.3, 2.0), within(0.3, 2.0)),
         2 => b.radius_max *= within(0.5, 1.5),
         3 => document.seed += 1,
-        // Far off: the density grid gets other proportions.
+        // A distant box changes the proportions of the density grid.
         4 => b.center.x += 30.0,
         5 => b.center.x -= 30.0,
         6 => b.n_particles = (b.n_particles + 3) % 17,
@@ -109,7 +110,7 @@ fn edit(document: &mut Document, kind: usize, random: &mut Random) -> bool {
 const N_KINDS: usize = 9;
 
 #[test]
-fn after_any_edits_all_is_as_of_a_fresh_player() {
+fn after_any_edits_a_player_equals_a_new_one() {
     let cases = [
         ("[lighting]\nmode = 'first'\ngrid = 12", "texture = 'by-box'"),
         (
@@ -124,36 +125,34 @@ fn after_any_edits_all_is_as_of_a_fresh_player() {
         let base = scene(more, of_cloud);
         let mut document = document(&base);
         let mut player = bed.player(base.clone(), true).expect("a player");
-        assert!(held(&bed, &mut player).1, "the first frame generates");
+        assert!(contents(&bed, &mut player).1, "the first frame generates");
         let mut random = Random(7 + i_case as u64);
         for i_edit in 0..2 * N_KINDS {
             let before = document.clone();
             let is_same_size = edit(&mut document, i_edit % N_KINDS, &mut random);
-            let touched = Touched::between(&before, &document);
+            let boxes = document.regenerated_since(&before);
             let scene = with(&base, &document);
-            let reshaped =
-                player.reshape(&bed, scene.clone(), &touched.generate).expect("reshaped");
+            let reshaped = player.reshape(&bed, scene.clone(), &boxes).expect("reshaped");
             assert_eq!(
                 reshaped == Reshaped::InPlace,
                 is_same_size,
                 "edit {i_edit} of case {i_case}"
             );
-            // Several edits may come before a frame.
+            // Some frames follow several edits.
             if i_edit % 3 == 1 {
                 continue;
             }
-            let (held, generates) = held(&bed, &mut player);
+            let (found, generates) = contents(&bed, &mut player);
             assert!(!generates);
-            assert!(held == fresh(&bed, &scene), "edit {i_edit} of case {i_case}: {touched:?}");
+            assert!(found == fresh(&bed, &scene), "edit {i_edit} of case {i_case}");
         }
     }
-    bed.close().expect("nothing to complain of");
+    bed.close().expect("no validation message");
 }
 
-/// What is not named as touched is left as it lies, on both ways: so who names too little sees what
-/// was.
+/// A changed box that is not listed keeps its old particles, with and without new buffers.
 #[test]
-fn only_what_is_touched_is_generated() {
+fn only_listed_boxes_are_generated() {
     let bed = bed();
     let base = scene("[lighting]\nmode = 'none'", "");
     let mut first = document(&base);
@@ -168,20 +167,20 @@ fn only_what_is_touched_is_generated() {
     let n_before = |document: &Document, i: usize| -> usize {
         document.boxes[..i].iter().map(|b| b.n_particles as usize).sum()
     };
-    let of = |held: &Held, document: &Document, i: usize| {
+    let of = |contents: &Contents, document: &Document, i: usize| {
         let begin = n_before(document, i);
-        held.particles[begin..begin + document.boxes[i].n_particles as usize].to_vec()
+        contents.particles[begin..begin + document.boxes[i].n_particles as usize].to_vec()
     };
     let old = fresh(&bed, &with(&base, &first));
-    for (document, touched, way) in [
+    for (document, boxes, way) in [
         (&changed, vec![5], Reshaped::InPlace),
         (&longer, vec![5, first.boxes.len()], Reshaped::Anew),
     ] {
         let mut player = bed.player(base.clone(), true).expect("a player");
-        held(&bed, &mut player);
+        contents(&bed, &mut player);
         let scene = with(&base, document);
-        assert_eq!(player.reshape(&bed, scene.clone(), &touched).expect("reshaped"), way);
-        let (found, new) = (held(&bed, &mut player).0, fresh(&bed, &scene));
+        assert_eq!(player.reshape(&bed, scene.clone(), &boxes).expect("reshaped"), way);
+        let (found, new) = (contents(&bed, &mut player).0, fresh(&bed, &scene));
         for i in 0..first.boxes.len() {
             let [old, found, new] =
                 [of(&old, &first, i), of(&found, document, i), of(&new, document, i)];
@@ -190,18 +189,18 @@ fn only_what_is_touched_is_generated() {
             assert_eq!(found == new, ![2, 6].contains(&i), "box {i}, {way:?}");
         }
         assert!(found.picture != new.picture);
-        // With all of them named it is as it should be.
+        // Listing the others completes the change.
         assert_eq!(player.reshape(&bed, scene, &[2, 6]).expect("reshaped"), Reshaped::InPlace);
-        assert!(held(&bed, &mut player).0 == new);
-        // And from a fresh start all is generated.
+        assert!(contents(&bed, &mut player).0 == new);
+        // A reset generates all particles.
         player.renderer.reset();
-        assert!(held(&bed, &mut player).1);
+        assert!(contents(&bed, &mut player).1);
     }
-    bed.close().expect("nothing to complain of");
+    bed.close().expect("no validation message");
 }
 
 #[test]
-fn nothing_but_boxes_may_differ_and_what_is_refused_changes_nothing() {
+fn other_changes_are_refused_and_a_refusal_changes_nothing() {
     let bed = bed();
     let base = scene("[lighting]\nmode = 'none'", "");
     let mut player = bed.player(base.clone(), true).expect("a player");
@@ -225,15 +224,14 @@ fn nothing_but_boxes_may_differ_and_what_is_refused_changes_nothing() {
     let mut huge = document(&base);
     huge.boxes[0].n_particles = u32::MAX;
     assert!(player.reshape(&bed, with(&base, &huge), &[0]).is_err());
-    assert!(held(&bed, &mut player).0 == fresh(&bed, &base.into()));
+    assert!(contents(&bed, &mut player).0 == fresh(&bed, &base.into()));
     drop(player);
-    bed.close().expect("nothing to complain of");
+    bed.close().expect("no validation message");
 }
 
-/// Tiles compute thin blobs otherwise: what a radius turns thin, or no longer so, takes other
-/// pipelines.
+/// Tiles draw thin particles by other pipelines, which a change of a radius may require.
 #[test]
-fn a_radius_that_makes_blobs_thin_makes_all_anew() {
+fn a_radius_that_makes_particles_thin_recreates_the_pipelines() {
     let bed = bed();
     let base = scene("[lighting]\nmode = 'none'", "");
     let mut base = Scene { clouds: base.clouds[..1].to_vec(), ..base };
@@ -241,29 +239,28 @@ fn a_radius_that_makes_blobs_thin_makes_all_anew() {
         unreachable!("boxes")
     };
     *optical_depth = 0.08;
-    // A greatest radius of 3 is 1.4 times the mean, one of 0.5 twice.
+    // A largest radius of 3 is 1.4 times the mean, one of 0.5 twice.
     let mut wide = document(&base);
     wide.boxes.iter_mut().for_each(|b| b.radius_max = 3.0);
     base = Scene::clone(&with(&base, &wide));
     let mut small = wide.clone();
     small.boxes[3].radius_max = 0.5;
     let mut player = bed.player(base.clone(), true).expect("a player");
-    held(&bed, &mut player);
+    contents(&bed, &mut player);
     for (document, way) in
         [(&small, Reshaped::Anew), (&small, Reshaped::InPlace), (&wide, Reshaped::Anew)]
     {
         let scene = with(&base, document);
         assert_eq!(player.reshape(&bed, scene.clone(), &[3]).expect("reshaped"), way);
-        assert!(held(&bed, &mut player).0 == fresh(&bed, &scene));
+        assert!(contents(&bed, &mut player).0 == fresh(&bed, &scene));
     }
     drop(player);
-    bed.close().expect("nothing to complain of");
+    bed.close().expect("no validation message");
 }
 
-/// A long cloud's grid has few cells across it; pulled together it needs more than there was room
-/// for.
+/// The grid of a long cloud has few cells across. A compact cloud needs more.
 #[test]
-fn the_density_grid_gets_room_for_other_proportions() {
+fn the_density_grid_grows_for_other_proportions() {
     let bed = bed();
     let base = scene("[lighting]\nmode = 'two-reflection'\ngrid = 16\nfacets_per_cloud = 30", "");
     let round = document(&base);
@@ -272,18 +269,17 @@ fn the_density_grid_gets_room_for_other_proportions() {
     let [long, round] = [long, round].map(|document| with(&base, &document));
     assert!(4 * n_cells_max(&long) < n_cells_max(&round));
     let mut player = bed.player(long.clone(), true).expect("a player");
-    held(&bed, &mut player);
+    contents(&bed, &mut player);
     for scene in [&round, &long, &round] {
         assert_eq!(player.reshape(&bed, scene.clone(), &[]).expect("reshaped"), Reshaped::InPlace);
-        assert!(held(&bed, &mut player).0 == fresh(&bed, scene));
+        assert!(contents(&bed, &mut player).0 == fresh(&bed, scene));
     }
     drop(player);
-    bed.close().expect("nothing to complain of");
+    bed.close().expect("no validation message");
 }
 
-/// From nothing to a box and back: a picture without particles is all there is to see.
 #[test]
-fn a_cloud_may_begin_with_no_box_and_lose_its_last() {
+fn a_cloud_may_begin_without_boxes_and_lose_its_last_box() {
     let bed = bed();
     for more in [
         "[lighting]\nmode = 'two-reflection'\ngrid = 8",
@@ -298,9 +294,9 @@ fn a_cloud_may_begin_with_no_box_and_lose_its_last() {
             Document { boxes, seed: 3 }
         });
         let mut player = bed.player(with(&base, &none), true).expect("a player of nothing");
-        let empty = held(&bed, &mut player).0;
+        let empty = contents(&bed, &mut player).0;
         assert!(empty.particles.is_empty() && empty.picture.iter().all(|byte| *byte == 0));
-        for (document, touched) in [
+        for (document, boxes) in [
             (&no_particles, vec![0]),
             (&one, vec![0]),
             (&no_particles, vec![0]),
@@ -308,11 +304,11 @@ fn a_cloud_may_begin_with_no_box_and_lose_its_last() {
             (&none, vec![]),
         ] {
             let scene = with(&base, document);
-            player.reshape(&bed, scene.clone(), &touched).expect("reshaped");
-            let held = held(&bed, &mut player).0;
-            assert!(held == fresh(&bed, &scene));
-            assert_eq!(held.picture != empty.picture, document == &one);
+            player.reshape(&bed, scene.clone(), &boxes).expect("reshaped");
+            let found = contents(&bed, &mut player).0;
+            assert!(found == fresh(&bed, &scene));
+            assert_eq!(found.picture != empty.picture, document == &one);
         }
     }
-    bed.close().expect("nothing to complain of");
+    bed.close().expect("no validation message");
 }

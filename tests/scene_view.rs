@@ -10,7 +10,7 @@ use nimbus::io::scene_file::{LoadedScene, load, load_and_name, parse};
 use nimbus::io::scene_view::{save, text_of};
 use nimbus::model::cloud::CloudSource;
 use nimbus::model::scene::Scene;
-use nimbus::viewer::wanted::Wanted;
+use nimbus::viewer::scene_window::ViewState;
 
 fn scenes() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
@@ -23,14 +23,14 @@ fn scenes() -> Vec<PathBuf> {
 }
 
 /// What is seen of a scene after hands have been at it.
-fn seen(loaded: &LoadedScene) -> Vec<String> {
+fn overrides_of_view(loaded: &LoadedScene) -> Vec<String> {
     let scene = Arc::new(loaded.scene.clone());
-    let mut wanted = Wanted::new(scene.clone(), true).unwrap();
-    ["t", "b", "o", "p", "r"].iter().for_each(|key| drop(wanted.press(key)));
-    wanted.drag(DVec2::new(31.0, -17.0), true);
-    wanted.approach(1.5);
-    wanted.size = [611, 407];
-    wanted.overrides(&scene)
+    let mut state = ViewState::new(scene.clone(), true).unwrap();
+    ["t", "b", "o", "p", "r"].iter().for_each(|key| drop(state.press(key)));
+    state.drag(DVec2::new(31.0, -17.0), true);
+    state.approach(1.5);
+    state.size = [611, 407];
+    state.overrides(&scene)
 }
 
 /// With particles that are moved where they are at one time: two files that are open are never the
@@ -72,7 +72,7 @@ fn assert_same(a: &LoadedScene, b: &LoadedScene, what: &str) {
 fn every_scene_reads_back_as_it_was_seen_from_any_folder() {
     let elsewhere = tempfile::tempdir().unwrap();
     for path in scenes() {
-        let set = seen(&load(&path, &[], None).unwrap());
+        let set = overrides_of_view(&load(&path, &[], None).unwrap());
         let expected = load(&path, &set, Some(7)).unwrap();
         let beside = path.with_file_name("view-1.toml");
         let text = text_of(&path, &beside, &set, Some(7)).unwrap();
@@ -103,7 +103,7 @@ fn what_was_not_set_stays_as_it_was_written() {
         let to = path.with_file_name("view-1.toml");
         assert_eq!(text_of(&path, &to, &[], None).unwrap(), text, "{}", path.display());
         // All lines but those that were set, in order.
-        let set = seen(&load(&path, &[], None).unwrap());
+        let set = overrides_of_view(&load(&path, &[], None).unwrap());
         let saved = text_of(&path, &to, &set, None).unwrap();
         let mut lines = saved.lines();
         let lost: Vec<&str> = text

@@ -1,5 +1,5 @@
-//! `nimbus view` under a virtual display: it opens, draws, hears keys and mouse, is resized, and
-//! closes; and says what is missing where it cannot.
+//! `nimbus view` on a virtual display: frames, keys, mouse, sizes, panels, files that change, and
+//! the message where there is no display.
 
 #![cfg(feature = "window")]
 
@@ -8,135 +8,160 @@ mod display;
 #[path = "harness/program.rs"]
 mod program;
 
-use std::process::{Child, Command};
-use std::time::{Duration, Instant};
+use std::path::{Path, PathBuf};
+use std::process::Child;
 
-use display::Display;
+use display::{Display, wait_for};
 use program::nimbus;
 use serde_json::Value;
 
-/// `nimbus view` of a small scene on `display`, in `dir`.
-fn view(display: &Display, dir: &std::path::Path, more: &[&str]) -> Child {
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
-    let args = [
-        &[
-            "view",
-            scene,
-            "--size",
-            "200x150",
-            "--validation",
-            "--json",
-            "--present",
-            "immediate",
-            "--no-panels",
-        ],
-        more,
-    ]
-    .concat();
-    let mut command: Command = nimbus(&args);
-    command.current_dir(dir).env("DISPLAY", display.name()).spawn().expect("the program runs")
+const HELLO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
+
+/// A running `nimbus view` whose stderr goes to a file.
+struct View<'a> {
+    display: &'a Display,
+    dir: &'a Path,
+    child: Child,
+    stderr: PathBuf,
 }
 
-/// What it printed and what it said once it has ended, within a minute.
-fn ended(mut child: Child) -> (String, String) {
-    let begin = Instant::now();
-    while child.try_wait().expect("a child").is_none() {
-        assert!(begin.elapsed() < Duration::from_secs(60), "the window does not close");
-        std::thread::sleep(Duration::from_millis(20));
+impl<'a> View<'a> {
+    fn start(display: &'a Display, dir: &'a Path, args: &[&str]) -> View<'a> {
+        let stderr = dir.join("stderr.txt");
+        let options = ["--validation", "--json", "--present", "immediate"];
+        let mut command = nimbus(&[&["view"], args, &options].concat());
+        command
+            .current_dir(dir)
+            .env("DISPLAY", display.name())
+            .env("NIMBUS_CACHE_DIR", dir.join("cache"))
+            .stderr(std::fs::File::create(&stderr).expect("a file"));
+        let child = command.spawn().expect("the program runs");
+        View { display, dir, child, stderr }
     }
-    let output = child.wait_with_output().expect("its output");
-    let [printed, said] =
-        [output.stdout, output.stderr].map(|b| String::from_utf8_lossy(&b).into_owned());
-    assert!(output.status.success(), "{said}");
-    (printed, said)
+
+    /// Waits until the window answers keys. Returns the window.
+    fn window(&self) -> String {
+        let window = self.display.window_of(self.child.id());
+        let n_helps = || self.text().matches("fly twice as fast").count();
+        let before = n_helps();
+        wait_for("answer to a key", || {
+            self.display.key("question");
+            n_helps() > before
+        });
+        window
+    }
+
+    fn keys(&self, names: &[&str]) {
+        names.iter().for_each(|name| self.display.key(name));
+    }
+
+    /// Returns the program's stderr so far.
+    fn text(&self) -> String {
+        std::fs::read_to_string(&self.stderr).unwrap_or_default()
+    }
+
+    fn wait_for_text(&self, text: &str) {
+        wait_for(text, || self.text().contains(text));
+    }
+
+    /// Waits until at least `n` more frames have been drawn: each count is of another frame.
+    fn wait_for_frames(&self, n: usize) {
+        let n_counts = || self.text().matches("not finite").count();
+        for _ in 0..n {
+            let before = n_counts();
+            self.display.key("n");
+            wait_for("count", || n_counts() > before);
+        }
+    }
+
+    /// Presses a key that saves a file, and waits for the file. Returns its path.
+    fn save(&self, key: &str, name: &str) -> PathBuf {
+        self.display.key(key);
+        let path = self.dir.join(name);
+        wait_for(name, || path.is_file());
+        path
+    }
+
+    /// Waits for the program's end. Returns stdout and stderr.
+    fn end(mut self) -> (String, String) {
+        wait_for("end", || self.child.try_wait().expect("a child").is_some());
+        let output = self.child.wait_with_output().expect("its output");
+        let text = std::fs::read_to_string(&self.stderr).unwrap_or_default();
+        assert!(output.status.success(), "{text}");
+        (String::from_utf8_lossy(&output.stdout).into_owned(), text)
+    }
 }
 
-fn loops(printed: &str) -> Vec<(String, u64)> {
-    let found: Value = serde_json::from_str(printed).expect("JSON");
+fn loops(stdout: &str) -> Vec<(String, u64)> {
+    let found: Value = serde_json::from_str(stdout).expect("JSON");
     let of = |row: &Value| {
         (row["loop"].as_str().expect("a name").to_owned(), row["n"].as_u64().expect("a number"))
     };
     found["loops"].as_array().expect("loops").iter().map(of).collect()
 }
 
+/// Renders a scene without a window. Returns the PNG's bytes.
+fn rendered(dir: &Path, scene: &str, args: &[&str]) -> Vec<u8> {
+    let path = dir.join("rendered.png");
+    let output = path.to_string_lossy();
+    let args = [&["render", scene, "-q", "-o", &output], args].concat();
+    assert!(nimbus(&args).output().expect("rendered").status.success());
+    std::fs::read(path).expect("a picture")
+}
+
 #[test]
 fn a_window_shows_as_many_frames_as_asked_for() {
     let display = Display::open();
     let dir = tempfile::tempdir().expect("a folder");
-    let (found, said) = ended(view(&display, dir.path(), &["--frames", "120"]));
-    // The ten after a beginning are not counted.
-    assert_eq!(loops(&found), [("parallel".to_owned(), 110)], "{said}");
-    assert!(said.contains("keys:") && said.contains("close the window"), "{said}");
-    let (found, said) = ended(view(&display, dir.path(), &["--frames", "30", "--no-skip", "-q"]));
-    assert_eq!((loops(&found), said.as_str()), (vec![("parallel".to_owned(), 20)], ""));
+    let args = [HELLO, "--size", "200x150", "--no-panels"];
+    let view = View::start(&display, dir.path(), &[&args[..], &["--frames", "120"]].concat());
+    let (found, text) = view.end();
+    // Ten frames of warm-up are not counted.
+    assert_eq!(loops(&found), [("parallel".to_owned(), 110)], "{text}");
+    assert!(text.contains("keys:") && text.contains("close the window"), "{text}");
+    let more = ["--frames", "30", "--no-skip", "-q"];
+    let (found, text) = View::start(&display, dir.path(), &[&args[..], &more].concat()).end();
+    assert_eq!((loops(&found), text.as_str()), (vec![("parallel".to_owned(), 20)], ""));
 }
 
 #[test]
-fn keys_and_mouse_and_sizes_are_heard() {
+fn the_window_follows_keys_mouse_and_size() {
     let display = Display::open();
     let dir = tempfile::tempdir().expect("a folder");
-    let child = view(&display, dir.path(), &[]);
-    let window = display.window_of(child.id());
-    display.focus(&window);
-    // Paused at the first frame; what is kept is what `render` draws.
-    for key in ["space", "Home", "F12"] {
-        display.key(key);
-    }
-    let kept = dir.path().join("view-1.png");
-    wait_for("a kept picture", || kept.is_file());
-    let drawn = dir.path().join("drawn.png");
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
-    let rendered =
-        nimbus(&["render", scene, "--size", "200x150", "-q", "-o", &drawn.to_string_lossy()])
-            .output();
-    assert!(rendered.expect("rendered").status.success());
-    assert!(
-        std::fs::read(&kept).expect("kept") == std::fs::read(&drawn).expect("drawn"),
-        "the same bytes"
-    );
-    // Every knob, on and on; the mouse turns and goes around; sizes change under way.
-    for key in ["t", "l", "p", "r", "k", "b", "g", "o", "v", "c", "t", "i"] {
-        display.key(key);
-    }
+    let view = View::start(&display, dir.path(), &[HELLO, "--size", "200x150", "--no-panels"]);
+    let window = view.window();
+    // Paused at the first frame, the window shows what `render` draws.
+    view.keys(&["space", "Home"]);
+    let first = std::fs::read(view.save("F12", "view-1.png")).expect("a picture");
+    assert!(first == rendered(dir.path(), HELLO, &["--size", "200x150"]), "the same bytes");
+    view.keys(&["t", "l", "p", "r", "k", "b", "g", "o", "v", "c", "t", "i"]);
     display.drag(&window, 1, [100, 75], [140, 60]);
     display.drag(&window, 3, [100, 75], [60, 90]);
-    for size in [[320, 200], [64, 48], [33, 77], [500, 400], [200, 150]] {
-        display.resize(&window, size);
-        std::thread::sleep(Duration::from_millis(120));
+    let mut n = 1;
+    let mut moved = vec![];
+    for [width, height] in [[320, 200], [64, 48], [33, 77], [500, 400], [200, 150]] {
+        display.resize(&window, [width, height]);
+        wait_for("picture of the new size", || {
+            n += 1;
+            let path = view.save("F12", &format!("view-{n}.png"));
+            moved = std::fs::read(&path).expect("a picture");
+            image::image_dimensions(&path).expect("a PNG") == (width, height)
+        });
     }
-    display.key("F12");
-    let moved = dir.path().join("view-2.png");
-    wait_for("another", || moved.is_file());
     display.key("Escape");
-    let (printed, said) = ended(child);
-    for words in [
-        "threads.mode = \"serial\"",
-        "draw.path = \"sprites\"",
-        "skipping is off",
-        "kept view-1.png",
-    ] {
-        assert!(said.contains(words), "{words}: {said}");
+    let (stdout, text) = view.end();
+    for words in
+        ["threads.mode = \"serial\"", "draw.path = \"sprites\"", "skipping is off", "view-1.png"]
+    {
+        assert!(text.contains(words), "{words}: {text}");
     }
-    // The command that draws what was seen does.
-    let line = printed.lines().find(|line| line.starts_with("nimbus render ")).expect("a command");
+    let line = stdout.lines().find(|line| line.starts_with("nimbus render ")).expect("a command");
     assert!(line.contains("--no-skip") && line.contains("--set 'draw.path=\"sprites\"'"), "{line}");
-    assert!(
-        std::fs::read(&moved).expect("kept") != std::fs::read(&drawn).expect("drawn"),
-        "the eye has moved"
-    );
-}
-
-fn wait_for(what: &str, is_there: impl Fn() -> bool) {
-    let begin = Instant::now();
-    while !is_there() {
-        assert!(begin.elapsed() < Duration::from_secs(60), "no {what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    assert!(moved != first, "the mouse has moved the camera");
 }
 
 #[test]
-fn without_a_display_it_says_what_is_missing_and_what_needs_none() {
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
+fn a_missing_display_is_reported_with_a_command_that_needs_none() {
     let run = |display: Option<&str>, args: &[&str]| {
         let mut command = nimbus(args);
         command.env_remove("WAYLAND_DISPLAY").env_remove("DISPLAY");
@@ -147,94 +172,65 @@ fn without_a_display_it_says_what_is_missing_and_what_needs_none() {
         assert_eq!(output.status.code(), Some(3));
         String::from_utf8_lossy(&output.stderr).into_owned()
     };
-    for args in [["view", scene, "-q"], ["edit", "none.dat", "-q"]] {
-        let said = run(None, &args);
-        assert!(
-            said.contains("there is no display: DISPLAY is not set")
-                && said.contains("nimbus render"),
-            "{said}"
-        );
-        let said = run(Some(":6543"), &args);
-        assert!(
-            said.contains("the display :6543 cannot be opened") && said.contains("nimbus render"),
-            "{said}"
-        );
+    for args in [["view", HELLO, "-q"], ["edit", "none.dat", "-q"]] {
+        for (display, why) in [
+            (None, "there is no display: DISPLAY is not set"),
+            (Some(":6543"), "the display :6543 cannot be opened"),
+        ] {
+            let text = run(display, &args);
+            assert!(text.contains(why) && text.contains("nimbus render"), "{text}");
+        }
     }
-}
-
-/// What a child says goes to a file, which is read while it runs.
-fn view_telling(
-    display: &Display,
-    dir: &std::path::Path,
-    args: &[&str],
-) -> (Child, impl Fn() -> String + use<>) {
-    let path = dir.join("said.txt");
-    let mut command: Command =
-        nimbus(&[&["view"], args, &["--validation", "--json", "--present", "immediate"]].concat());
-    command
-        .current_dir(dir)
-        .env("DISPLAY", display.name())
-        .env("NIMBUS_CACHE_DIR", dir.join("cache"));
-    command.stderr(std::fs::File::create(&path).expect("a file"));
-    let child = command.spawn().expect("the program runs");
-    (child, move || std::fs::read_to_string(&path).unwrap_or_default())
 }
 
 #[test]
 fn panels_compare_count_and_measure() {
     let display = Display::open();
     let dir = tempfile::tempdir().expect("a folder");
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
-    let (child, said) = view_telling(&display, dir.path(), &[scene, "--size", "400x300"]);
-    let window = display.window_of(child.id());
-    display.focus(&window);
-    display.key("space");
-    display.key("n");
-    wait_for("counts", || said().contains("0 not finite"));
-    // B is what is set now, A goes without light: how far each is from the truth.
-    display.key("m");
-    display.key("l");
-    display.key("j");
-    wait_for("A's error", || said().contains("A: RMSE"));
-    wait_for("B's error", || said().contains("B: RMSE"));
-    // What is turned is measured anew.
-    let n_said = || said().lines().filter(|line| line.starts_with("A: RMSE")).count();
-    let before = n_said();
+    let view = View::start(&display, dir.path(), &[HELLO, "--size", "400x300"]);
+    view.window();
+    view.keys(&["space", "n"]);
+    view.wait_for_text("0 not finite");
+    // B has the present settings, A has no light; both are compared with the reference.
+    view.keys(&["m", "l", "j"]);
+    view.wait_for_text("A: RMSE");
+    view.wait_for_text("B: RMSE");
+    // A changed setting is measured again.
+    let n_errors = || view.text().lines().filter(|line| line.starts_with("A: RMSE")).count();
+    let before = n_errors();
     display.key("p");
-    wait_for("another measurement", || n_said() > before);
-    for key in ["x", "x", "x", "m", "h", "h"] {
+    wait_for("another measurement", || n_errors() > before);
+    // Every comparison, and frames of A alone with and without panels.
+    for key in ["x", "x", "x"] {
         display.key(key);
-        std::thread::sleep(Duration::from_millis(250));
+        view.wait_for_frames(1);
+    }
+    for key in ["m", "h", "h"] {
+        display.key(key);
+        view.wait_for_frames(11);
     }
     display.key("Escape");
-    let output = child.wait_with_output().expect("its output");
-    assert!(output.status.success(), "{}", said());
-    let found: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let (stdout, text) = view.end();
+    let found: Value = serde_json::from_str(&stdout).expect("JSON");
     let rows = found["loops"].as_array().expect("loops");
-    assert!(
-        rows.iter().any(|row| row["panels"] == true)
-            && rows.iter().any(|row| row["panels"] == false),
-        "{found}"
-    );
+    let has_row = |panels: bool| rows.iter().any(|row| row["panels"] == panels);
+    assert!(has_row(true) && has_row(false), "{found}");
     assert!(found["panels"]["p50"].as_f64().is_some_and(|ms| ms > 0.0), "{found}");
-    // The truth is that of what is set, and B has other light.
-    let text = said();
     let error = |name: &str| {
-        let line = text
-            .lines()
-            .rfind(|line| line.starts_with(&format!("{name}: RMSE ")))
-            .expect("an error");
-        line.split([' ', ',']).nth(2).expect("a number").parse::<f64>().expect("a number")
+        let line = text.lines().rfind(|line| line.starts_with(&format!("{name}: RMSE ")));
+        let value = line.expect("an error").split([' ', ',']).nth(2).expect("a number");
+        value.parse::<f64>().expect("a number")
     };
-    // A's is what sprites' cut-off leaves out: thin sprites of the reference have none.
+    // The reference is that of A's settings. A is off by the sprites' cut-off, which thin sprites
+    // of the reference do not have; B has other light.
     assert!(error("A") < 0.02 && error("B") > 10.0 * error("A"), "{text}");
 }
 
 #[test]
-fn files_that_change_are_read_again_and_what_is_wrong_leaves_the_picture() {
+fn changed_files_are_read_again_and_errors_keep_the_last_picture() {
     let display = Display::open();
     let dir = tempfile::tempdir().expect("a folder");
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let copy =
         |from: &str, to: &str| std::fs::copy(root.join(from), dir.path().join(to)).expect("a copy");
     copy("scenes/hello.csv", "hello.csv");
@@ -247,47 +243,32 @@ fn files_that_change_are_read_again_and_what_is_wrong_leaves_the_picture() {
             std::fs::copy(entry.path(), shaders.join(entry.file_name())).expect("a copy");
         }
     }
-    let (child, said) = view_telling(
-        &display,
-        dir.path(),
-        &["scene.toml", "--size", "200x150", "--no-panels", "--shaders", "shaders"],
-    );
-    let window = display.window_of(child.id());
-    display.focus(&window);
-    display.key("space");
-    display.key("Home");
+    let args = ["scene.toml", "--size", "200x150", "--no-panels", "--shaders", "shaders"];
+    let view = View::start(&display, dir.path(), &args);
+    let window = view.window();
+    view.keys(&["space", "Home"]);
     let write =
         |name: &str, text: &str| std::fs::write(dir.path().join(name), text).expect("written");
     let scene = std::fs::read_to_string(dir.path().join("scene.toml")).expect("text");
     write("scene.toml", &scene.replace("width = 320", "width = ]"));
-    wait_for("an error", || said().contains("scene.toml:"));
+    view.wait_for_text("scene.toml:");
     write("scene.toml", &scene.replace("[film]", "[film]\nexposure = 0.5"));
-    wait_for("the scene again", || said().contains("scene.toml has changed"));
+    view.wait_for_text("scene.toml has changed");
     let present = std::fs::read_to_string(shaders.join("present.frag")).expect("text");
     write("shaders/present.frag", "no shader");
-    wait_for("a shader's error", || said().contains("back to what was"));
-    // It stands over the picture, and goes when all is well again.
+    view.wait_for_text("the last good state stays");
+    // A red box shows the error until the shader is right again.
     let n_red = || {
-        let (.., rgb) = display.seen(&window);
+        let (.., rgb) = display.pixels(&window);
         rgb.chunks_exact(3).filter(|p| p[0] > 130 && p[1] < 70 && p[2] < 70).count()
     };
-    wait_for("an alarm", || n_red() > 500);
+    wait_for("alarm", || n_red() > 500);
     write("shaders/present.frag", &present);
-    wait_for("no alarm", || n_red() == 0);
-    // What is saved as a scene is drawn as what is kept as a picture.
-    for (key, name) in [("F12", "view-1.png"), ("F10", "scene-view-1.toml")] {
-        display.key(key);
-        wait_for(name, || dir.path().join(name).is_file());
-    }
+    wait_for("end of the alarm", || n_red() == 0);
+    // The saved scene draws the saved picture.
+    let picture = std::fs::read(view.save("F12", "view-1.png")).expect("a picture");
+    let saved = view.save("F10", "scene-view-1.toml");
     display.key("Escape");
-    let output = child.wait_with_output().expect("its output");
-    assert!(output.status.success(), "{}", said());
-    let drawn = dir.path().join("drawn.png");
-    let saved = dir.path().join("scene-view-1.toml");
-    let rendered =
-        nimbus(&["render", &saved.to_string_lossy(), "-q", "-o", &drawn.to_string_lossy()])
-            .output();
-    assert!(rendered.expect("rendered").status.success());
-    let kept = std::fs::read(dir.path().join("view-1.png")).expect("kept");
-    assert!(kept == std::fs::read(&drawn).expect("drawn"), "the same bytes");
+    view.end();
+    assert!(picture == rendered(dir.path(), &saved.to_string_lossy(), &[]), "the same bytes");
 }

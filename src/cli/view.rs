@@ -10,16 +10,10 @@ use super::{device_choice, load_and_name, output, overrides};
 use crate::error::Result;
 use crate::gpu::PresentMode;
 use crate::measure::stats::Summary;
-use crate::viewer::origin::Origin;
-use crate::viewer::screen::LoopTimes;
-use crate::viewer::wanted::help;
-use crate::viewer::window::{self, Ended, Options};
+use crate::viewer::scene_window::{self, LoopTimes, Options, SceneSource, WindowTimes, help};
 
 pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
     let (loaded, files) = load_and_name(&args.scene, &args.options)?;
-    let first = Arc::new(loaded.scene);
-    let (typed, shaders) =
-        ((overrides(&args.options), args.options.seed), args.options.shaders.as_deref());
     if !args.options.quiet {
         eprint!("{}", help());
     }
@@ -28,15 +22,22 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         PresentArg::Mailbox => PresentMode::Mailbox,
         PresentArg::Immediate => PresentMode::Immediate,
     };
-    let Ended { loops, panels_ms } = window::run(Options {
-        origin: Origin::new((&args.scene, first), typed, files, shaders),
+    let source = SceneSource {
+        path: args.scene.clone(),
+        overrides: overrides(&args.options),
+        seed: args.options.seed,
+        first: Arc::new(loaded.scene),
+        files,
+    };
+    let WindowTimes { loops, panels_ms } = scene_window::run(Options {
+        source,
         choice: device_choice(&args.options),
-        skip: !args.options.no_skip,
+        skips: !args.options.no_skip,
         mode,
         n_frames: args.frames,
         stop,
-        quiet: args.options.quiet,
-        panels: !args.no_panels,
+        is_quiet: args.options.quiet,
+        has_panels: !args.no_panels,
     })?;
     if args.json {
         let rows: Vec<Value> = loops.iter().map(row).collect();

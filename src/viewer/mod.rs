@@ -1,37 +1,24 @@
-//! Looking at scenes: a window to fly in, with what can be toggled while it runs. Pure reducers,
-//! and under them a window. And changing clouds by hand: the [`editor`], (state, action) → state,
-//! which knows no window.
+//! Interactive windows: `nimbus view` shows a scene, `nimbus edit` edits a cloud's boxes.
+//!
+//! Both windows follow one pattern. Input events change plain state: [`scene_window::ViewState`]
+//! in the viewer, [`editor::EditorController`] in the editor. A render thread draws that state
+//! into a window target, and panels (egui) are drawn over the picture. The state compiles and is
+//! tested without a window.
 
-#[cfg(feature = "window")]
-pub mod easel;
-#[cfg(feature = "window")]
-pub mod edit_panels;
 #[cfg(feature = "window")]
 pub mod edit_window;
 pub mod editor;
-pub mod flight;
-pub mod judge;
 #[cfg(feature = "window")]
-pub mod judging;
-pub mod knobs;
+mod egui_layer;
+pub mod error_probe;
+mod fly_camera;
 #[cfg(feature = "window")]
-pub mod opening;
-pub mod origin;
+mod free_path;
 #[cfg(feature = "window")]
-pub mod pane;
+mod native_window;
 #[cfg(feature = "window")]
-pub mod panels;
-pub mod playback;
+mod posed_player;
+pub mod scene_window;
+mod sync;
 #[cfg(feature = "window")]
-pub mod screen;
-#[cfg(feature = "window")]
-pub mod second;
-#[cfg(feature = "window")]
-pub mod seen;
-pub mod timeline;
-pub mod wanted;
-pub mod watch;
-#[cfg(feature = "window")]
-pub mod widgets;
-#[cfg(feature = "window")]
-pub mod window;
+mod window_target;

@@ -1,36 +1,46 @@
-//! Documents and actions, generated: the usual, and all that a file takes and what it does not.
+//! Generated documents and actions: usual ones, all that a file can hold, and invalid ones.
 
 use glam::DVec3;
 use nimbus::model::boxes::CloudBox;
-use nimbus::viewer::editor::action::Modifiers;
-use nimbus::viewer::editor::handles::{Handle, Side};
-use nimbus::viewer::editor::mirror::{Outcome, Plane};
-use nimbus::viewer::editor::ray::Ray;
-use nimbus::viewer::editor::selection::How;
-use nimbus::viewer::editor::snap::Snap;
-use nimbus::viewer::editor::state::{Scaling, View};
-use nimbus::viewer::editor::{Action, Axis, DragAction, Edit, Select, Setting};
+use nimbus::viewer::editor::{
+    Action, Axis, DisplayMode, DragAction, DragModifiers, Edit, GridSnap, Handle, MirrorPlane,
+    MirrorResult, Ray, ScalingAnchor, Select, SelectionMode, Setting, Side,
+};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
 pub fn select(boxes: Vec<usize>) -> Action {
-    Action::Select(Select::Boxes { boxes, how: How::Replace })
+    Action::Select(Select::Boxes { boxes, mode: SelectionMode::Replace })
 }
 
-/// What a file takes: places to 1e15, edges of 0 or from 1e-30 on.
+/// Returns a coordinate that a file can hold: up to 1e15.
 fn coordinate() -> BoxedStrategy<f64> {
-    prop_oneof![6 => -9.0..9.0, 1 => Just(0.0), 1 => Just(-0.0), 1 => -1e15..1e15, 1 => Just(6.12438e-7)].boxed()
+    prop_oneof![
+        6 => -9.0..9.0,
+        1 => Just(0.0),
+        1 => Just(-0.0),
+        1 => -1e15..1e15,
+        1 => Just(6.12438e-7),
+    ]
+    .boxed()
 }
 
+/// Returns an extent that a file can hold: 0, or from 1e-30 on.
 fn edge() -> BoxedStrategy<f64> {
     prop_oneof![6 => 0.1..8.0, 1 => Just(0.0), 1 => Just(1e-30), 1 => Just(1e15)].boxed()
 }
 
-/// And anything at all.
+/// Returns any number.
 fn wild() -> BoxedStrategy<f64> {
     let ends =
         [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, 1e-31, 1e15, -1e15, f64::MIN_POSITIVE];
-    prop_oneof![6 => -9.0..9.0, 2 => prop::sample::select(ends.to_vec()), 1 => any::<f64>(), 1 => Just(0.0)].boxed()
+    prop_oneof![
+        6 => -9.0..9.0,
+        2 => prop::sample::select(ends.to_vec()),
+        1 => any::<f64>(),
+        1 => Just(0.0),
+    ]
+    .boxed()
 }
 
 type Number = fn() -> BoxedStrategy<f64>;
@@ -54,7 +64,7 @@ pub fn boxes() -> impl Strategy<Value = Vec<CloudBox>> {
     vec(cloud_box(edge, coordinate), 0..8)
 }
 
-/// Within some ten units, none of them flat.
+/// Returns boxes within ten units, none of them flat.
 pub fn usual_boxes() -> impl Strategy<Value = Vec<CloudBox>> {
     vec(
         cloud_box(|| (0.1..8.0).boxed(), || prop_oneof![8 => -9.0..9.0, 1 => Just(0.0)].boxed()),
@@ -78,27 +88,26 @@ fn edit(n: Number) -> impl Strategy<Value = Edit> {
         2 => (axis(), n()).prop_map(|(axis, v)| Edit::Center(axis, v)),
         1 => n().prop_map(Edit::Radius),
         2 => vector(n).prop_map(Edit::MoveBy),
-        2 => vector(n).prop_map(Edit::ScaleBy),
         3 => mirror(),
-        1 => Just(Edit::SnapToGrid),
         1 => (0..4u32).prop_map(Edit::Seed),
     ]
 }
 
 fn mirror() -> impl Strategy<Value = Edit> {
-    let plane = prop_oneof![Just(Plane::Zero), Just(Plane::Middle)];
-    let outcome = prop_oneof![Just(Outcome::Move), Just(Outcome::Copy)];
-    (axis(), plane, outcome).prop_map(|(axis, plane, outcome)| Edit::Mirror {
-        axis,
-        plane,
-        outcome,
-    })
+    let plane = prop_oneof![Just(MirrorPlane::Zero), Just(MirrorPlane::Middle)];
+    let result = prop_oneof![Just(MirrorResult::Move), Just(MirrorResult::Copy)];
+    (axis(), plane, result).prop_map(|(axis, plane, result)| Edit::Mirror { axis, plane, result })
 }
 
 fn selection() -> impl Strategy<Value = Select> {
-    let how = prop_oneof![2 => Just(How::Replace), 2 => Just(How::Add), 1 => Just(How::Toggle), 1 => Just(How::Remove)];
+    let mode = prop_oneof![
+        2 => Just(SelectionMode::Replace),
+        2 => Just(SelectionMode::Add),
+        1 => Just(SelectionMode::Toggle),
+        1 => Just(SelectionMode::Remove),
+    ];
     prop_oneof![
-        4 => (vec(0..10usize, 0..4), how).prop_map(|(boxes, how)| Select::Boxes { boxes, how }),
+        4 => (vec(0..10usize, 0..4), mode).prop_map(|(boxes, mode)| Select::Boxes { boxes, mode }),
         4 => Just(Select::All),
         1 => Just(Select::None),
         1 => Just(Select::Next),
@@ -109,15 +118,16 @@ fn selection() -> impl Strategy<Value = Select> {
 fn setting() -> impl Strategy<Value = Setting> {
     prop_oneof![
         (any::<bool>(), prop_oneof![Just(0.1), 0.01..2.0, wild()])
-            .prop_map(|(on, step)| Setting::Snap(Snap { on, step })),
-        prop_oneof![Just(Scaling::Symmetric), Just(Scaling::OppositeFace)]
-            .prop_map(Setting::Scaling),
-        prop_oneof![Just(View::Boxes), Just(View::Cloud), Just(View::Both)].prop_map(Setting::View),
+            .prop_map(|(is_on, step)| Setting::Snap(GridSnap { is_on, step })),
+        prop_oneof![Just(ScalingAnchor::Center), Just(ScalingAnchor::OppositeFace)]
+            .prop_map(Setting::Anchor),
+        prop_oneof![Just(DisplayMode::Boxes), Just(DisplayMode::Cloud), Just(DisplayMode::Both)]
+            .prop_map(Setting::Display),
         axis().prop_map(Setting::Axis),
     ]
 }
 
-/// Towards the middle of things, more or less; seldom anywhere.
+/// Returns a ray, mostly toward the boxes.
 fn ray() -> impl Strategy<Value = Ray> {
     let usual = (-6.0..6.0, -6.0..6.0, -0.5..0.5, -0.5..0.5).prop_map(|(x, y, dx, dy)| Ray {
         origin: DVec3::new(x, y, 20.0),
@@ -150,7 +160,7 @@ pub fn begin() -> impl Strategy<Value = Action> {
 
 pub fn drag_to() -> impl Strategy<Value = Action> {
     let modifiers =
-        (any::<bool>(), any::<bool>()).prop_map(|(snap, scaling)| Modifiers { snap, scaling });
+        (any::<bool>(), any::<bool>()).prop_map(|(snap, anchor)| DragModifiers { snap, anchor });
     (ray(), modifiers).prop_map(|(ray, modifiers)| Action::Drag(DragAction::To { ray, modifiers }))
 }
 
@@ -176,7 +186,7 @@ pub fn action() -> impl Strategy<Value = Action> {
     ]
 }
 
-/// Few different ones, so that a way back is met by chance as well.
+/// Returns one of few actions, so that a sequence may return to an earlier document.
 pub fn small_action() -> impl Strategy<Value = Action> {
     let one = |v: f64| prop_oneof![Just(v), Just(-v)];
     prop_oneof![

@@ -1,5 +1,5 @@
-//! P, Table 2, by hands alone: the pointer's pixels, keys, and numbers as they are printed, from an
-//! empty window to a saved file.
+//! P, Table 2, made by input alone: pixels, keys, and numbers as printed, from an empty window to a
+//! saved file.
 
 use std::path::Path;
 
@@ -7,30 +7,29 @@ use glam::{DVec2, DVec3};
 use nimbus::io::box_file;
 use nimbus::model::boxes::CloudBox;
 use nimbus::model::camera::Pose;
-use nimbus::viewer::editor::Axis;
-use nimbus::viewer::editor::desk::{Button, Desk, Field, Held, Input, Screen, Turn};
-use nimbus::viewer::editor::handles::Handle;
-use nimbus::viewer::editor::session::{Event, Request, Session, perform};
-use nimbus::viewer::editor::shortcuts::{Chord, Key};
+use nimbus::viewer::editor::{
+    Axis, Button, Chord, EditorController, Field, Handle, Input, Key, ModifierKeys, PictureArea,
+    Request, Session, SessionEvent, perform,
+};
 
-const NONE: Held = Held { ctrl: false, shift: false };
-const CTRL: Held = Held { ctrl: true, ..NONE };
+const NONE: ModifierKeys = ModifierKeys { ctrl: false, shift: false };
+const CTRL: ModifierKeys = ModifierKeys { ctrl: true, ..NONE };
 
-/// What is asked of the window is done at once, and a name is given where one is asked for.
+/// A window that carries out every request at once. A dialog returns `path`.
 struct Window<'a> {
-    desk: Desk,
+    controller: EditorController,
     path: &'a Path,
     has_quit: bool,
 }
 
 impl Window<'_> {
     fn takes(&mut self, input: Input) {
-        let Turn { desk, requests, .. } = self.desk.after(&input);
-        self.desk = desk;
-        assert_eq!(self.desk.said().filter(|said| !said.starts_with("saved")), None, "{input:?}");
+        let requests = self.controller.handle(&input);
+        let message = self.controller.message();
+        assert_eq!(message.filter(|text| !text.starts_with("saved")), None, "{input:?}");
         for request in requests {
             let event = match request {
-                Request::ChooseToSave => Event::ChosenToSave(Some(self.path.to_owned())),
+                Request::ChooseToSave => SessionEvent::ChosenToSave(Some(self.path.to_owned())),
                 Request::Quit => {
                     self.has_quit = true;
                     continue;
@@ -45,8 +44,8 @@ impl Window<'_> {
         self.takes(Input::Chord(Chord { key: Key::Char(key), ctrl, shift: false, alt: false }));
     }
 
-    fn moves(&mut self, pixel: DVec2, held: Held) {
-        self.takes(Input::PointerMoved { pixel, held });
+    fn moves(&mut self, pixel: DVec2, keys: ModifierKeys) {
+        self.takes(Input::PointerMoved { pixel, keys });
     }
 
     fn types(&mut self, field: Field, text: &str) {
@@ -54,29 +53,29 @@ impl Window<'_> {
     }
 
     fn active(&self) -> CloudBox {
-        *self.desk.editor().active_box().unwrap().1
+        *self.controller.editor().active_box().unwrap().1
     }
 
-    /// Pulls the arrow along an axis so that the box's coordinate becomes about `to`, with Ctrl
-    /// held: the grid of tenths.
+    /// Drags the arrow along an axis until the box's coordinate is about `to`. Ctrl snaps to the
+    /// grid of tenths.
     fn pulls(&mut self, axis: Axis, to: f64) {
-        let (view, b) = (self.desk.viewport(), self.active());
-        let handles = self.desk.editor().handles(&view);
+        let (view, b) = (self.controller.viewport(), self.active());
+        let handles = self.controller.editor().handles(&view);
         let arrow = handles.iter().find(|p| p.handle == Handle::MoveAxis(axis)).unwrap();
         let middle = 0.5 * (arrow.from + arrow.to);
         let pixel = |place: DVec3| view.project(place).unwrap().round();
         let (from, to) =
             (pixel(middle), pixel(middle + (to - b.center[axis.index()]) * axis.unit()));
         self.moves(from, NONE);
-        assert_eq!(self.desk.hovered(), Some(Handle::MoveAxis(axis)));
-        self.takes(Input::Button { which: Button::Left, is_down: true, held: NONE });
+        assert_eq!(self.controller.feedback().hovered, Some(Handle::MoveAxis(axis)));
+        self.takes(Input::Button { button: Button::Left, is_down: true, keys: NONE });
         for share in [0.2, 1.3, 1.0] {
             self.moves((from + share * (to - from)).round(), CTRL);
         }
-        self.takes(Input::Button { which: Button::Left, is_down: false, held: CTRL });
+        self.takes(Input::Button { button: Button::Left, is_down: false, keys: CTRL });
     }
 
-    /// A line of the table, as it is printed.
+    /// Makes the box of one printed line of the table.
     fn makes(&mut self, fields: &[&str]) {
         self.moves(DVec2::new(430.0, 320.0), NONE);
         self.key('a', false);
@@ -84,7 +83,7 @@ impl Window<'_> {
         self.pulls(Axis::X, v(4).abs());
         self.pulls(Axis::Y, v(5));
         if v(4) < 0.0 {
-            // Placed right of the middle.
+            // PlacedHandle right of the middle.
             self.key('x', false);
             self.key('m', false);
         }
@@ -101,15 +100,16 @@ impl Window<'_> {
 }
 
 #[test]
-fn lines_of_the_papers_table_are_made_by_pixels_keys_and_numbers() {
+fn boxes_of_the_papers_table_are_made_by_pixels_keys_and_numbers() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("made.dat");
     let position = DVec3::new(0.0, 0.0, 18.0);
     let pose = Pose { position, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
     let fov_y_rad = 45f64.to_radians();
-    let screen = Screen { size_px: DVec2::new(800.0, 600.0), px_per_point: 1.0, fov_y_rad };
-    let desk = Desk::new(Session::new(), (&pose, DVec3::Y, DVec3::ZERO), screen, 250.0);
-    let mut window = Window { desk, path: &path, has_quit: false };
+    let area = PictureArea { size_px: DVec2::new(800.0, 600.0), px_per_point: 1.0, fov_y_rad };
+    let controller =
+        EditorController::new(Session::default(), (&pose, DVec3::Y, DVec3::ZERO), area, 250.0);
+    let mut window = Window { controller, path: &path, has_quit: false };
 
     let table = Path::new("scenes/cubes-554.dat");
     let text = std::fs::read_to_string(table).unwrap();
@@ -118,25 +118,26 @@ fn lines_of_the_papers_table_are_made_by_pixels_keys_and_numbers() {
         window.makes(&line.split(',').map(str::trim).collect::<Vec<_>>());
     }
     window.key('s', true);
-    assert_eq!(window.desk.said(), Some(format!("saved {}", path.display()).as_str()));
+    assert_eq!(window.controller.message(), Some(format!("saved {}", path.display()).as_str()));
     let expected = box_file::read(table).unwrap()[..N_LINES].to_vec();
     assert_eq!(box_file::read(&path).unwrap(), expected);
-    assert!(!window.desk.session().is_dirty());
+    assert!(!window.controller.session().is_dirty());
 
-    // A drag is undone as one step, and all of it one by one.
-    let steps = window.desk.editor().history().n_undo();
+    // Every step is undone and redone.
+    let steps = window.controller.editor().history().n_undo();
     window.key('z', true);
     assert!(
-        window.desk.session().is_dirty() && window.desk.editor().history().n_undo() == steps - 1
+        window.controller.session().is_dirty()
+            && window.controller.editor().history().n_undo() == steps - 1
     );
     for _ in 1..steps {
         window.key('z', true);
     }
-    assert!(window.desk.editor().boxes().is_empty());
+    assert!(window.controller.editor().boxes().is_empty());
     for _ in 0..steps {
         window.key('y', true);
     }
-    assert!(!window.desk.session().is_dirty());
+    assert!(!window.controller.session().is_dirty());
     window.key('q', true);
     assert!(window.has_quit);
 }

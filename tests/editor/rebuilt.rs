@@ -1,20 +1,18 @@
-//! P, Tables 2 and 3, made from nothing by what a hand does: boxes are added and duplicated,
-//! dragged onto the grid, mirrored, and given numbers as they are printed; then saved, and compared
-//! with the tables as values.
+//! P, Tables 2 and 3, made by actions from an empty document.
+//!
+//! Boxes are added, duplicated, dragged onto the grid, mirrored, and given numbers as printed. The
+//! saved file is compared with the tables.
 
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use nimbus::io::box_file;
-use nimbus::viewer::editor::action::Modifiers;
-use nimbus::viewer::editor::handles::Handle;
-use nimbus::viewer::editor::mirror::{Outcome, Plane};
-use nimbus::viewer::editor::ray::Ray;
-use nimbus::viewer::editor::session::{Answer, Event, Request, Session, Wish, perform};
-use nimbus::viewer::editor::snap::Snap;
-use nimbus::viewer::editor::{Action, Axis, DragAction, Edit, Setting, document, numbers};
+use nimbus::viewer::editor::{
+    Action, Answer, Axis, DragAction, DragModifiers, Edit, GridSnap, Handle, Intent, MirrorPlane,
+    MirrorResult, Ray, Request, Session, SessionEvent, Setting, document, numbers, perform,
+};
 
-/// How often each kind of act was of use.
+/// Number of actions of each kind.
 #[derive(Debug, Default)]
 struct Acts {
     n_added: usize,
@@ -25,15 +23,15 @@ struct Acts {
     n_typed: usize,
 }
 
-struct Hand {
+struct Rebuild {
     session: Session,
     acts: Acts,
 }
 
-impl Hand {
+impl Rebuild {
     fn act(&mut self, action: Action) {
-        let turn = self.session.after(&Event::Act(action.clone()));
-        self.session = turn.unwrap_or_else(|refusal| panic!("{action:?}: {refusal}")).session;
+        let next = self.session.after(&SessionEvent::Act(action.clone()));
+        self.session = next.unwrap_or_else(|refusal| panic!("{action:?}: {refusal}")).0;
     }
 
     fn edit(&mut self, edit: Edit) {
@@ -44,7 +42,7 @@ impl Hand {
         *self.session.editor().active_box().unwrap().1
     }
 
-    /// A line of the table, as it is printed there.
+    /// Makes the box of one printed line of the table.
     fn make(&mut self, fields: &[&str]) {
         let typed = |i: usize| numbers::length(fields[i], 1.0).unwrap();
         if self.session.editor().active_box().is_some() {
@@ -62,14 +60,18 @@ impl Hand {
                 self.acts.n_typed += 1;
             }
         }
-        // Left of the middle what was placed right of it is mirrored.
+        // A box left of the middle is placed right of it and mirrored.
         let x = typed(4);
         self.place(
             DVec3::new(x.abs(), typed(5), typed(6)),
             [fields[4].trim_start_matches('-'), fields[5], fields[6]],
         );
         if x < 0.0 {
-            self.edit(Edit::Mirror { axis: Axis::X, plane: Plane::Zero, outcome: Outcome::Move });
+            self.edit(Edit::Mirror {
+                axis: Axis::X,
+                plane: MirrorPlane::Zero,
+                result: MirrorResult::Move,
+            });
             self.acts.n_mirrored += 1;
         }
         self.fill(numbers::count(fields[0]).unwrap());
@@ -79,11 +81,10 @@ impl Hand {
         }
     }
 
-    /// Along x and y by a drag onto the grid of tenths, from wherever the box was; what does not
-    /// lie on it is typed.
+    /// Moves the box along x and y by drags onto the grid of tenths. Other coordinates are typed.
     fn place(&mut self, to: DVec3, printed: [&str; 3]) {
         let from = self.active().center;
-        // Three hundredths beside the mark: that is what the grid is for.
+        // The drags miss their places by three hundredths, and the grid corrects them.
         for (axis, beside) in
             [(Axis::X, DVec3::new(0.03, 5.0, 0.0)), (Axis::Y, DVec3::new(-5.0, -0.03, 0.0))]
         {
@@ -95,7 +96,7 @@ impl Hand {
             };
             let to = |share: f64| DragAction::To {
                 ray: ray(from + share * (to - from) + beside),
-                modifiers: Modifiers::default(),
+                modifiers: DragModifiers::default(),
             };
             for step in [begin, to(0.3), to(1.4), to(1.0), DragAction::End] {
                 self.act(Action::Drag(step));
@@ -111,7 +112,7 @@ impl Hand {
         }
     }
 
-    /// By density where the box has one to give, else by number.
+    /// Sets the number of particles by their density.
     fn fill(&mut self, n: u32) {
         let volume = document::volume(&self.active());
         self.edit(Edit::Density(f64::from(n) / volume));
@@ -120,41 +121,38 @@ impl Hand {
     }
 }
 
-fn rebuild(table: &str) -> Acts {
+fn rebuild_table(table: &str) -> Acts {
     let path = Path::new("scenes").join(table);
     let expected = box_file::read(&path).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
-    let mut hand = Hand { session: Session::new(), acts: Acts::default() };
-    hand.act(Action::Set(Setting::Snap(Snap { on: true, step: 0.1 })));
+    let mut rebuild = Rebuild { session: Session::default(), acts: Acts::default() };
+    rebuild.act(Action::Set(Setting::Snap(GridSnap { is_on: true, step: 0.1 })));
     for line in text.lines().skip(2).filter(|line| !line.trim().is_empty()) {
-        hand.make(&line.split(',').map(str::trim).collect::<Vec<_>>());
+        rebuild.make(&line.split(',').map(str::trim).collect::<Vec<_>>());
     }
     let folder = tempfile::tempdir().unwrap();
-    let saved = save_before_quitting(&hand.session, folder.path().join("made.dat"));
+    let saved = save_before_quitting(&rebuild.session, folder.path().join("made.dat"));
     assert_eq!(box_file::read(saved.path().unwrap()).unwrap(), expected);
     assert_eq!(
         saved.editor().document().n_particles(),
         expected.iter().map(|b| u64::from(b.n_particles)).sum::<u64>()
     );
-    // And all the way back.
-    while hand.session.editor().history().n_undo() > 0 {
-        hand.act(Action::Undo);
+    // Every step can be undone.
+    while rebuild.session.editor().history().n_undo() > 0 {
+        rebuild.act(Action::Undo);
     }
-    assert!(hand.session.editor().boxes().is_empty() && !hand.session.is_dirty());
-    hand.acts
+    assert!(rebuild.session.editor().boxes().is_empty() && !rebuild.session.is_dirty());
+    rebuild.acts
 }
 
-/// Quit, save, a name, and gone.
+/// Quits, answers the question by saving, and gives a path.
 fn save_before_quitting(session: &Session, path: PathBuf) -> Session {
-    let after = |session: &Session, event: Event| {
-        let turn = session.after(&event).unwrap();
-        (turn.session, turn.request)
-    };
-    let (session, request) = after(session, Event::Wish(Wish::Quit));
-    assert_eq!(request, Some(Request::Ask(Wish::Quit)));
-    let (session, request) = after(&session, Event::Answer(Answer::Save));
+    let after = |session: &Session, event: SessionEvent| session.after(&event).unwrap();
+    let (session, request) = after(session, SessionEvent::Intend(Intent::Quit));
+    assert_eq!(request, Some(Request::Ask(Intent::Quit)));
+    let (session, request) = after(&session, SessionEvent::Answer(Answer::Save));
     assert_eq!(request, Some(Request::ChooseToSave));
-    let (session, request) = after(&session, Event::ChosenToSave(Some(path)));
+    let (session, request) = after(&session, SessionEvent::ChosenToSave(Some(path)));
     let (session, request) = after(&session, perform(&request.unwrap()).unwrap());
     assert_eq!((session.is_dirty(), request), (false, Some(Request::Quit)));
     session
@@ -162,23 +160,22 @@ fn save_before_quitting(session: &Session, path: PathBuf) -> Session {
 
 #[test]
 fn the_cloud_of_554_particles_is_made_by_hand() {
-    let acts = rebuild("cubes-554.dat");
+    let acts = rebuild_table("cubes-554.dat");
     assert_eq!(
         (acts.n_added, acts.n_duplicated, acts.n_dragged, acts.n_densities),
         (1, 16, 34, 17),
         "{acts:?}"
     );
-    // Left of the middle lie eight boxes, by the table.
+    // The table has eight boxes left of the middle.
     assert_eq!(acts.n_mirrored, 8, "{acts:?}");
-    // Of 17 · 8 numbers the grid and what was duplicated leave these: by the table, edges and radii
-    // that differ from the line before, heights z that do, and places x and y with more than one
-    // decimal.
+    // Of 17 · 8 numbers these are typed: extents, radii and heights z that differ from the line
+    // before, and places x and y with more than one decimal.
     assert_eq!(acts.n_typed, 49, "{acts:?}");
 }
 
 #[test]
 fn the_cloud_of_615_particles_is_made_by_hand() {
-    let acts = rebuild("cubes-615.dat");
+    let acts = rebuild_table("cubes-615.dat");
     assert_eq!(
         (acts.n_added, acts.n_duplicated, acts.n_dragged, acts.n_densities),
         (1, 22, 46, 23),

@@ -7,6 +7,16 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+/// Waits until `condition` holds. Fails after a minute without it.
+pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !condition() {
+        assert!(begin.elapsed() < Duration::from_secs(60), "no {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// An X server of its own.
 pub struct Display {
     server: Child,
     name: String,
@@ -58,8 +68,8 @@ impl Display {
 
     /// Waits for the window of a process.
     pub fn window_of(&self, pid: u32) -> String {
-        let begin = Instant::now();
-        loop {
+        let mut window = None;
+        wait_for("window", || {
             let found = self.xdotool(&["search", "--onlyvisible", "--pid", &pid.to_string()]);
             if let Some(window) = found.and_then(|all| all.lines().next().map(str::to_owned)) {
                 return window;
@@ -76,6 +86,7 @@ impl Display {
         std::thread::sleep(Duration::from_millis(500));
     }
 
+    /// Presses and releases a key.
     pub fn key(&self, name: &str) {
         self.xdotool(&["key", "--delay", "30", name]).expect("a key");
     }
@@ -85,6 +96,7 @@ impl Display {
         self.xdotool(&["type", "--delay", "30", "--", text]).expect("text");
     }
 
+    /// Returns the title of a window.
     pub fn title(&self, window: &str) -> String {
         self.xdotool(&["getwindowname", window]).unwrap_or_default()
     }
@@ -101,7 +113,7 @@ impl Display {
         let image = connection
             .get_image(ImageFormat::Z_PIXMAP, id, 0, 0, width, height, !0)
             .expect("asked");
-        let data = image.reply().expect("what is seen").data;
+        let data = image.reply().expect("the content").data;
         assert_eq!(
             connection.setup().image_byte_order,
             x11rb::protocol::xproto::ImageOrder::LSB_FIRST
@@ -110,6 +122,7 @@ impl Display {
         (u32::from(width), u32::from(height), rgb)
     }
 
+    /// Sets the size of a window, in pixels.
     pub fn resize(&self, window: &str, [width, height]: [u32; 2]) {
         self.xdotool(&["windowsize", window, &width.to_string(), &height.to_string()])
             .expect("a size");

@@ -1,115 +1,141 @@
-//! What can be done to the state, as data.
-
-use std::fmt;
+//! Actions on the editor's state, as data.
 
 use glam::DVec3;
 
-use super::Axis;
+use super::axis::Axis;
+use super::grid_snap::GridSnap;
 use super::handles::Handle;
-use super::mirror::{Outcome, Plane};
+use super::mirror::{MirrorPlane, MirrorResult};
 use super::ray::Ray;
-use super::selection::How;
-use super::snap::Snap;
-use super::state::{Scaling, View};
+use super::selection::SelectionMode;
+use super::settings::{DisplayMode, ScalingAnchor};
 use crate::model::boxes::CloudBox;
 
+/// An action on the editor's state.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
-    /// Of the boxes or the seed: one step to undo, if it changes anything.
+    /// Changes the document. The change, if any, is one step of the history.
     Edit(Edit),
+    /// Changes the selection.
     Select(Select),
+    /// Begins, continues or ends a drag.
     Drag(DragAction),
+    /// Restores the state before the last step.
     Undo,
+    /// Restores the state after the step that was undone last.
     Redo,
+    /// Changes a setting.
     Set(Setting),
 }
 
-/// What is done to all selected boxes, where it does not say otherwise. Lengths are in scene units.
+/// A change of the selected boxes, unless stated otherwise. Lengths are in scene units.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Edit {
-    /// A box at the end of the list, which is selected then.
+    /// Appends a box and selects it.
     Add(CloudBox),
-    /// Copies at the end of the list, in the places of their originals; they are selected then.
+    /// Appends copies at the same places and selects them.
     Duplicate,
+    /// Removes the boxes.
     Delete,
+    /// Sets the number of particles.
     Count(u32),
-    /// Particles in a cubic unit: sets the count to the nearest whole number.
+    /// Sets the number of particles to the nearest integer for this density, particles per cubic
+    /// unit.
     Density(f64),
-    /// The edge along an axis; [`Scaling`] says what stays where it is.
+    /// Sets the length along an axis; [`ScalingAnchor`] says what stays in place.
     Extent(Axis, f64),
-    /// The centre's coordinate.
+    /// Sets a coordinate of the centre.
     Center(Axis, f64),
+    /// Sets the largest radius of the particles.
     Radius(f64),
+    /// Moves the centres.
     MoveBy(DVec3),
-    /// Places and edges times these, about the selection's middle; counts and radii stay.
-    ScaleBy(DVec3),
+    /// Mirrors the boxes across a plane.
     Mirror {
+        /// Axis perpendicular to the plane.
         axis: Axis,
-        plane: Plane,
-        outcome: Outcome,
+        /// Place of the plane.
+        plane: MirrorPlane,
+        /// Use of the images.
+        result: MirrorResult,
     },
-    /// Centres and edges to the nearest grid places, edges to a step at least.
-    SnapToGrid,
-    /// The cloud's seed; whatever is selected.
+    /// Sets the cloud's seed, whatever is selected.
     Seed(u32),
 }
 
+/// A change of the selection.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Select {
-    /// As found by [`super::viewport::pick`] or [`super::viewport::pick_rectangle`]; the last one
-    /// becomes active.
+    /// The last of the boxes becomes active.
     Boxes {
+        /// Indices of the boxes.
         boxes: Vec<usize>,
-        how: How,
+        /// Effect on the selection before.
+        mode: SelectionMode,
     },
+    /// Selects every box; the active box stays active.
     All,
+    /// Selects no box.
     None,
-    /// The box after the active one in the list alone, the first where none is; the last is
-    /// followed by the first.
+    /// Selects the box after the active one alone. The list is cyclic; it starts with the first
+    /// box.
     Next,
+    /// Selects the box before the active one alone.
     Previous,
 }
 
-/// From the press of a button to its release; all of it is one step to undo.
+/// A part of a drag, which lasts from the press of a button to its release. A drag is one step of
+/// the history.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DragAction {
-    /// `forward`: which way the camera looks, a unit vector.
+    /// Takes hold of a handle.
     Begin {
+        /// The handle under the pointer.
         handle: Handle,
+        /// Ray through the pointer.
         ray: Ray,
+        /// View direction of the camera, a unit vector.
         forward: DVec3,
     },
-    /// The pointer is at `ray` now.
+    /// Moves the pointer to `ray`.
     To {
+        /// Ray through the pointer.
         ray: Ray,
-        modifiers: Modifiers,
+        /// Keys that are held.
+        modifiers: DragModifiers,
     },
-    /// Moves or scales along this axis only; the same once more takes that back.
+    /// Restricts the drag to an axis; the same axis again lifts the restriction.
     Constrain(Axis),
+    /// Ends the drag where it is.
     End,
-    /// All is as it was before.
+    /// Restores the document.
     Cancel,
 }
 
-/// Keys held while dragging: each turns the setting of its name around.
+/// Settings that a held key inverts during a drag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Modifiers {
+pub struct DragModifiers {
+    /// Inverts snapping to the grid.
     pub snap: bool,
-    pub scaling: bool,
+    /// Toggles the scaling anchor.
+    pub anchor: bool,
 }
 
-/// What is no part of the document and is not undone.
+/// A change of one setting.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Setting {
-    View(View),
-    Snap(Snap),
-    Scaling(Scaling),
-    /// What mirroring goes by, and what is drawn as chosen.
+    /// Sets what is drawn.
+    Display(DisplayMode),
+    /// Sets the grid.
+    Snap(GridSnap),
+    /// Sets the anchor of scaling.
+    Anchor(ScalingAnchor),
+    /// Sets the axis of mirroring.
     Axis(Axis),
 }
 
 impl Edit {
-    /// As in "Undo …".
+    /// Returns the name of the step, as in "Undo …".
     pub fn label(&self) -> &'static str {
         match self {
             Edit::Add(_) => "add a box",
@@ -121,22 +147,8 @@ impl Edit {
             Edit::Center(..) => "set a place",
             Edit::Radius(_) => "set the radius",
             Edit::MoveBy(_) => "move",
-            Edit::ScaleBy(_) => "scale",
             Edit::Mirror { .. } => "mirror",
-            Edit::SnapToGrid => "snap to the grid",
             Edit::Seed(_) => "set the seed",
         }
     }
 }
-
-/// Why an action was not taken; nothing has changed. One sentence for a status line.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refusal(pub String);
-
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Refusal {}

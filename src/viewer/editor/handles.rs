@@ -1,52 +1,62 @@
-//! What the hand takes hold of at the active box: an arrow along each axis to move, a handle on
-//! each face to scale, and the centre to move in the view's plane.
+//! Handles of the active box: an arrow along each axis to move the box, a square on each face to
+//! scale it, and its centre to move it in the view plane.
 
 use glam::{DVec2, DVec3};
 
-use super::Axis;
+use super::axis::Axis;
 use super::viewport::Viewport;
 use crate::model::boxes::CloudBox;
 
+/// A side of a box along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Side {
+    /// The side of the smaller coordinate.
     Low,
+    /// The side of the larger coordinate.
     High,
 }
 
+/// A handle that a drag takes hold of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Handle {
+    /// Moves along an axis.
     MoveAxis(Axis),
-    /// In the plane through the centre that the camera looks at.
+    /// Moves in the plane through the centre that faces the camera.
     MoveView,
+    /// Moves one face.
     ScaleFace(Axis, Side),
-    /// All selected boxes and the distances between them, about their middle: by the pointer's
-    /// distance from it.
+    /// Scales all selected boxes, and their distances, by the pointer's distance from their middle.
     ScaleAll,
-    /// The same along one axis.
+    /// Scales in the same way along one axis.
     ScaleAxis(Axis),
 }
 
-/// Where a handle lies in the scene: on a line, whose ends are the same where it is a point.
+/// A handle in the scene: a line, or a point where both ends are equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Placed {
+pub struct PlacedHandle {
+    /// The handle.
     pub handle: Handle,
+    /// Begin of the line.
     pub from: DVec3,
+    /// End of the line.
     pub to: DVec3,
 }
 
-/// From a face to its arrow, so that the face's own handle lies free; logical points, as are the
-/// next two.
+/// Distance from a face to its arrow, which leaves space for the face's handle, points.
 pub const GAP_POINTS: f64 = 16.0;
+/// Length of an arrow, points.
 pub const ARROW_POINTS: f64 = 64.0;
-/// A handle is under the pointer at most so far from it: what a hand hits well.
+/// Largest distance of the pointer from a handle that it picks, points.
 pub const REACH_POINTS: f64 = 8.0;
-/// Handles of an axis that is seen nearly from its end are not shown: below this sine (6°) the
-/// pointer's place along the axis is magnified more than tenfold.
-const LEAST_SINE: f64 = 0.1;
+/// Sine of the angle (6°) between view and axis below which the axis has no handles: the pointer's
+/// place would be magnified more than tenfold along it.
+const MIN_SINE: f64 = 0.1;
 
 impl Side {
+    /// Both sides.
     pub const BOTH: [Side; 2] = [Side::Low, Side::High];
 
+    /// Returns −1 or 1.
     pub fn sign(self) -> f64 {
         match self {
             Side::Low => -1.0,
@@ -56,7 +66,7 @@ impl Side {
 }
 
 impl Handle {
-    /// As in "Undo …".
+    /// Returns the name of the step, as in "Undo …".
     pub fn label(self) -> &'static str {
         match self {
             Handle::MoveAxis(_) | Handle::MoveView => "move",
@@ -64,6 +74,7 @@ impl Handle {
         }
     }
 
+    /// Returns the axis that the handle is bound to.
     pub fn axis(self) -> Option<Axis> {
         match self {
             Handle::MoveAxis(axis) | Handle::ScaleFace(axis, _) | Handle::ScaleAxis(axis) => {
@@ -74,42 +85,46 @@ impl Handle {
     }
 }
 
-/// The handles of a box as they are to be drawn, all at the same size on the screen wherever the
-/// box is.
-pub fn placed(b: &CloudBox, view: &Viewport) -> Vec<Placed> {
-    let mut placed = vec![Placed { handle: Handle::MoveView, from: b.center, to: b.center }];
+/// Returns the handles of a box. Their size on the screen does not depend on the box's distance.
+pub fn place_handles(b: &CloudBox, view: &Viewport) -> Vec<PlacedHandle> {
+    let mut placed = vec![PlacedHandle { handle: Handle::MoveView, from: b.center, to: b.center }];
     let sight = (b.center - view.pose.position).normalize_or(view.pose.forward);
     for axis in Axis::ALL {
         let unit = axis.unit();
-        if unit.cross(sight).length() < LEAST_SINE {
+        if unit.cross(sight).length() < MIN_SINE {
             continue;
         }
         let half = 0.5 * b.extent[axis.index()];
         for side in Side::BOTH {
             let face = b.center + side.sign() * half * unit;
-            placed.push(Placed { handle: Handle::ScaleFace(axis, side), from: face, to: face });
+            placed.push(PlacedHandle {
+                handle: Handle::ScaleFace(axis, side),
+                from: face,
+                to: face,
+            });
         }
         let face = b.center + half * unit;
         let point = view.units_per_point(face);
         let (from, to) =
             (face + GAP_POINTS * point * unit, face + (GAP_POINTS + ARROW_POINTS) * point * unit);
-        placed.push(Placed { handle: Handle::MoveAxis(axis), from, to });
+        placed.push(PlacedHandle { handle: Handle::MoveAxis(axis), from, to });
     }
-    // What is not before the eye cannot be taken hold of.
+    // Handles behind the camera cannot be picked.
     placed.retain(|p| view.project(p.from).is_some() && view.project(p.to).is_some());
     placed
 }
 
-/// The handle nearest to a pixel, if one is within [`REACH_POINTS`].
-pub fn pick(placed: &[Placed], view: &Viewport, pixel: DVec2) -> Option<Handle> {
-    let distance =
-        |p: &Placed| Some(from_segment(pixel, view.project(p.from)?, view.project(p.to)?));
+/// Returns the handle nearest to a pixel within [`REACH_POINTS`].
+pub fn pick_handle(placed: &[PlacedHandle], view: &Viewport, pixel: DVec2) -> Option<Handle> {
+    let distance = |p: &PlacedHandle| {
+        Some(distance_to_segment(pixel, view.project(p.from)?, view.project(p.to)?))
+    };
     let reached = placed.iter().filter_map(|p| Some((p.handle, distance(p)?)));
     let nearest = reached.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (nearest.1 <= REACH_POINTS * view.px_per_point).then_some(nearest.0)
 }
 
-fn from_segment(point: DVec2, a: DVec2, b: DVec2) -> f64 {
+fn distance_to_segment(point: DVec2, a: DVec2, b: DVec2) -> f64 {
     let along = b - a;
     let length_squared = along.length_squared();
     let t = if length_squared > 0.0 {
@@ -122,7 +137,7 @@ fn from_segment(point: DVec2, a: DVec2, b: DVec2) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::unit_box;
+    use super::super::fixtures::unit_box;
     use super::*;
     use crate::model::camera::Pose;
 
@@ -134,38 +149,38 @@ mod tests {
     }
 
     #[test]
-    fn ten_handles_and_each_is_found_under_its_own_pixel() {
+    fn each_of_the_ten_handles_is_picked_at_its_own_pixel() {
         let (view, b) = (view(DVec3::new(3.0, 2.0, 4.0)), unit_box());
-        let placed = placed(&b, &view);
+        let placed = place_handles(&b, &view);
         assert_eq!(placed.len(), 1 + 6 + 3);
         for p in &placed {
             let (a, b) = (view.project(p.from).unwrap(), view.project(p.to).unwrap());
-            assert_eq!(pick(&placed, &view, 0.5 * (a + b)), Some(p.handle));
+            assert_eq!(pick_handle(&placed, &view, 0.5 * (a + b)), Some(p.handle));
         }
-        assert_eq!(pick(&placed, &view, DVec2::new(5.0, 5.0)), None);
+        assert_eq!(pick_handle(&placed, &view, DVec2::new(5.0, 5.0)), None);
     }
 
     #[test]
-    fn reach_and_arrows_are_as_long_as_said_and_grow_with_the_displays_points() {
+    fn reach_and_arrows_scale_with_the_displays_points() {
         for px_per_point in [1.0, 2.0] {
             let view = Viewport { px_per_point, ..view(DVec3::new(0.0, 0.0, 9.0)) };
-            let placed = placed(&unit_box(), &view);
+            let placed = place_handles(&unit_box(), &view);
             let arrow = placed.iter().find(|p| p.handle == Handle::MoveAxis(Axis::X)).unwrap();
             let (from, to) = (view.project(arrow.from).unwrap(), view.project(arrow.to).unwrap());
             assert!((from.distance(to) - ARROW_POINTS * px_per_point).abs() < 1e-9);
             let beside = |points: f64| 0.5 * (from + to) + DVec2::Y * points * px_per_point;
-            assert_eq!(pick(&placed, &view, beside(7.9)), Some(Handle::MoveAxis(Axis::X)));
-            assert_eq!(pick(&placed, &view, beside(8.1)), None);
-            // Seen from its end, z has no handles.
+            assert_eq!(pick_handle(&placed, &view, beside(7.9)), Some(Handle::MoveAxis(Axis::X)));
+            assert_eq!(pick_handle(&placed, &view, beside(8.1)), None);
+            // The view is along z, which has no handles then.
             assert!(placed.iter().all(|p| p.handle.axis() != Some(Axis::Z)));
             assert_eq!(placed.len(), 1 + 4 + 2);
         }
     }
 
     #[test]
-    fn what_lies_behind_has_no_handles() {
+    fn a_box_behind_the_camera_has_no_handles() {
         let mut view = view(DVec3::new(3.0, 2.0, 4.0));
         view.pose.forward = -view.pose.forward;
-        assert_eq!(placed(&unit_box(), &view), []);
+        assert_eq!(place_handles(&unit_box(), &view), []);
     }
 }

@@ -1,6 +1,7 @@
-//! Steps that can be undone and redone. A step keeps the whole document as it was: documents are
-//! small beside what is drawn of them, and nothing has to be undone by arithmetic, which would not
-//! give the same bits.
+//! Undo and redo.
+//!
+//! A step keeps the whole document as it was. Documents are small beside the particles drawn from
+//! them, and undoing by arithmetic would not restore every bit.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -8,70 +9,76 @@ use std::sync::Arc;
 use super::document::Document;
 use super::selection::Selection;
 
-/// Steps that are kept at most.
-pub const MOST_STEPS: usize = 1000;
-/// What the kept documents may take, in bytes; the last step is kept however large.
-pub const MOST_BYTES: usize = 256 << 20;
+/// Largest number of steps that are kept.
+pub const MAX_STEPS: usize = 1000;
+/// Largest size of the kept documents, bytes. The last step is kept whatever its size.
+pub const MAX_BYTES: usize = 256 << 20;
 
-/// The document and what was selected of it.
+/// A document and its selection.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
     pub document: Arc<Document>,
     pub selection: Selection,
 }
 
-/// One state beside the present one, and what was done between the two.
+/// A state next to the present one, and the name of the change between them.
 #[derive(Debug, Clone)]
 struct Step {
     snapshot: Snapshot,
     label: &'static str,
 }
 
+/// Steps that can be undone and redone.
 #[derive(Debug, Clone, Default)]
 pub struct History {
-    /// The latest last.
+    /// The latest step is last.
     undo: VecDeque<Step>,
-    /// The next last.
+    /// The next step is last.
     redo: Vec<Step>,
 }
 
 impl History {
-    /// What was undone is forgotten, and so is the oldest where there is too much.
+    /// Adds a step. Undone steps are dropped, and the oldest steps beyond the limits.
     pub(super) fn push(&mut self, before: Snapshot, label: &'static str) {
         self.redo.clear();
         self.undo.push_back(Step { snapshot: before, label });
         let mut n_bytes: usize = self.undo.iter().map(Step::n_bytes).sum();
-        while self.undo.len() > 1 && (self.undo.len() > MOST_STEPS || n_bytes > MOST_BYTES) {
+        while self.undo.len() > 1 && (self.undo.len() > MAX_STEPS || n_bytes > MAX_BYTES) {
             n_bytes -= self.undo.pop_front().map_or(0, |step| step.n_bytes());
         }
     }
 
-    /// The state before the last step; `now` is kept for [`History::redo`].
+    /// Returns the state before the last step, and keeps `now` for [`History::redo`].
     pub(super) fn undo(&mut self, now: Snapshot) -> Option<Snapshot> {
         let step = self.undo.pop_back()?;
         self.redo.push(Step { snapshot: now, label: step.label });
         Some(step.snapshot)
     }
 
+    /// Returns the state after the step that was undone last, and keeps `now` for
+    /// [`History::undo`].
     pub(super) fn redo(&mut self, now: Snapshot) -> Option<Snapshot> {
         let step = self.redo.pop()?;
         self.undo.push_back(Step { snapshot: now, label: step.label });
         Some(step.snapshot)
     }
 
-    /// What an undo would take back.
+    /// Returns the name of the step that an undo takes back.
     pub fn undo_label(&self) -> Option<&'static str> {
         self.undo.back().map(|step| step.label)
     }
 
+    /// Returns the name of the step that a redo repeats.
     pub fn redo_label(&self) -> Option<&'static str> {
         self.redo.last().map(|step| step.label)
     }
 
+    /// Returns the number of steps that can be undone.
     pub fn n_undo(&self) -> usize {
         self.undo.len()
     }
 
+    /// Returns the number of steps that can be redone.
     pub fn n_redo(&self) -> usize {
         self.redo.len()
     }
@@ -86,7 +93,7 @@ impl Step {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::document;
+    use super::super::fixtures::document;
     use super::*;
     use crate::model::boxes::CloudBox;
 
@@ -95,13 +102,13 @@ mod tests {
     }
 
     #[test]
-    fn no_more_steps_are_kept_than_there_is_room_for() {
+    fn the_oldest_steps_beyond_the_limits_are_dropped() {
         let mut history = History::default();
         let small = Arc::new(document(1));
-        (0..MOST_STEPS + 5).for_each(|_| history.push(snapshot(&small), "move"));
-        assert_eq!(history.n_undo(), MOST_STEPS);
-        // Two of these are too much, and one by itself is kept.
-        let n = (MOST_BYTES / size_of::<CloudBox>()) as u32 / 2 + 1;
+        (0..MAX_STEPS + 5).for_each(|_| history.push(snapshot(&small), "move"));
+        assert_eq!(history.n_undo(), MAX_STEPS);
+        // Two of these exceed the limit; one alone is kept.
+        let n = (MAX_BYTES / size_of::<CloudBox>()) as u32 / 2 + 1;
         let large = Arc::new(document(n));
         history.push(snapshot(&large), "move");
         assert!(history.n_undo() > 1);

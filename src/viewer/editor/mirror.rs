@@ -1,26 +1,30 @@
-//! Mirroring across a plane that is perpendicular to an axis. A box is its own mirror image, so
-//! that only its centre moves; its particles are drawn by lot anew where it is a copy, and are not
-//! mirrored.
+//! Mirroring of boxes across a plane perpendicular to an axis.
+//!
+//! A box is its own mirror image, so only its centre moves. The particles of a mirrored copy are
+//! new random ones.
 
-use super::Axis;
+use super::axis::Axis;
 use super::document::{Document, is_same};
 use super::selection::Selection;
 use super::viewport::bounds;
 use crate::model::boxes::CloudBox;
 
+/// The plane of a mirror.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Plane {
-    /// Where the coordinate is 0.
+pub enum MirrorPlane {
+    /// Coordinate 0.
     Zero,
-    /// Through the middle of what the selected boxes fill.
+    /// The middle of the selected boxes' bounds.
     Middle,
 }
 
+/// The use of the mirror images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum MirrorResult {
+    /// Images replace the boxes.
     Move,
-    /// Images at the end of the list, which are selected then. A box that is its own image has
-    /// none: two boxes in one place would have twice its particles.
+    /// Images are appended and selected. A box that is its own image is left out, because two
+    /// boxes in one place would double its particles.
     Copy,
 }
 
@@ -28,42 +32,32 @@ pub(super) fn mirrored(
     document: &Document,
     selection: &Selection,
     axis: Axis,
-    plane: Plane,
-    outcome: Outcome,
+    plane: MirrorPlane,
+    result: MirrorResult,
 ) -> (Document, Selection) {
-    let twice = match plane {
-        Plane::Zero => 0.0,
-        Plane::Middle => twice_the_middle(document, selection, axis),
+    let twice_plane = match plane {
+        MirrorPlane::Zero => 0.0,
+        MirrorPlane::Middle => twice_the_middle(document, selection, axis),
     };
     let mut new = document.clone();
-    match outcome {
-        Outcome::Move => {
-            selection
-                .boxes()
-                .iter()
-                .for_each(|i| new.boxes[*i] = image(&document.boxes[*i], axis, twice));
-            (new, selection.clone())
-        }
-        Outcome::Copy => {
-            let images = selection
-                .boxes()
-                .iter()
-                .map(|i| (document.boxes[*i], image(&document.boxes[*i], axis, twice)));
-            let images: Vec<CloudBox> =
-                images.filter(|(b, image)| !is_same(b, image)).map(|(_, image)| image).collect();
-            if images.is_empty() {
-                return (new, selection.clone());
+    let image = |i: &usize| image(&document.boxes[*i], axis, twice_plane);
+    match result {
+        MirrorResult::Move => selection.boxes().iter().for_each(|i| new.boxes[*i] = image(i)),
+        MirrorResult::Copy => {
+            let images = selection.boxes().iter().map(|i| (i, image(i)));
+            let images = images.filter(|(i, image)| !is_same(&document.boxes[**i], image));
+            new.boxes.extend(images.map(|(_, image)| image));
+            if new.boxes.len() > document.boxes.len() {
+                let copies = Selection::new(document.boxes.len()..new.boxes.len());
+                return (new, copies);
             }
-            let first = new.boxes.len();
-            new.boxes.extend(images);
-            let copies = Selection::new(first..new.boxes.len());
-            (new, copies)
         }
     }
+    (new, selection.clone())
 }
 
-/// Low and high side together. Of one box it is twice its centre, to the bit, so that nothing
-/// moves.
+/// Returns the sum of the lower and the upper bound. For one box it is exactly twice the centre, so
+/// that the box stays in place.
 fn twice_the_middle(document: &Document, selection: &Selection, axis: Axis) -> f64 {
     let k = axis.index();
     match selection.boxes() {
@@ -73,12 +67,12 @@ fn twice_the_middle(document: &Document, selection: &Selection, axis: Axis) -> f
     }
 }
 
-fn image(b: &CloudBox, axis: Axis, twice: f64) -> CloudBox {
+fn image(b: &CloudBox, axis: Axis, twice_plane: f64) -> CloudBox {
     let mut image = *b;
     let c = &mut image.center[axis.index()];
-    // 0 stays 0, where a minus would make it −0; across 0 the way back gives the same bits.
-    if *c != 0.0 || twice != 0.0 {
-        *c = twice - *c;
+    // Across 0 the sign of 0 is kept, so that mirroring twice restores every bit.
+    if *c != 0.0 || twice_plane != 0.0 {
+        *c = twice_plane - *c;
     }
     image
 }

@@ -1,60 +1,67 @@
-//! The cloud macrostructure editor (P, Figs. 2, 3 and 5) without its window: what a cloud is shaped
-//! by is a list of boxes, and every change of it is a function from one state to the next.
+//! The editor of the cloud macrostructure (P, Figs. 2, 3 and 5) without its window.
 //!
-//! [`session`] has the file: what is open, what is saved, what would be lost. [`state`] has what is
-//! edited: the [`document`], what is selected of it, the drag that is under way and the steps that
-//! can be undone. It takes an [`action`]; [`edits`], [`mirror`] and [`drag`] say what becomes of
-//! the boxes. A window draws what the state holds, asks [`viewport`] and [`handles`] what lies
-//! under the pointer, [`shortcuts`] what a key means and [`numbers`] what was typed, and computes
-//! anew what [`document::Touched`] names. [`desk`] does the asking: what pointer and keys do there
-//! becomes the session's events. [`scenery`] is the scene whose cloud is edited, [`sketch`] what is
-//! drawn over it.
+//! A cloud is shaped by a list of boxes. Every change is a function from one state to the next:
+//!
+//! - [`EditorController`] takes the window's [`Input`] and returns the [`Request`]s to the window.
+//! - [`Session`] holds the file: what is open, saved, or about to be lost.
+//! - [`Editor`] holds the [`Document`], the selection, the drag in progress, and the history. It
+//!   changes by an [`Action`].
+//! - [`EditedScene`] is the scene around the edited cloud, and `overlay` makes the shapes over it.
 
-pub mod acceptance;
-pub mod action;
-pub mod desk;
+#[cfg(feature = "window")]
+mod acceptance;
+mod action;
+mod axis;
+mod controller;
 pub mod document;
-pub mod drag;
-pub mod edits;
-pub mod handles;
-pub mod history;
-pub mod mirror;
-pub mod numbers;
-pub mod ray;
-pub mod recent;
-pub mod scenery;
-pub mod selection;
-pub mod session;
-pub mod shortcuts;
-pub mod sketch;
-pub mod snap;
-pub mod state;
-pub mod viewport;
-
+mod drag;
+mod edited_scene;
+mod edits;
 #[cfg(test)]
-mod samples;
+mod fixtures;
+mod grid_snap;
+mod handles;
+mod history;
+mod input;
+mod mirror;
+pub mod numbers;
+#[cfg(feature = "window")]
+mod overlay;
+mod pointer;
+mod ray;
+#[cfg(feature = "window")]
+mod recent_files;
+mod refusal;
+mod selection;
+mod session;
+mod settings;
+mod shortcuts;
+mod state;
+mod viewport;
 
-pub use action::{Action, DragAction, Edit, Refusal, Select, Setting};
-pub use document::{Document, Touched};
+pub use action::{Action, DragAction, DragModifiers, Edit, Select, Setting};
+pub use axis::Axis;
+pub use controller::EditorController;
+pub use document::Document;
+pub use edited_scene::EditedScene;
+pub use grid_snap::GridSnap;
+pub use handles::{Handle, Side};
+pub use input::{Button, Field, Input, ModifierKeys};
+pub use mirror::{MirrorPlane, MirrorResult};
+pub use pointer::PictureArea;
+pub use ray::Ray;
+pub use selection::SelectionMode;
+pub use session::{Answer, Intent, Request, Session, SessionEvent, perform};
+pub use settings::{DisplayMode, ScalingAnchor};
+pub use shortcuts::{Chord, Key};
 pub use state::Editor;
+pub use viewport::Viewport;
 
-/// One of the scene's axes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Axis {
-    X,
-    Y,
-    Z,
-}
-
-impl Axis {
-    pub const ALL: [Axis; 3] = [Axis::X, Axis::Y, Axis::Z];
-
-    /// Of a vector's component.
-    pub fn index(self) -> usize {
-        self as usize
-    }
-
-    pub fn unit(self) -> glam::DVec3 {
-        glam::DVec3::AXES[self.index()]
-    }
-}
+#[cfg(feature = "window")]
+pub(crate) use self::{
+    acceptance::{BoxAcceptance, box_acceptances, mean_rate},
+    input::MOUSE_HELP,
+    overlay::{Color, Shape, Stroke, overlay_shapes},
+    recent_files::{RecentFiles, default_path},
+    shortcuts::{Command, SHORTCUTS},
+};

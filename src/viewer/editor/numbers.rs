@@ -1,8 +1,8 @@
-//! Numbers as they are typed into a panel, with units. A number without one is in scene units.
+//! Parsing of typed numbers with units. A number without a unit is in scene units.
 
-use super::action::Refusal;
+use super::refusal::Refusal;
 
-/// Metres as a fraction, so that 110 cm is 1.1 and not 110 times what 0.01 is rounded to.
+/// A unit of length: `metres / per` metres. The fraction makes 110 cm exactly 1.1 m.
 struct Unit {
     name: &'static str,
     metres: f64,
@@ -16,11 +16,15 @@ const UNITS: [Unit; 4] = [
     Unit { name: "km", metres: 1000.0, per: 1.0 },
 ];
 
-/// Most characters of what was typed that a message repeats.
-const SHOWN: usize = 40;
+/// Largest number of typed characters that a message repeats.
+const MAX_SHOWN: usize = 40;
 
-/// "1.5", "1.5 m", "150cm", "2 km": scene units of `metres_per_unit` metres each. Whether it is too
-/// great is for the edit that takes it to say.
+/// Parses a length such as "1.5", "1.5 m", "150cm" or "2 km".
+///
+/// *Units*: the result is in scene units of `metres_per_unit` metres.
+///
+/// # Errors
+/// The text is not a finite number with a known unit.
 pub fn length(text: &str, metres_per_unit: f64) -> Result<f64, Refusal> {
     let expected = "a length such as 1.5, 1.5 m, 150 cm or 2 km";
     let (number, unit) = split(text);
@@ -34,7 +38,12 @@ pub fn length(text: &str, metres_per_unit: f64) -> Result<f64, Refusal> {
     }
 }
 
-/// Particles in a volume: "12" a cubic scene unit, "12 /m³", "0.5/km3", "8 per m^3".
+/// Parses a density such as "12", "12 /m³", "0.5/km3" or "8 per m^3".
+///
+/// *Units*: the result is in particles per cubic scene unit, of `metres_per_unit` metres edge.
+///
+/// # Errors
+/// The text is not a finite number with a known unit.
 pub fn density(text: &str, metres_per_unit: f64) -> Result<f64, Refusal> {
     let expected = "particles in a volume such as 12, 12 /m³ or 0.5 /km³";
     let parted = text.split_once('/').or_else(|| text.split_once("per"));
@@ -44,25 +53,24 @@ pub fn density(text: &str, metres_per_unit: f64) -> Result<f64, Refusal> {
     let cubed = ["³", "^3", "3"].iter().find_map(|power| volume.strip_suffix(power));
     let Some(name) = cubed else { return Err(unexpected(expected, text)) };
     let unit = unit_named(name.trim(), text)?;
-    // By whichever of the edges is a whole number of the other: 12 /m³ are 12000 in a cube of 10 m.
+    // The ratio of the edges that is above 1 may be an exact integer: 12 /m³ are 12000 in a cube of
+    // 10 m.
     let (edge, inverse) =
         (unit.metres / unit.per / metres_per_unit, metres_per_unit * unit.per / unit.metres);
     let v = if edge < 1.0 { v * inverse.powi(3) } else { v / edge.powi(3) };
     within(v, expected, text)
 }
 
-/// A number of particles, or a seed.
+/// Parses a number of particles or a seed.
+///
+/// # Errors
+/// The text is not an integer of 32 bits.
 pub fn count(text: &str) -> Result<u32, Refusal> {
     let expected = format!("an integer from 0 to {}", u32::MAX);
     text.trim().parse().map_err(|_| unexpected(&expected, text))
 }
 
-/// A number without a unit, such as what to scale by.
-pub fn factor(text: &str) -> Result<f64, Refusal> {
-    finite(text.trim(), "a number such as 1.5", text)
-}
-
-/// After the last digit or point a unit begins.
+/// Splits a text into number and unit, which begins after the last digit or point.
 fn split(text: &str) -> (&str, &str) {
     let end = text.rfind(|c: char| c.is_ascii_digit() || c == '.').map_or(0, |i| i + 1);
     (text[..end].trim(), text[end..].trim())
@@ -74,7 +82,7 @@ fn unit_named(name: &str, text: &str) -> Result<&'static Unit, Refusal> {
 }
 
 fn finite(number: &str, expected: &str, text: &str) -> Result<f64, Refusal> {
-    // Words that f64 reads, such as "inf", are none that one types. A minus may come from a text.
+    // f64 would also parse words such as "inf". Pasted text may have the minus sign U+2212.
     let number = number.replace('\u{2212}', "-");
     let is_digits = number.chars().all(|c| c.is_ascii_digit() || "+-.eE".contains(c));
     let v = number.parse().ok().filter(|_| is_digits);
@@ -86,8 +94,8 @@ fn within(v: f64, expected: &str, text: &str) -> Result<f64, Refusal> {
 }
 
 fn unexpected(expected: &str, text: &str) -> Refusal {
-    let mut shown: String = text.trim().chars().take(SHOWN).collect();
-    if text.trim().chars().nth(SHOWN).is_some() {
+    let mut shown: String = text.trim().chars().take(MAX_SHOWN).collect();
+    if text.trim().chars().nth(MAX_SHOWN).is_some() {
         shown.push('…');
     }
     Refusal(format!("expected {expected}, found `{shown}`"))
@@ -119,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_length_is_refused_in_one_sentence() {
+    fn other_text_is_refused_in_one_sentence() {
         let example = "expected a length such as 1.5, 1.5 m, 150 cm or 2 km, found ";
         for text in ["", "m", "1,5", "nan", "inf", "-inf m", "1e999", "1 2", "0x10", "--1", "1 2 m"]
         {
@@ -130,12 +138,12 @@ mod tests {
             assert_eq!(length(text, 1.0), Err(Refusal(format!("{unit}`{text}`"))));
         }
         let long = length(&"x".repeat(5000), 1.0).unwrap_err().0;
-        assert_eq!(long, format!("{example}`{}…`", "x".repeat(SHOWN)));
+        assert_eq!(long, format!("{example}`{}…`", "x".repeat(MAX_SHOWN)));
         assert!(length("1e300 km", 1e-300).is_err());
     }
 
     #[test]
-    fn densities_counts_and_factors() {
+    fn densities_and_counts_are_read() {
         assert_eq!(density("12", 500.0), Ok(12.0));
         for text in ["12 /m³", "12/m3", "12 per m^3"] {
             assert_eq!(density(text, 10.0), Ok(12_000.0), "{text}");
@@ -144,11 +152,10 @@ mod tests {
         for text in ["12 /m", "12 /m²", "12 /lb3", "/m3", "x", "", "inf"] {
             assert!(density(text, 1.0).is_err(), "{text}");
         }
-        assert_eq!((count(" 554 "), factor("0.5")), (Ok(554), Ok(0.5)));
+        assert_eq!(count(" 554 "), Ok(554));
         for text in ["-1", "1.5", "4294967296", "", "many"] {
             let expected = format!("expected an integer from 0 to 4294967295, found `{text}`");
             assert_eq!(count(text), Err(Refusal(expected)));
         }
-        assert!(factor("2 m").is_err() && factor("NaN").is_err());
     }
 }

@@ -1,35 +1,41 @@
-//! Half lines from the eye through the pointer, and what they meet; f64, scene units.
+//! Rays from the camera through the pointer, and their intersections; f64, scene units.
 
 use glam::DVec3;
 
 use crate::model::boxes::CloudBox;
 
+/// A half line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
+    /// First point.
     pub origin: DVec3,
-    /// A unit vector, so that t is a length.
+    /// Unit vector.
     pub direction: DVec3,
 }
 
-/// Sine squared of the angle between a ray and an axis below which no place on the axis is near the
-/// ray more than others: at 0.01 rad the pointer's place is magnified 10⁴ times.
-const LEAST_SINE_SQUARED: f64 = 1e-4;
-/// And of that between a ray and a plane.
-const LEAST_SINE: f64 = 1e-2;
+/// Least sine squared of the angle between a ray and an axis. At 0.01 rad an error of the pointer
+/// is magnified 10⁴ times along the axis.
+const MIN_SINE_SQUARED: f64 = 1e-4;
+/// Least sine of the angle between a ray and a plane.
+const MIN_SINE: f64 = 1e-2;
 
 impl Ray {
+    /// Returns the point at distance `t`.
     pub fn at(&self, t: f64) -> DVec3 {
         self.origin + t * self.direction
     }
 
-    /// Where the ray meets the box's surface, by slabs, faces included: the first time from
-    /// outside, and from inside where it leaves, so that a box around the eye does not hide what
-    /// lies in it.
+    /// Returns the distance to the box's surface, faces included.
+    ///
+    /// From outside the ray hits where it enters. From inside it hits where it leaves, so that a
+    /// box around the camera does not hide the boxes in it.
+    ///
+    /// *Source*: slab method.
     pub fn hit(&self, b: &CloudBox) -> Option<f64> {
         let (origin, half) = ((self.origin - b.center).to_array(), (0.5 * b.extent).to_array());
         let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
         for (k, d) in self.direction.to_array().into_iter().enumerate() {
-            // Parallel to the slab: 0/0 would say nothing on its faces.
+            // Parallel to the slab: on a face the quotient would be 0/0.
             if d == 0.0 {
                 if origin[k].abs() > half[k] {
                     return None;
@@ -40,20 +46,21 @@ impl Ray {
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
-        // A direction that is not a number compares with nothing.
+        // Comparisons with NaN are false.
         let is_hit = enter <= leave && leave >= 0.0 && leave.is_finite();
         is_hit.then_some(if enter > 0.0 { enter } else { leave })
     }
 
-    /// The place s on the line `point` + s `axis` (a unit vector) that the ray passes nearest to.
-    /// None where the two are nearly parallel, and where that place lies behind the eye: the
-    /// pointer says nothing about it then.
+    /// Returns s, where `point` + s `axis` is the point of the line nearest to the ray. `axis` is a
+    /// unit vector.
+    ///
+    /// `None` where ray and line are nearly parallel, or the nearest point is behind the camera.
     pub fn nearest_on_axis(&self, point: DVec3, axis: DVec3) -> Option<f64> {
         let to_point = point - self.origin;
         let cosine = axis.dot(self.direction);
-        // |a × d|² keeps its accuracy where 1 − cos² loses it.
+        // |a × d|² is accurate where 1 − cos² cancels.
         let sine_squared = axis.cross(self.direction).length_squared();
-        if sine_squared.is_nan() || sine_squared < LEAST_SINE_SQUARED {
+        if sine_squared.is_nan() || sine_squared < MIN_SINE_SQUARED {
             return None;
         }
         let (along_ray, along_axis) = (to_point.dot(self.direction), to_point.dot(axis));
@@ -62,10 +69,11 @@ impl Ray {
         (t > 0.0 && s.is_finite()).then_some(s)
     }
 
-    /// Where the ray meets the plane through `point`; none where it runs along it or away from it.
+    /// Returns the intersection with the plane through `point`; `None` where the ray is nearly
+    /// parallel to the plane or points away from it.
     pub fn on_plane(&self, point: DVec3, normal: DVec3) -> Option<DVec3> {
         let sine = normal.dot(self.direction);
-        if sine.is_nan() || sine.abs() < LEAST_SINE * normal.length() {
+        if sine.is_nan() || sine.abs() < MIN_SINE * normal.length() {
             return None;
         }
         let t = normal.dot(point - self.origin) / sine;
@@ -75,7 +83,7 @@ impl Ray {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::unit_box;
+    use super::super::fixtures::unit_box;
     use super::*;
 
     fn ray(origin: [f64; 3], direction: [f64; 3]) -> Ray {
@@ -91,13 +99,13 @@ mod tests {
         for (origin, direction, expected) in [
             ([-5.0, 0.0, 0.0], [1.0, 0.0, 0.0], Some(5.0)),
             ([-5.0, 0.0, 0.0], [-1.0, 0.0, 0.0], None),
-            // From inside it is where the ray leaves.
+            // From inside.
             ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Some(2.0)),
             ([1.0, 1.0, 0.0], [0.0, 0.0, -1.0], Some(3.0)),
             // Along a face, and just beside it.
             ([1.0, 2.0, -9.0], [0.0, 0.0, 1.0], Some(6.0)),
             ([1.0, 2.0 + 1e-12, -9.0], [0.0, 0.0, 1.0], None),
-            // 3-4-5: the corner edge x = 0, z = -3.
+            // A 3-4-5 triangle: the edge at x = 0, z = −3.
             ([-3.0, 0.0, -7.0], [3.0, 0.0, 4.0], Some(5.0)),
             ([-3.0, 0.0, -7.001], [3.0, 0.0, 4.0], Some(5.0)),
             ([-3.0, 0.0, -7.0], [-3.0, 0.0, 4.0], None),
@@ -116,20 +124,19 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_place_on_an_axis_is_that_of_a_scan() {
+    fn the_nearest_point_of_an_axis_agrees_with_a_scan() {
         let (point, axis) = (DVec3::new(1.0, 2.0, 3.0), DVec3::Y);
         let r = ray([4.0, -1.0, 9.0], [-0.4, 0.3, -0.8]);
         let s = r.nearest_on_axis(point, axis).unwrap();
         let distance = |s: f64| (point + s * axis - r.origin).cross(r.direction).length();
         let least =
             (-4000..4000).map(|i| distance(f64::from(i) * 1e-3)).fold(f64::INFINITY, f64::min);
-        // The scan's nearest step is at most half a step from the minimum, where a distance d grows
-        // by h²/2d.
+        // The scan comes within half a step h of the minimum, where a distance d grows by h²/2d.
         assert!(distance(s) < least + 1e-12 && least - distance(s) < 1e-6, "{s}");
     }
 
     #[test]
-    fn parallel_lines_and_places_behind_the_eye_say_nothing() {
+    fn parallel_lines_and_points_behind_the_camera_have_no_result() {
         let r = ray([0.0, 0.0, 5.0], [0.0, 1e-3, -1.0]);
         assert_eq!(r.nearest_on_axis(DVec3::ZERO, DVec3::Z), None);
         assert!(

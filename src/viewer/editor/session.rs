@@ -1,231 +1,252 @@
-//! The file around the editor: what is open, what of it is saved, and the question that stands
-//! between unsaved changes and their loss. (session, event) → (session, request): what has to be
-//! done with files and dialogs is asked of the window, which answers with an event; [`perform`]
-//! does what needs no dialog.
+//! An editing session: the open file, unsaved changes, and the question before they are lost.
+//!
+//! (session, event) → (session, request). A request asks the window for a file or a dialog, and the
+//! window answers with an event. [`perform`] carries out the requests that need no dialog.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::action::{Action, DragAction, Refusal};
-use super::document::{Document, Touched, same_boxes};
+use super::action::{Action, DragAction};
+use super::document::{Document, are_same_boxes};
+use super::refusal::Refusal;
 use super::state::Editor;
 use crate::error::Error;
 use crate::io::box_file;
 use crate::model::boxes::CloudBox;
 
+/// A document with its file.
 #[derive(Debug, Clone)]
 pub struct Session {
     editor: Editor,
     path: Option<PathBuf>,
-    /// The boxes as the file has them; none of a new cloud.
+    /// The document as saved; that of a new cloud is empty.
     saved: Arc<Document>,
-    waiting: Waiting,
+    pending: Pending,
 }
 
-/// What is to go on when the window has answered.
+/// The step that follows the window's answer.
 #[derive(Debug, Clone, Default)]
-enum Waiting {
+enum Pending {
     #[default]
     Nothing,
-    /// Whether to save before this.
-    Answer(Wish),
-    /// A save, and then this.
-    Save(Wish),
-    /// A file, in place of this document.
-    File(Arc<Document>),
+    /// Asks whether to save before this.
+    Question(Intent),
+    /// Does this after a save.
+    Save(Intent),
+    /// Opens a file in place of this document.
+    Open(Arc<Document>),
 }
 
-/// What would lose unsaved changes.
+/// An action that would lose unsaved changes.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Wish {
+pub enum Intent {
+    /// Begins a new cloud.
     New,
-    /// A file, or one that is to be chosen.
+    /// Opens a file; without a path the user chooses one.
     Open(Option<PathBuf>),
+    /// Closes the window.
     Quit,
 }
 
+/// An event of the session.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Event {
+pub enum SessionEvent {
+    /// An action on the document.
     Act(Action),
-    Wish(Wish),
+    /// An action that may need a question first.
+    Intend(Intent),
+    /// The answer to the question.
     Answer(Answer),
+    /// Saves to the file.
     Save,
+    /// Saves to another file.
     SaveAs,
-    /// From a dialog; none where it was cancelled.
+    /// A dialog's path; `None` where it was cancelled.
     ChosenToOpen(Option<PathBuf>),
+    /// The path to save to; `None` where the dialog was cancelled.
     ChosenToSave(Option<PathBuf>),
+    /// A file was read.
     Opened {
+        /// The file.
         path: PathBuf,
+        /// Its boxes.
         boxes: Vec<CloudBox>,
     },
+    /// A file was written.
     Saved {
+        /// The file.
         path: PathBuf,
+        /// The document as written.
         document: Arc<Document>,
     },
-    /// Opening or saving; all is as it was.
+    /// A file could not be opened or saved.
     Failed(Error),
 }
 
-/// To [`Request::Ask`].
+/// An answer to [`Request::Ask`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
+    /// Saves to the file.
     Save,
+    /// Loses the changes.
     Discard,
+    /// Drops the intent.
     Cancel,
 }
 
-/// What the window has to do next.
+/// Work for the window.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Request {
-    /// "Save changes before …?", answered by [`Event::Answer`].
-    Ask(Wish),
+    /// Asks whether to save changes, and answers by [`SessionEvent::Answer`].
+    Ask(Intent),
+    /// Asks for a file to open.
     ChooseToOpen,
+    /// Asks for a file to save to.
     ChooseToSave,
+    /// Reads a file.
     Open(PathBuf),
+    /// Writes a file.
     Save {
+        /// The file.
         path: PathBuf,
+        /// The document as written.
         document: Arc<Document>,
     },
+    /// Closes the window.
     Quit,
 }
 
-/// What an event led to.
-#[derive(Debug, Clone)]
-pub struct Turn {
-    pub session: Session,
-    pub touched: Touched,
-    pub request: Option<Request>,
+impl Default for Session {
+    /// Creates a new cloud without boxes and without a file.
+    fn default() -> Self {
+        let editor = Editor::default();
+        let saved = editor.shared_document();
+        Session { saved, editor, path: None, pending: Pending::Nothing }
+    }
 }
 
 impl Session {
-    /// A new cloud without boxes and without a file.
-    pub fn new() -> Session {
-        Session::of(Vec::new(), None)
+    /// Creates a new cloud that will be saved as `path`.
+    pub fn with_path(path: &Path) -> Session {
+        Session { path: Some(path.to_owned()), ..Session::default() }
     }
 
-    /// A new cloud that is to be saved as `path`.
-    pub fn begun(path: &Path) -> Session {
-        Session::of(Vec::new(), Some(path.to_owned()))
-    }
-
-    /// Boxes as they were read from `path`.
-    pub fn opened(path: &Path, boxes: Vec<CloudBox>) -> Session {
-        Session::of(boxes, Some(path.to_owned()))
-    }
-
-    fn of(boxes: Vec<CloudBox>, path: Option<PathBuf>) -> Session {
+    /// Creates a session with the boxes read from `path`.
+    pub fn from_file(path: &Path, boxes: Vec<CloudBox>) -> Session {
         let editor = Editor::new(boxes);
-        Session { saved: editor.shared_document(), editor, path, waiting: Waiting::Nothing }
+        Session { saved: editor.shared_document(), editor, ..Session::with_path(path) }
     }
 
-    /// The same with a scene's seed, before anything is done to it.
-    pub fn seeded(self, seed: u32) -> Session {
+    /// Returns the session with a scene's seed and an empty history.
+    pub fn with_seed(self, seed: u32) -> Session {
         let document = Document { seed, ..self.editor.document().clone() };
-        let editor = Editor::of(document, *self.editor.settings());
+        let editor = Editor::with_settings(document, *self.editor.settings());
         Session { saved: editor.shared_document(), editor, ..self }
     }
 
+    /// Returns the editor's state.
     pub fn editor(&self) -> &Editor {
         &self.editor
     }
 
+    /// Returns the file; `None` for a new cloud.
     pub fn path(&self) -> Option<&Path> {
         self.path.as_deref()
     }
 
-    /// Whether the boxes are others than the file's, to the bit: what is undone to what was saved
-    /// is not.
+    /// Returns whether the boxes differ, bitwise, from the saved ones.
     pub fn is_dirty(&self) -> bool {
-        !same_boxes(self.editor.boxes(), &self.saved.boxes)
+        !are_same_boxes(self.editor.boxes(), &self.saved.boxes)
     }
 
-    /// What a question stands about.
-    pub fn asked(&self) -> Option<&Wish> {
-        if let Waiting::Answer(wish) = &self.waiting { Some(wish) } else { None }
+    /// Returns the intent that the open question is about.
+    pub fn question(&self) -> Option<&Intent> {
+        if let Pending::Question(intent) = &self.pending { Some(intent) } else { None }
     }
 
-    /// An error changes nothing, and is a sentence to show.
-    pub fn after(&self, event: &Event) -> Result<Turn, Refusal> {
-        if let Event::Act(action) = event {
-            let (editor, touched) = self.editor.after(action)?;
-            return Ok(Turn {
-                session: Session { editor, ..self.clone() },
-                touched,
-                request: None,
-            });
+    /// Returns the session after an event, and the work that it asks for.
+    ///
+    /// # Errors
+    /// The editor rejects an action.
+    pub fn after(&self, event: &SessionEvent) -> Result<(Session, Option<Request>), Refusal> {
+        let mut next = self.clone();
+        if let SessionEvent::Act(action) = event {
+            next.editor = self.editor.after(action)?;
+            return Ok((next, None));
         }
-        let mut session = self.clone();
-        // What the hand holds is let go where it is: undo takes it back.
-        session.editor = session.editor.after(&Action::Drag(DragAction::End))?.0;
-        let request = session.turn(event);
-        let touched = Touched::between(self.editor.document(), session.editor.document());
-        Ok(Turn { session, touched, request })
+        // A drag in progress ends where it is; undo takes it back.
+        next.editor = self.editor.after(&Action::Drag(DragAction::End))?;
+        let request = next.handle(event);
+        Ok((next, request))
     }
 
-    fn turn(&mut self, event: &Event) -> Option<Request> {
-        let waiting = std::mem::take(&mut self.waiting);
+    fn handle(&mut self, event: &SessionEvent) -> Option<Request> {
+        let pending = std::mem::take(&mut self.pending);
         match event {
-            Event::Act(_) => {
-                self.waiting = waiting;
-                None
-            }
-            Event::Wish(wish) => self.wish(wish.clone()),
-            Event::Answer(answer) => {
-                let Waiting::Answer(wish) = waiting else {
-                    self.waiting = waiting;
-                    return None;
-                };
-                match answer {
-                    Answer::Cancel => None,
-                    Answer::Discard => self.go(wish),
-                    Answer::Save => {
-                        self.waiting = Waiting::Save(wish);
-                        Some(self.save())
-                    }
+            SessionEvent::Act(_) | SessionEvent::Failed(_) => None,
+            SessionEvent::Intend(intent) => self.intend(intent.clone()),
+            SessionEvent::Answer(answer) => match (pending, answer) {
+                (Pending::Question(_), Answer::Cancel) => None,
+                (Pending::Question(intent), Answer::Discard) => self.proceed(intent),
+                (Pending::Question(intent), Answer::Save) => {
+                    self.pending = Pending::Save(intent);
+                    Some(self.save())
                 }
-            }
-            Event::Save => Some(self.save()),
-            Event::SaveAs => Some(Request::ChooseToSave),
-            Event::ChosenToSave(path) => {
+                (other, _) => {
+                    self.pending = other;
+                    None
+                }
+            },
+            SessionEvent::Save => Some(self.save()),
+            SessionEvent::SaveAs => Some(Request::ChooseToSave),
+            SessionEvent::ChosenToSave(path) => {
                 let path = path.clone()?;
-                // Still to be gone on with after the save.
-                self.waiting = waiting;
+                // The intent follows after the save.
+                self.pending = pending;
                 Some(Request::Save { path, document: self.editor.shared_document() })
             }
-            Event::Saved { path, document } => {
+            SessionEvent::Saved { path, document } => {
                 self.path = Some(path.clone());
                 self.saved = document.clone();
-                // Asked again where there were changes since.
-                if let Waiting::Save(wish) = waiting { self.wish(wish) } else { None }
+                // Changes made since the save began are asked about again.
+                if let Pending::Save(intent) = pending { self.intend(intent) } else { None }
             }
-            Event::ChosenToOpen(path) => {
+            SessionEvent::ChosenToOpen(path) => {
                 let path = path.clone()?;
-                self.waiting = waiting;
+                self.pending = pending;
                 Some(Request::Open(path))
             }
-            Event::Opened { path, boxes } => self.open(path, boxes, &waiting),
-            Event::Failed(_) => None,
+            SessionEvent::Opened { path, boxes } => {
+                // Changes made while the dialog was open have not been asked about.
+                let is_agreed = matches!(pending, Pending::Open(document)
+                    if self.editor.document().is_same(&document));
+                if !is_agreed && self.is_dirty() {
+                    return self.intend(Intent::Open(Some(path.clone())));
+                }
+                self.replace(Some(path), boxes.clone());
+                None
+            }
         }
     }
 
-    fn wish(&mut self, wish: Wish) -> Option<Request> {
+    fn intend(&mut self, intent: Intent) -> Option<Request> {
         if self.is_dirty() {
-            self.waiting = Waiting::Answer(wish.clone());
-            return Some(Request::Ask(wish));
+            self.pending = Pending::Question(intent.clone());
+            return Some(Request::Ask(intent));
         }
-        self.go(wish)
+        self.proceed(intent)
     }
 
-    /// Whatever is lost.
-    fn go(&mut self, wish: Wish) -> Option<Request> {
-        match wish {
-            Wish::New => {
+    /// Carries out an intent. Unsaved changes are lost.
+    fn proceed(&mut self, intent: Intent) -> Option<Request> {
+        match intent {
+            Intent::New => {
                 self.replace(None, Vec::new());
                 None
             }
-            Wish::Quit => Some(Request::Quit),
-            Wish::Open(path) => {
-                self.waiting = Waiting::File(self.editor.shared_document());
+            Intent::Quit => Some(Request::Quit),
+            Intent::Open(path) => {
+                self.pending = Pending::Open(self.editor.shared_document());
                 Some(path.map_or(Request::ChooseToOpen, Request::Open))
             }
         }
@@ -236,45 +257,28 @@ impl Session {
         self.path.clone().map_or(Request::ChooseToSave, |path| Request::Save { path, document })
     }
 
-    fn open(&mut self, path: &Path, boxes: &[CloudBox], waiting: &Waiting) -> Option<Request> {
-        // What changed while a dialog was open nobody has been asked about.
-        let is_agreed =
-            matches!(waiting, Waiting::File(document) if self.editor.document().is_same(document));
-        if !is_agreed && self.is_dirty() {
-            return self.wish(Wish::Open(Some(path.to_owned())));
-        }
-        self.replace(Some(path), boxes.to_vec());
-        None
-    }
-
-    /// The seed and the settings are the scene's and the hand's, and stay.
+    /// Replaces the document. The scene's seed and the settings stay.
     fn replace(&mut self, path: Option<&Path>, boxes: Vec<CloudBox>) {
         let document = Document { boxes, seed: self.editor.document().seed };
-        self.editor = Editor::of(document, *self.editor.settings());
+        self.editor = Editor::with_settings(document, *self.editor.settings());
         self.saved = self.editor.shared_document();
         self.path = path.map(Path::to_owned);
     }
 }
 
-impl Default for Session {
-    fn default() -> Self {
-        Session::new()
-    }
-}
-
-/// Opens and saves; none of what takes a dialog, or ends the window.
-pub fn perform(request: &Request) -> Option<Event> {
-    match request {
-        Request::Open(path) => Some(match box_file::read(path) {
-            Ok(boxes) => Event::Opened { path: path.clone(), boxes },
-            Err(error) => Event::Failed(error),
-        }),
-        Request::Save { path, document } => Some(match box_file::write(path, &document.boxes) {
-            Ok(()) => Event::Saved { path: path.clone(), document: document.clone() },
-            Err(error) => Event::Failed(error),
-        }),
-        Request::Ask(_) | Request::ChooseToOpen | Request::ChooseToSave | Request::Quit => None,
-    }
+/// Opens or saves a file. Returns `None` for a request that needs a dialog or ends the window.
+pub fn perform(request: &Request) -> Option<SessionEvent> {
+    let done = match request {
+        Request::Open(path) => {
+            box_file::read(path).map(|boxes| SessionEvent::Opened { path: path.clone(), boxes })
+        }
+        Request::Save { path, document } => box_file::write(path, &document.boxes)
+            .map(|()| SessionEvent::Saved { path: path.clone(), document: document.clone() }),
+        Request::Ask(_) | Request::ChooseToOpen | Request::ChooseToSave | Request::Quit => {
+            return None;
+        }
+    };
+    Some(done.unwrap_or_else(SessionEvent::Failed))
 }
 
 #[cfg(test)]

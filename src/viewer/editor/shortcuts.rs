@@ -1,34 +1,43 @@
-//! What the keys do: one table, which a window looks keys up in and lists where it is asked what
-//! they do.
+//! Keyboard shortcuts of the editor, with their commands and descriptions.
 
 use std::fmt;
 
-use super::Axis;
 use super::action::{Action, DragAction, Edit, Select, Setting};
-use super::mirror::{Outcome, Plane};
-use super::snap::Snap;
-use super::state::{Editor, View};
+use super::axis::Axis;
+use super::grid_snap::GridSnap;
+use super::mirror::{MirrorPlane, MirrorResult};
+use super::settings::DisplayMode;
+use super::state::Editor;
 
+/// A key of the keyboard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Key {
-    /// What the key writes, a letter as a small one.
+    /// The character that the key types; letters in lower case.
     Char(char),
+    /// Delete.
     Delete,
+    /// Backspace.
     Backspace,
+    /// Escape.
     Escape,
+    /// Tab.
     Tab,
 }
 
-/// A key, and those that are held with it.
+/// A key with its modifiers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Chord {
+    /// The key.
     pub key: Key,
-    /// Command on a Mac.
+    /// Ctrl, or Command on a Mac.
     pub ctrl: bool,
+    /// Shift.
     pub shift: bool,
+    /// Alt.
     pub alt: bool,
 }
 
+/// A command of the editor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Command {
     New,
@@ -40,31 +49,34 @@ pub enum Command {
     Redo,
     Add,
     Duplicate,
+    /// Delete.
     Delete,
     SelectAll,
-    /// A drag, or else what is selected.
+    /// Cancels a drag, or clears the selection.
     Cancel,
     NextBox,
     PreviousBox,
-    /// The camera goes where the selection fills the picture.
+    /// Moves the camera so that the selection fills the picture.
     Frame,
-    /// A drag begins without a button: the next press ends it.
+    /// Begins a drag without a button; the next press ends it.
     Move,
     Scale,
-    /// What a drag goes along; without one, what mirroring goes by.
+    /// Restricts a drag to an axis; without a drag, sets the axis of mirroring.
     Axis(Axis),
     Mirror,
     MirrorCopy,
     MirrorMiddle,
     ToggleSnap,
-    View(View),
+    Display(DisplayMode),
     Help,
 }
 
+/// A chord with its command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shortcut {
     pub chord: Chord,
     pub command: Command,
+    #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "only panels list the keys"))]
     pub description: &'static str,
 }
 
@@ -85,8 +97,7 @@ const fn with_alt(shortcut: Shortcut) -> Shortcut {
     Shortcut { chord: Chord { alt: true, ..shortcut.chord }, ..shortcut }
 }
 
-/// In the order of a list for reading; of two chords for one command the first is the one to show
-/// beside it.
+/// Every shortcut, in the order of the list of keys. Panels show the first chord of a command.
 pub const SHORTCUTS: [Shortcut; 30] = [
     ctrl('n', Command::New, "new cloud"),
     ctrl('o', Command::Open, "open a box file"),
@@ -122,26 +133,25 @@ pub const SHORTCUTS: [Shortcut; 30] = [
         "mirror the selection across its middle",
     )),
     with_shift(shortcut(Key::Char('s'), Command::ToggleSnap, "snap to the grid, or do not")),
-    shortcut(Key::Char('1'), Command::View(View::Boxes), "show the boxes"),
-    shortcut(Key::Char('2'), Command::View(View::Cloud), "show the cloud"),
-    shortcut(Key::Char('3'), Command::View(View::Both), "show both"),
+    shortcut(Key::Char('1'), Command::Display(DisplayMode::Boxes), "show the boxes"),
+    shortcut(Key::Char('2'), Command::Display(DisplayMode::Cloud), "show the cloud"),
+    shortcut(Key::Char('3'), Command::Display(DisplayMode::Both), "show both"),
     shortcut(Key::Char('?'), Command::Help, "list the keys"),
 ];
 
-/// What a chord means.
+/// Returns the command of a chord.
 pub fn command(chord: Chord) -> Option<Command> {
     let chord = chord.normal();
     SHORTCUTS.iter().find(|shortcut| shortcut.chord == chord).map(|shortcut| shortcut.command)
 }
 
 impl Chord {
-    /// Letters small, and shift only where it does not decide what is written: "?" takes one on
-    /// some keyboards.
+    /// Returns the chord with a lower-case letter. A sign loses its shift, because "?" needs shift
+    /// only on some keyboards.
     fn normal(self) -> Chord {
         match self.key {
             Key::Char(c) if c.is_alphabetic() => {
-                let small = c.to_lowercase().next().unwrap_or(c);
-                Chord { key: Key::Char(small), ..self }
+                Chord { key: Key::Char(c.to_lowercase().next().unwrap_or(c)), ..self }
             }
             Key::Char(_) => Chord { shift: false, ..self },
             _ => self,
@@ -150,13 +160,13 @@ impl Chord {
 }
 
 impl Command {
-    /// What it does to the editor; none of those that take a file, a camera or a pointer, which are
-    /// for the window and the session.
+    /// Returns the command's action on the editor's state; `None` for a command that needs a file,
+    /// a camera or the pointer.
     pub fn action(self, editor: &Editor) -> Option<Action> {
         let is_dragging = editor.dragged_handle().is_some();
         let settings = editor.settings();
         let mirror =
-            |plane, outcome| Action::Edit(Edit::Mirror { axis: settings.axis, plane, outcome });
+            |plane, result| Action::Edit(Edit::Mirror { axis: settings.axis, plane, result });
         Some(match self {
             Command::Undo => Action::Undo,
             Command::Redo => Action::Redo,
@@ -169,13 +179,14 @@ impl Command {
             Command::PreviousBox => Action::Select(Select::Previous),
             Command::Axis(axis) if is_dragging => Action::Drag(DragAction::Constrain(axis)),
             Command::Axis(axis) => Action::Set(Setting::Axis(axis)),
-            Command::Mirror => mirror(Plane::Zero, Outcome::Move),
-            Command::MirrorCopy => mirror(Plane::Zero, Outcome::Copy),
-            Command::MirrorMiddle => mirror(Plane::Middle, Outcome::Move),
+            Command::Mirror => mirror(MirrorPlane::Zero, MirrorResult::Move),
+            Command::MirrorCopy => mirror(MirrorPlane::Zero, MirrorResult::Copy),
+            Command::MirrorMiddle => mirror(MirrorPlane::Middle, MirrorResult::Move),
             Command::ToggleSnap => {
-                Action::Set(Setting::Snap(Snap { on: !settings.snap.on, ..settings.snap }))
+                let snap = settings.snap;
+                Action::Set(Setting::Snap(GridSnap { is_on: !snap.is_on, ..snap }))
             }
-            Command::View(view) => Action::Set(Setting::View(view)),
+            Command::Display(display) => Action::Set(Setting::Display(display)),
             Command::New
             | Command::Open
             | Command::Save
@@ -199,10 +210,7 @@ impl fmt::Display for Chord {
         }
         match self.key {
             Key::Char(c) => write!(f, "{}", c.to_uppercase()),
-            Key::Delete => f.write_str("Delete"),
-            Key::Backspace => f.write_str("Backspace"),
-            Key::Escape => f.write_str("Escape"),
-            Key::Tab => f.write_str("Tab"),
+            key => write!(f, "{key:?}"),
         }
     }
 }

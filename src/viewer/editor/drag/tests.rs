@@ -1,10 +1,12 @@
-//! Drags by rays that run straight down z, so that the pointer's place is the scene's.
+//! Drags by rays along −z, so that the pointer's place is that in the scene.
 
 use glam::DVec3;
 
-use super::super::action::{Action, Edit, Select, Setting};
+use super::super::action::{Action, DragAction, Edit, Select, Setting};
+use super::super::fixtures::{after, editor, selected};
 use super::super::handles::Side;
-use super::super::samples::{after, editor, selected};
+use super::super::refusal::Refusal;
+use super::super::state::Editor;
 use super::*;
 use crate::model::boxes::CloudBox;
 
@@ -17,16 +19,16 @@ fn begin(handle: Handle, x: f64, y: f64) -> Action {
 }
 
 fn to(x: f64, y: f64) -> Action {
-    held(x, y, Modifiers::default())
+    held(x, y, DragModifiers::default())
 }
 
-fn held(x: f64, y: f64, modifiers: Modifiers) -> Action {
+fn held(x: f64, y: f64, modifiers: DragModifiers) -> Action {
     Action::Drag(DragAction::To { ray: ray(x, y), modifiers })
 }
 
 const END: Action = Action::Drag(DragAction::End);
 const CANCEL: Action = Action::Drag(DragAction::Cancel);
-const SNAP: Snap = Snap { on: true, step: 0.5 };
+const SNAP: GridSnap = GridSnap { is_on: true, step: 0.5 };
 const HIGH_X: Handle = Handle::ScaleFace(Axis::X, Side::High);
 
 fn snapping(editor: &Editor) -> Editor {
@@ -48,13 +50,13 @@ fn a_drag_of_many_moves_is_one_step() {
         (x_of(&e), e.history().n_undo(), e.history().undo_label()),
         (vec![1.0, 5.0, 8.0], 1, Some("move"))
     );
-    // The way between leaves nothing.
+    // The path leaves no trace.
     assert!(after(&e, &[Action::Undo]).document().is_same(start.document()));
     assert!(e.boxes().iter().all(|b| b.center.y == 0.0));
 }
 
 #[test]
-fn a_cancelled_drag_and_one_that_comes_back_leave_no_step() {
+fn a_cancelled_drag_and_one_that_returns_are_no_step() {
     let start = after(&selected(&editor(3), &[1]), &[Action::Edit(Edit::Count(3)), Action::Undo]);
     for ways in [vec![to(2.0, 1.0), CANCEL], vec![to(2.0, 1.0), to(0.0, 0.0), END], vec![END]] {
         let e = after(&start, &[vec![begin(Handle::MoveView, 0.0, 0.0)], ways].concat());
@@ -64,23 +66,23 @@ fn a_cancelled_drag_and_one_that_comes_back_leave_no_step() {
 }
 
 #[test]
-fn a_drag_goes_to_the_grid_with_the_active_box() {
+fn a_drag_snaps_the_active_box_to_the_grid() {
     let mut boxes = editor(2).boxes().to_vec();
     boxes[0].center = DVec3::new(0.25, 0.1, -0.600_002);
     let start = snapping(&selected(&Editor::new(boxes), &[0, 1]));
-    // The active one from (4, 0) by (0.6, 0.9) to (4.5, 1); what lies beside it keeps beside it,
-    // and z as it was.
+    // The active box moves from (4, 0) by (0.6, 0.9) to (4.5, 1). The other keeps its relative
+    // place, and z stays.
     let e = after(&start, &[begin(Handle::MoveView, 1.0, 1.0), to(1.6, 1.9), END]);
     assert_eq!(e.boxes()[1].center, DVec3::new(4.5, 1.0, 0.0));
     assert_eq!(e.boxes()[0].center, DVec3::new(0.75, 1.1, -0.600_002));
-    // Held, the key turns the setting around.
-    let free = Modifiers { snap: true, scaling: false };
+    // A held key inverts the setting.
+    let free = DragModifiers { snap: true, anchor: false };
     let e = after(&start, &[begin(Handle::MoveView, 1.0, 1.0), held(1.25, 1.0, free), END]);
     assert_eq!(e.boxes()[1].center, DVec3::new(4.25, 0.0, 0.0));
 }
 
 #[test]
-fn a_drag_may_be_held_to_an_axis_and_freed() {
+fn a_drag_can_be_restricted_to_an_axis() {
     let constrain = |axis| Action::Drag(DragAction::Constrain(axis));
     let grabbed =
         after(&selected(&editor(1), &[0]), &[begin(Handle::MoveView, 0.0, 0.0), to(2.0, 3.0)]);
@@ -94,19 +96,19 @@ fn a_drag_may_be_held_to_an_axis_and_freed() {
     assert_eq!(other.boxes()[0].center, DVec3::X * 2.0);
     let free = after(&other, &[constrain(Axis::X)]);
     assert_eq!(free.boxes()[0].center, DVec3::new(2.0, 3.0, 0.0));
-    // Along z the rays say nothing: all stays as it was.
-    let blind = after(&free, &[constrain(Axis::Z), to(5.0, 5.0)]);
-    assert_eq!(blind.boxes()[0].center, DVec3::new(2.0, 3.0, 0.0));
+    // The rays are parallel to z, so the box stays.
+    let along_z = after(&free, &[constrain(Axis::Z), to(5.0, 5.0)]);
+    assert_eq!(along_z.boxes()[0].center, DVec3::new(2.0, 3.0, 0.0));
 }
 
 #[test]
 fn faces_scale_about_the_centre_or_from_the_other_face() {
     let start = selected(&editor(2), &[1, 0]);
-    // Face of box 0 at 0.5, dragged outwards by 0.25.
+    // The face of box 0 at 0.5 is dragged outward by 0.25.
     let e = after(&start, &[begin(HIGH_X, 0.5, 0.0), to(0.75, 0.0), END]);
     assert_eq!(e.boxes()[0].extent, DVec3::new(1.5, 1.0, 1.0));
     assert_eq!((x_of(&e), e.boxes()[1].extent.x), (vec![0.0, 4.0], 1.5));
-    let opposite = Modifiers { snap: false, scaling: true };
+    let opposite = DragModifiers { snap: false, anchor: true };
     let e = after(&start, &[begin(HIGH_X, 0.5, 0.0), held(0.75, 0.0, opposite), END]);
     assert_eq!((e.boxes()[0].extent.x, x_of(&e)), (1.25, vec![0.125, 4.125]));
     let low = Handle::ScaleFace(Axis::X, Side::Low);
@@ -115,22 +117,22 @@ fn faces_scale_about_the_centre_or_from_the_other_face() {
 }
 
 #[test]
-fn faces_meet_and_do_not_pass_and_keep_a_step_on_the_grid() {
+fn a_face_stops_at_the_opposite_one_or_one_grid_step_before() {
     let start = selected(&editor(1), &[0]);
     let e = after(&start, &[begin(HIGH_X, 0.5, 0.0), to(-9.0, 0.0), END]);
     assert_eq!((e.boxes()[0].extent.x, e.boxes()[0].center.x), (0.0, 0.0));
     let e = after(&snapping(&start), &[begin(HIGH_X, 0.5, 0.0), to(-9.0, 0.0), END]);
     assert_eq!((e.boxes()[0].extent.x, e.history().undo_label()), (0.5, Some("scale")));
-    let opposite = Modifiers { snap: false, scaling: true };
+    let opposite = DragModifiers { snap: false, anchor: true };
     let e = after(&snapping(&start), &[begin(HIGH_X, 0.5, 0.0), held(1.3, 0.0, opposite), END]);
-    // 1.8 goes to 2, and the low face stays at −0.5.
+    // 1.8 snaps to 2, and the low face stays at −0.5.
     assert_eq!((e.boxes()[0].extent.x, e.boxes()[0].center.x), (2.0, 0.5));
 }
 
 #[test]
-fn all_scales_by_the_distance_from_the_middle() {
+fn a_selection_scales_by_the_distance_from_its_middle() {
     let start = selected(&editor(3), &[0, 1]);
-    // They fill −0.5 to 4.5: about 2.
+    // The bounds are −0.5 to 4.5, so the middle is 2.
     let e = after(&start, &[begin(Handle::ScaleAll, 3.0, 0.0), to(2.0, 1.5), END]);
     assert_eq!((x_of(&e), e.boxes()[1].extent), (vec![-1.0, 5.0, 8.0], DVec3::splat(1.5)));
     let one_axis = [
@@ -140,15 +142,15 @@ fn all_scales_by_the_distance_from_the_middle() {
         END,
     ];
     let e = after(&snapping(&start), &one_axis);
-    // 2.04 goes to tenths.
+    // The factor 2.04 snaps to tenths.
     assert_eq!((x_of(&e), e.boxes()[1].extent), (vec![-2.0, 6.0, 8.0], DVec3::new(2.0, 1.0, 1.0)));
-    // From the middle itself no distance says anything.
+    // A start in the middle has no distance to compare with.
     let e = after(&start, &[begin(Handle::ScaleAll, 2.0, 0.0), to(9.0, 0.0), END]);
     assert_eq!(e.history().n_undo(), 0);
 }
 
 #[test]
-fn during_a_drag_other_actions_are_refused_and_after_it_moves_do_nothing() {
+fn a_drag_refuses_other_actions_and_moves_after_it_do_nothing() {
     let grabbed =
         after(&selected(&editor(2), &[0]), &[begin(Handle::MoveView, 0.0, 0.0), to(1.0, 0.0)]);
     for action in [
@@ -166,7 +168,7 @@ fn during_a_drag_other_actions_are_refused_and_after_it_moves_do_nothing() {
 }
 
 #[test]
-fn a_drag_beyond_the_bounds_stays_where_it_was() {
+fn a_drag_beyond_the_limits_keeps_its_last_place() {
     let far = CloudBox { center: DVec3::X * 9e14, ..editor(1).boxes()[0] };
     let e = after(
         &selected(&Editor::new(vec![far]), &[0]),

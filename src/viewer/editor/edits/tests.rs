@@ -1,14 +1,18 @@
-//! Edits by numbers worked by hand.
+//! Edits compared with numbers worked by hand.
 
 use glam::DVec3;
 
-use super::super::action::{Action, Edit, Refusal, Select, Setting};
-use super::super::mirror::{Outcome, Plane};
-use super::super::samples::{after, edited, editor, selected, unit_box};
-use super::super::selection::How;
-use super::super::snap::Snap;
-use super::super::state::{Editor, Scaling};
-use super::super::{Axis, document};
+use super::super::action::{Action, Edit, Select, Setting};
+use super::super::axis::Axis;
+use super::super::document;
+use super::super::fixtures::{after, edited, editor, selected, unit_box};
+use super::super::grid_snap::GridSnap;
+use super::super::mirror::{MirrorPlane, MirrorResult};
+use super::super::refusal::Refusal;
+use super::super::selection::SelectionMode;
+use super::super::settings::ScalingAnchor;
+use super::super::state::Editor;
+use super::scaled;
 use crate::model::boxes::CloudBox;
 
 fn refused(editor: &Editor, edit: Edit) -> String {
@@ -20,7 +24,7 @@ fn set(editor: &Editor, setting: Setting) -> Editor {
 }
 
 #[test]
-fn numbers_go_to_every_selected_box_and_to_no_other() {
+fn an_edit_changes_every_selected_box_and_no_other() {
     let e = selected(&editor(4), &[3, 1]);
     let e = edited(&e, Edit::Count(77));
     let e = edited(&e, Edit::Radius(1.25));
@@ -40,11 +44,11 @@ fn numbers_go_to_every_selected_box_and_to_no_other() {
 }
 
 #[test]
-fn an_edge_grows_about_the_centre_or_from_its_low_face() {
+fn an_extent_grows_about_the_centre_or_from_the_low_face() {
     let e = selected(&editor(2), &[1]);
     let symmetric = edited(&e, Edit::Extent(Axis::X, 3.0)).boxes()[1];
     assert_eq!((symmetric.extent.x, symmetric.center.x), (3.0, 4.0));
-    let e = set(&e, Setting::Scaling(Scaling::OppositeFace));
+    let e = set(&e, Setting::Anchor(ScalingAnchor::OppositeFace));
     let from_face = edited(&e, Edit::Extent(Axis::X, 3.0)).boxes()[1];
     // The low face stays at 3.5.
     assert_eq!((from_face.extent.x, from_face.center.x), (3.0, 5.0));
@@ -77,56 +81,58 @@ fn a_density_sets_the_count() {
 }
 
 #[test]
-fn copies_come_last_and_are_selected_and_the_active_ones_copy_is_active() {
+fn copies_are_appended_and_selected_in_the_order_of_their_originals() {
     let e = edited(&selected(&editor(4), &[2, 0]), Edit::Duplicate);
     assert_eq!(e.boxes()[4..], [e.boxes()[0], e.boxes()[2]]);
     assert_eq!(e.selection().boxes(), [5, 4]);
     let e = edited(&e, Edit::Delete);
     assert!(e.document().is_same(editor(4).document()) && e.selection().is_empty());
-    // The boxes left keep their order.
+    // The remaining boxes keep their order.
     let e = edited(&selected(&e, &[2, 0]), Edit::Delete);
     assert_eq!(e.boxes(), [editor(4).boxes()[1], editor(4).boxes()[3]]);
     assert_eq!(edited(&e, Edit::Delete).history().n_undo(), e.history().n_undo());
 }
 
 #[test]
-fn moving_and_scaling_by_numbers() {
+fn boxes_move_and_scale_about_their_middle() {
     let e = selected(&editor(3), &[0, 2]);
     let moved = edited(&e, Edit::MoveBy(DVec3::new(0.0, -1.5, 0.0)));
     assert_eq!(moved.boxes().iter().map(|b| b.center.y).collect::<Vec<_>>(), [-1.5, 0.0, -1.5]);
-    // They fill −0.5 to 8.5 along x.
-    let scaled = edited(&e, Edit::ScaleBy(DVec3::new(0.5, 1.0, 3.0)));
-    assert_eq!(scaled.boxes().iter().map(|b| b.center.x).collect::<Vec<_>>(), [2.0, 4.0, 6.0]);
-    assert_eq!(scaled.boxes()[2].extent, DVec3::new(0.5, 1.0, 3.0));
-    assert_eq!((scaled.boxes()[2].n_particles, scaled.boxes()[2].radius_max), (12, 2.0));
-    let message = "box 0: x extent: expected 0 or a number from 1e-30 to 1e15, found -1";
-    assert_eq!(refused(&e, Edit::ScaleBy(DVec3::new(-1.0, 1.0, 1.0))), message);
+    // The bounds are −0.5 to 8.5 along x.
+    let scaled = scaled(e.document(), e.selection(), DVec3::new(0.5, 1.0, 3.0));
+    assert_eq!(scaled.boxes.iter().map(|b| b.center.x).collect::<Vec<_>>(), [2.0, 4.0, 6.0]);
+    assert_eq!(scaled.boxes[2].extent, DVec3::new(0.5, 1.0, 3.0));
+    assert_eq!((scaled.boxes[2].n_particles, scaled.boxes[2].radius_max), (12, 2.0));
 }
 
 #[test]
-fn mirrored_boxes_come_back() {
+fn mirroring_twice_restores_the_boxes() {
     let start = edited(&selected(&editor(3), &[1, 2]), Edit::MoveBy(DVec3::new(0.1, 0.7, 0.0)));
     for axis in Axis::ALL {
-        let zero = Edit::Mirror { axis, plane: Plane::Zero, outcome: Outcome::Move };
+        let zero = Edit::Mirror { axis, plane: MirrorPlane::Zero, result: MirrorResult::Move };
         let once = edited(&start, zero.clone());
         assert_eq!(once.boxes()[1].center[axis.index()], -start.boxes()[1].center[axis.index()]);
         assert!(edited(&once, zero).document().is_same(start.document()));
     }
-    // 4.1 and 8.1, each half a unit wide on both sides, change places.
-    let middle = Edit::Mirror { axis: Axis::X, plane: Plane::Middle, outcome: Outcome::Move };
+    // The boxes at 4.1 and 8.1 have equal extents, so they change places.
+    let middle =
+        Edit::Mirror { axis: Axis::X, plane: MirrorPlane::Middle, result: MirrorResult::Move };
     let once = edited(&start, middle.clone());
     let x = |i: usize| once.boxes()[i].center.x;
-    // Roundings of sums below 16.
+    // Rounding of sums below 16.
     assert!((x(1) - 8.1).abs() < 1e-14 && (x(2) - 4.1).abs() < 1e-14);
-    // One box by itself does not move, and is no step.
+    // One box is its own mirror image, so this is no step.
     let one = selected(&start, &[2]);
     assert_eq!(edited(&one, middle).history().n_undo(), start.history().n_undo());
 }
 
 #[test]
-fn mirrored_copies_are_new_boxes_but_for_those_on_the_plane() {
+fn mirrored_copies_are_appended_unless_they_equal_their_originals() {
     let e = after(&editor(3), &[Action::Select(Select::All)]);
-    let e = edited(&e, Edit::Mirror { axis: Axis::X, plane: Plane::Zero, outcome: Outcome::Copy });
+    let e = edited(
+        &e,
+        Edit::Mirror { axis: Axis::X, plane: MirrorPlane::Zero, result: MirrorResult::Copy },
+    );
     assert_eq!(
         e.boxes().iter().map(|b| b.center.x).collect::<Vec<_>>(),
         [0.0, 4.0, 8.0, -4.0, -8.0]
@@ -135,26 +141,13 @@ fn mirrored_copies_are_new_boxes_but_for_those_on_the_plane() {
     let on_plane = selected(&e, &[0]);
     let copied = edited(
         &on_plane,
-        Edit::Mirror { axis: Axis::X, plane: Plane::Zero, outcome: Outcome::Copy },
+        Edit::Mirror { axis: Axis::X, plane: MirrorPlane::Zero, result: MirrorResult::Copy },
     );
     assert_eq!((copied.boxes().len(), copied.history().n_undo()), (5, 1));
 }
 
 #[test]
-fn boxes_go_to_the_grid() {
-    let b = CloudBox {
-        center: DVec3::new(0.26, -3.301, 0.04),
-        extent: DVec3::new(0.01, 1.07, 2.0),
-        ..unit_box()
-    };
-    let e = selected(&Editor::new(vec![b]), &[0]);
-    let e = edited(&set(&e, Setting::Snap(Snap { on: false, step: 0.1 })), Edit::SnapToGrid);
-    assert_eq!(e.boxes()[0].center, DVec3::new(0.3, -3.3, 0.0));
-    assert_eq!(e.boxes()[0].extent, DVec3::new(0.1, 1.1, 2.0));
-}
-
-#[test]
-fn what_the_reader_refuses_is_refused_in_one_sentence_and_changes_nothing() {
+fn values_that_a_box_file_cannot_hold_are_refused_in_one_sentence() {
     let e = selected(&editor(3), &[0, 2]);
     for (edit, message) in [
         (
@@ -177,14 +170,14 @@ fn what_the_reader_refuses_is_refused_in_one_sentence_and_changes_nothing() {
     ] {
         assert_eq!(refused(&e, edit), message);
     }
-    let wrong = Action::Select(Select::Boxes { boxes: vec![1, 3], how: How::Add });
+    let wrong = Action::Select(Select::Boxes { boxes: vec![1, 3], mode: SelectionMode::Add });
     assert_eq!(
         e.after(&wrong).map(|_| ()),
         Err(Refusal("box: expected a number below 3, found 3".to_owned()))
     );
-    assert!(e.after(&Action::Set(Setting::Snap(Snap { on: true, step: 0.0 }))).is_err());
-    // The copies of as many boxes as there may be are too many.
+    assert!(e.after(&Action::Set(Setting::Snap(GridSnap { is_on: true, step: 0.0 }))).is_err());
+    // Copies would exceed the largest number of boxes.
     let full =
-        after(&Editor::new(vec![unit_box(); document::MOST_BOXES]), &[Action::Select(Select::All)]);
+        after(&Editor::new(vec![unit_box(); document::MAX_BOXES]), &[Action::Select(Select::All)]);
     assert_eq!(refused(&full, Edit::Duplicate), "expected at most 262144 boxes, found 524288");
 }

@@ -1,8 +1,8 @@
-//! The table is what is said of it, and every command does what its line says.
+//! Chords are unique, and every command has its action.
 
 use std::collections::HashSet;
 
-use super::super::samples::{after, editor, selected};
+use super::super::fixtures::{after, editor, selected};
 use super::*;
 use crate::viewer::editor::handles::Handle;
 use crate::viewer::editor::ray::Ray;
@@ -13,7 +13,7 @@ fn typed(key: char) -> Chord {
 }
 
 #[test]
-fn no_two_are_the_same_and_all_can_be_typed() {
+fn every_chord_has_one_command() {
     let mut seen = HashSet::new();
     for shortcut in SHORTCUTS {
         assert!(seen.insert(shortcut.chord), "{} twice", shortcut.chord);
@@ -23,7 +23,7 @@ fn no_two_are_the_same_and_all_can_be_typed() {
 }
 
 #[test]
-fn todays_habits_are_kept() {
+fn common_chords_have_their_usual_commands() {
     let named =
         |chord: &str| SHORTCUTS.iter().find(|s| s.chord.to_string() == chord).map(|s| s.command);
     for (chord, command) in [
@@ -46,9 +46,9 @@ fn todays_habits_are_kept() {
         ("Y", Command::Axis(Axis::Y)),
         ("Z", Command::Axis(Axis::Z)),
         ("M", Command::Mirror),
-        ("1", Command::View(View::Boxes)),
-        ("2", Command::View(View::Cloud)),
-        ("3", Command::View(View::Both)),
+        ("1", Command::Display(DisplayMode::Boxes)),
+        ("2", Command::Display(DisplayMode::Cloud)),
+        ("3", Command::Display(DisplayMode::Both)),
         ("Tab", Command::NextBox),
         ("?", Command::Help),
     ] {
@@ -57,7 +57,7 @@ fn todays_habits_are_kept() {
 }
 
 #[test]
-fn capitals_and_signs_that_take_shift_are_found() {
+fn capitals_and_shifted_signs_are_recognized() {
     assert_eq!(command(Chord { shift: true, ..typed('?') }), Some(Command::Help));
     assert_eq!(command(Chord { ctrl: true, shift: true, ..typed('Z') }), Some(Command::Redo));
     assert_eq!(command(typed('G')), Some(Command::Move));
@@ -66,7 +66,7 @@ fn capitals_and_signs_that_take_shift_are_found() {
 }
 
 #[test]
-fn commands_of_the_editor_are_actions_that_it_takes() {
+fn commands_become_actions() {
     let e = selected(&editor(3), &[2]);
     let done = |command: Command| after(&e, &[command.action(&e).unwrap()]);
     assert_eq!(done(Command::Duplicate).boxes().len(), 4);
@@ -78,13 +78,13 @@ fn commands_of_the_editor_are_actions_that_it_takes() {
     assert_eq!(done(Command::NextBox).selection().active(), Some(0));
     assert_eq!(done(Command::PreviousBox).selection().active(), Some(1));
     assert_eq!(done(Command::Axis(Axis::Y)).settings().axis, Axis::Y);
-    assert!(done(Command::ToggleSnap).settings().snap.on);
-    assert_eq!(done(Command::View(View::Cloud)).settings().view, View::Cloud);
+    assert!(done(Command::ToggleSnap).settings().snap.is_on);
+    assert_eq!(done(Command::Display(DisplayMode::Cloud)).settings().display, DisplayMode::Cloud);
     assert_eq!(Command::Open.action(&e), None);
 }
 
 #[test]
-fn while_dragging_axes_and_escape_are_the_drags() {
+fn during_a_drag_axis_keys_and_escape_act_on_the_drag() {
     let ray = Ray { origin: DVec3::Z * 5.0, direction: -DVec3::Z };
     let begin = DragAction::Begin { handle: Handle::MoveView, ray, forward: -DVec3::Z };
     let e = after(&selected(&editor(1), &[0]), &[Action::Drag(begin)]);

@@ -1,9 +1,12 @@
-//! Steps, selections and settings.
+//! History, selection and settings.
 
 use glam::DVec3;
 
-use super::super::samples::{after, edited, editor, selected, unit_box};
-use super::super::selection::How;
+use super::super::axis::Axis;
+use super::super::fixtures::{after, edited, editor, selected, unit_box};
+use super::super::grid_snap::GridSnap;
+use super::super::selection::SelectionMode;
+use super::super::settings::{DisplayMode, ScalingAnchor};
 use super::*;
 
 #[test]
@@ -20,45 +23,55 @@ fn undo_and_redo_restore_boxes_and_selection() {
     );
     let redone = after(&undone, &[Action::Redo, Action::Redo]);
     assert!(redone.document().is_same(moved.document()) && redone.selection() == moved.selection());
-    // Nothing left, nothing done.
+    // At the end of the history nothing changes.
     assert!(after(&redone, &[Action::Redo]).document().is_same(moved.document()));
     assert!(after(&undone, &[Action::Undo]).document().is_same(start.document()));
 }
 
 #[test]
-fn a_new_step_forgets_what_was_undone_and_one_that_changes_nothing_does_not() {
+fn a_new_step_drops_undone_steps_and_an_edit_without_effect_does_not() {
     let e = edited(&selected(&editor(2), &[0]), Edit::Count(5));
     let undone = after(&e, &[Action::Undo]);
     let nothing = edited(&undone, Edit::Count(10));
     assert_eq!((nothing.history().n_undo(), nothing.history().n_redo()), (0, 1));
-    let selection =
-        after(&undone, &[Action::Select(Select::All), Action::Set(Setting::View(View::Both))]);
+    let selection = after(
+        &undone,
+        &[Action::Select(Select::All), Action::Set(Setting::Display(DisplayMode::Both))],
+    );
     assert_eq!((selection.history().n_undo(), selection.history().n_redo()), (0, 1));
     let other = edited(&undone, Edit::Count(6));
     assert_eq!((other.history().n_undo(), other.history().n_redo()), (1, 0));
 }
 
 #[test]
-fn views_and_settings_are_not_undone() {
-    let snap = Snap { on: true, step: 0.25 };
+fn settings_are_not_undone() {
+    let snap = GridSnap { is_on: true, step: 0.25 };
     let e = after(
         &edited(&selected(&editor(1), &[0]), Edit::Count(5)),
         &[
-            Action::Set(Setting::View(View::Cloud)),
+            Action::Set(Setting::Display(DisplayMode::Cloud)),
             Action::Set(Setting::Snap(snap)),
             Action::Set(Setting::Axis(Axis::Z)),
             Action::Undo,
         ],
     );
-    let expected = Settings { view: View::Cloud, snap, axis: Axis::Z, scaling: Scaling::Symmetric };
+    let expected = Settings {
+        display: DisplayMode::Cloud,
+        snap,
+        axis: Axis::Z,
+        anchor: ScalingAnchor::Center,
+    };
     assert_eq!((e.settings(), e.boxes()[0].n_particles), (&expected, 10));
 }
 
 #[test]
 fn selections_end_with_the_active_box() {
     let select =
-        |boxes: &[usize], how| Action::Select(Select::Boxes { boxes: boxes.to_vec(), how });
-    let e = after(&editor(4), &[select(&[2], How::Replace), select(&[0], How::Toggle)]);
+        |boxes: &[usize], mode| Action::Select(Select::Boxes { boxes: boxes.to_vec(), mode });
+    let e = after(
+        &editor(4),
+        &[select(&[2], SelectionMode::Replace), select(&[0], SelectionMode::Toggle)],
+    );
     assert_eq!(e.active_box().map(|(i, _)| i), Some(0));
     let e = after(&e, &[Action::Select(Select::All)]);
     assert_eq!(e.selection().boxes(), [1, 2, 3, 0]);
@@ -71,29 +84,26 @@ fn selections_end_with_the_active_box() {
 }
 
 #[test]
-fn the_seed_touches_every_box_and_is_a_step() {
-    let e = editor(3);
-    let (seeded, touched) = e.after(&Action::Edit(Edit::Seed(9))).unwrap();
-    assert_eq!((seeded.document().seed, touched.generate), (9, vec![0, 1, 2]));
-    let (undone, touched) = seeded.after(&Action::Undo).unwrap();
-    assert_eq!((undone.document().seed, touched.generate.len()), (1, 3));
-    assert!(undone.after(&Action::Select(Select::All)).unwrap().1.is_nothing());
+fn the_seed_is_a_step() {
+    let seeded = edited(&editor(3), Edit::Seed(9));
+    assert_eq!((seeded.document().seed, seeded.history().n_undo()), (9, 1));
+    assert_eq!(after(&seeded, &[Action::Undo]).document().seed, 1);
 }
 
 #[test]
-fn a_new_box_is_like_the_active_one_and_on_the_grid_where_that_is_on() {
+fn a_new_box_copies_the_active_one_and_snaps_to_the_grid() {
     let place = DVec3::new(0.12, 0.0, 1.3);
     assert_eq!(editor(0).new_box(place), CloudBox { center: place, ..NEW_BOX });
     let e = after(
         &selected(&editor(3), &[2]),
-        &[Action::Set(Setting::Snap(Snap { on: true, step: 0.5 }))],
+        &[Action::Set(Setting::Snap(GridSnap { is_on: true, step: 0.5 }))],
     );
     let center = DVec3::new(0.0, 0.0, 1.5);
     assert_eq!(e.new_box(place), CloudBox { n_particles: 12, center, ..unit_box() });
 }
 
 #[test]
-fn bounds_are_the_selections_or_everythings() {
+fn bounds_are_those_of_the_selection_or_of_all_boxes() {
     let e = editor(3);
     let half = DVec3::splat(0.5);
     assert_eq!(e.bounds(), Some((-half, DVec3::X * 8.0 + half)));

@@ -1,7 +1,6 @@
-//! Places, pixels, points and rectangles: what is found is compared with what a dense bundle of
-//! rays finds.
+//! Projection, picking and framing. Rectangles are compared with a dense bundle of rays.
 
-use super::super::samples::unit_box;
+use super::super::fixtures::unit_box;
 use super::*;
 
 fn view() -> Viewport {
@@ -14,7 +13,7 @@ fn view() -> Viewport {
     Viewport { pose, fov_y_rad: 1.0, size_px: DVec2::new(800.0, 600.0), px_per_point: 1.0 }
 }
 
-/// Turned about two axes, so that nothing is parallel to anything.
+/// Returns a view turned about two axes, so that no direction is parallel to an axis.
 fn turned_view() -> Viewport {
     let forward = DVec3::new(-0.4, -0.3, -0.8).normalize();
     let right = forward.cross(DVec3::Y).normalize();
@@ -24,7 +23,7 @@ fn turned_view() -> Viewport {
 }
 
 #[test]
-fn a_place_is_on_the_ray_of_its_pixel() {
+fn a_place_lies_on_the_ray_of_its_pixel() {
     let view = turned_view();
     for place in [DVec3::ZERO, DVec3::new(1.0, -2.0, 0.5), DVec3::new(-30.0, 20.0, -100.0)] {
         let pixel = view.project(place).unwrap();
@@ -51,21 +50,21 @@ fn a_point_spans_the_difference_of_neighbouring_pixels() {
 }
 
 #[test]
-fn the_nearest_box_is_picked_and_the_others_follow() {
+fn boxes_are_picked_from_near_to_far() {
     let at = |z: f64| CloudBox { center: DVec3::Z * z, ..unit_box() };
     let boxes = [at(-3.0), at(4.0), at(1.0), CloudBox { center: DVec3::X * 5.0, ..unit_box() }];
     let ray = view().ray(DVec2::new(400.0, 300.0));
     let order: Vec<usize> = pick_all(&boxes, &ray).iter().map(|hit| hit.i_box).collect();
     assert_eq!(order, [1, 2, 0]);
-    assert_eq!(pick(&boxes, &ray), Some(Hit { i_box: 1, distance: 5.5 }));
-    // From within the second what it holds is nearer than its far side.
+    assert_eq!(pick_all(&boxes, &ray)[0], Hit { i_box: 1, distance: 5.5 });
+    // From inside a box, a box in it is nearer than its far side.
     let around = CloudBox { extent: DVec3::splat(40.0), center: DVec3::Z * 4.0, ..unit_box() };
-    assert_eq!(pick(&[around, at(1.0)], &ray).map(|hit| hit.i_box), Some(1));
-    assert_eq!(pick(&[], &ray), None);
+    assert_eq!(pick_all(&[around, at(1.0)], &ray)[0].i_box, 1);
+    assert_eq!(pick_all(&[], &ray), []);
 }
 
 #[test]
-fn a_rectangle_finds_what_its_rays_find() {
+fn a_rectangle_picks_the_boxes_that_its_rays_hit() {
     let view = turned_view();
     let boxes: Vec<CloudBox> = (0..40)
         .map(|i| {
@@ -86,8 +85,8 @@ fn a_rectangle_finds_what_its_rays_find() {
         (DVec2::new(0.0, 0.0), DVec2::new(60.0, 600.0)),
     ] {
         let found = pick_rectangle(&boxes, &view, corner, opposite);
-        // Boxes are 9 pixels wide or more, and rays 2.5 pixels apart or less: what reaches 12
-        // pixels into the rectangle is hit by one.
+        // Boxes are at least 9 pixels wide, and rays at most 2.5 pixels apart, so a box that
+        // reaches 12 pixels into the rectangle is hit.
         let inwards = 12.0 * (opposite - corner).signum();
         let surely = pick_rectangle(&boxes, &view, corner + inwards, opposite - inwards);
         for (i, b) in boxes.iter().enumerate() {
@@ -106,7 +105,7 @@ fn a_rectangle_finds_what_its_rays_find() {
 }
 
 #[test]
-fn what_is_framed_is_seen_whole_and_fills_the_picture() {
+fn framed_boxes_are_whole_and_fill_the_picture() {
     for (aspect, size_px) in [(2.0, DVec2::new(800.0, 400.0)), (0.5, DVec2::new(300.0, 600.0))] {
         let b = CloudBox {
             extent: DVec3::new(3.0, 2.0, 4.0),

@@ -1,0 +1,383 @@
+//! The editor's window: passes events of the window system to the controller, and carries out its
+//! requests.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use glam::{DVec2, DVec3};
+use winit::application::ApplicationHandler;
+use winit::dpi::{PhysicalPosition, PhysicalSize};
+use winit::event::{KeyEvent, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
+use winit::keyboard::{Key, ModifiersState, NamedKey};
+use winit::window::{Window, WindowId};
+
+use super::dialogs::FileDialog;
+use super::fields::FieldTexts;
+use super::keys::{button_of, key_of};
+use super::panel_state::PanelState;
+use super::panels;
+use super::render_thread::{DrawRequests, DrawState, EditRenderer, RenderEvent, RenderLinks};
+use crate::error::{Error, Result};
+use crate::frame::stage::DeviceChoice;
+use crate::io::box_file;
+use crate::model::camera::Pose;
+use crate::viewer::editor::{
+    BoxAcceptance, Chord, DisplayMode, EditedScene, EditorController, Input, Intent, ModifierKeys,
+    PictureArea, RecentFiles, Request, Session, SessionEvent, default_path, perform,
+};
+use crate::viewer::egui_layer::{EguiLayer, SharedWidgets};
+use crate::viewer::free_path::free_path;
+use crate::viewer::native_window::{RenderThread, event_loop, open_window, wheel_notches};
+
+/// Options of an editor window.
+pub struct Options {
+    pub session: Session,
+    pub scene: EditedScene,
+    pub choice: DeviceChoice,
+    /// Size of the window in pixels.
+    pub size: [u32; 2],
+    /// Closes the window without saving when set.
+    pub stop: &'static AtomicBool,
+}
+
+/// Interval between two updates of untouched panels, and between two looks at the stop flag.
+const IDLE_INTERVAL: Duration = Duration::from_millis(250);
+
+/// Opens a window and edits until the user closes it.
+///
+/// # Errors
+/// There is no display, no device can present to it, the device failed, or validation has found a
+/// fault.
+pub fn run(options: Options) -> Result<()> {
+    let alternative = "a box file is text that any editor changes, and `nimbus render SCENE -o \
+        FILE.png` draws it";
+    let events = event_loop::<RenderEvent>(alternative)?;
+    let mut app = App::new(options, events.create_proxy())?;
+    let ran = events.run_app(&mut app).map_err(|e| Error::vulkan("window", e));
+    app.close();
+    // The render thread ends before the window that it draws into.
+    let rendered = app.thread.take().map(RenderThread::join);
+    drop(app.window.take());
+    app.rescue();
+    if let Some(error) = app.failure {
+        return Err(error);
+    }
+    ran?;
+    rendered.unwrap_or(Ok(()))
+}
+
+struct App {
+    controller: EditorController,
+    scene: EditedScene,
+    choice: DeviceChoice,
+    size: [u32; 2],
+    stop: &'static AtomicBool,
+    requests: Arc<DrawRequests>,
+    widgets: SharedWidgets,
+    proxy: EventLoopProxy<RenderEvent>,
+    thread: Option<RenderThread<()>>,
+    window: Option<Window>,
+    layer: Option<EguiLayer>,
+    modifiers: ModifiersState,
+    texts: FieldTexts,
+    dialog: Option<FileDialog>,
+    acceptances: Vec<BoxAcceptance>,
+    render_failure: Option<String>,
+    recent: RecentFiles,
+    /// Why the window could not open.
+    failure: Option<Error>,
+    /// The user has closed the window, and was asked about unsaved changes.
+    is_closed: bool,
+}
+
+impl App {
+    fn new(options: Options, proxy: EventLoopProxy<RenderEvent>) -> Result<App> {
+        let Options { session, scene, choice, size, stop } = options;
+        let document = session.editor().shared_document();
+        let whole = scene.scene(&document);
+        let camera = &whole.camera;
+        let pose = camera.pose(whole.time.start_s).ok_or_else(|| {
+            Error::usage("the scene's camera has no direction at its first frame")
+        })?;
+        let origin = scene.origin();
+        let target = camera.keys.first().map_or(DVec3::ZERO, |key| key.target) - origin;
+        let local = Pose { position: pose.position - origin, ..pose };
+        let picture = panels::picture_size(size, 1.0);
+        let [width, height] = picture.map(f64::from);
+        let area = PictureArea {
+            size_px: DVec2::new(width, height),
+            px_per_point: 1.0,
+            fov_y_rad: camera.fov_y_rad,
+        };
+        let view = (&local, camera.up, target);
+        let controller = EditorController::new(session, view, area, scene.metres_per_unit());
+        let requests = DrawRequests::new(DrawState {
+            document,
+            pose,
+            has_cloud: false,
+            size,
+            picture,
+            is_closing: false,
+            version: 0,
+        });
+        Ok(App {
+            controller,
+            scene,
+            choice,
+            size,
+            stop,
+            requests: Arc::new(requests),
+            widgets: SharedWidgets::default(),
+            proxy,
+            thread: None,
+            window: None,
+            layer: None,
+            modifiers: ModifiersState::empty(),
+            texts: FieldTexts::default(),
+            dialog: None,
+            acceptances: vec![],
+            render_failure: None,
+            recent: default_path()
+                .map_or_else(RecentFiles::default, |path| RecentFiles::load(&path)),
+            failure: None,
+            is_closed: false,
+        })
+    }
+
+    fn close(&self) {
+        self.requests.change(|state| state.is_closing = true);
+    }
+
+    /// Saves unsaved changes beside the file, where the window has ended without a question: by a
+    /// lost device or by Ctrl-C.
+    fn rescue(&self) {
+        let session = self.controller.session();
+        if self.is_closed || !session.is_dirty() {
+            return;
+        }
+        let path = session.path().unwrap_or(Path::new("cloud.dat"));
+        let path = free_path(|n| path.with_extension(format!("unsaved-{n}.dat")));
+        match box_file::write(&path, session.editor().boxes()) {
+            Ok(()) => eprintln!("unsaved changes were written to {}", path.display()),
+            Err(error) => eprintln!("unsaved changes are lost: {error}"),
+        }
+    }
+
+    fn open(&mut self, events: &ActiveEventLoop) -> Result<()> {
+        let (window, surface) = open_window(events, "nimbus", self.size, self.choice.validation)?;
+        let proxy = self.proxy.clone();
+        let links = RenderLinks {
+            requests: self.requests.clone(),
+            widgets: self.widgets.clone(),
+            // Sending fails only after the event loop has ended, when no event matters any more.
+            send: Box::new(move |event| drop(proxy.send_event(event))),
+            stop: self.stop,
+        };
+        let renderer = EditRenderer::new(surface, &self.choice, self.scene.clone(), links)?;
+        self.layer = Some(EguiLayer::new(&window, self.widgets.clone(), IDLE_INTERVAL, true));
+        let proxy = self.proxy.clone();
+        let on_end = move || drop(proxy.send_event(RenderEvent::Ended));
+        self.thread = Some(RenderThread::start(move || renderer.run(), on_end)?);
+        let (size, px_per_point) = (window.inner_size(), window.scale_factor());
+        self.window = Some(window);
+        self.resize(size, px_per_point);
+        Ok(())
+    }
+
+    fn resize(&mut self, size: PhysicalSize<u32>, px_per_point: f64) {
+        self.size = size.into();
+        let [width, height] = panels::picture_size(self.size, px_per_point).map(f64::from);
+        self.handle(Input::Resized { size_px: DVec2::new(width, height), px_per_point });
+    }
+
+    /// Passes an input to the controller, and carries out the requests that follow.
+    fn handle(&mut self, input: Input) {
+        let mut inputs = vec![input];
+        while let Some(input) = inputs.pop() {
+            let requests = self.controller.handle(&input);
+            inputs.extend(requests.iter().filter_map(|request| self.carry_out(request)));
+        }
+        if let Some(layer) = &mut self.layer {
+            layer.request_update();
+        }
+        self.request_draw();
+    }
+
+    fn carry_out(&mut self, request: &Request) -> Option<Input> {
+        match request {
+            Request::ChooseToOpen => self.dialog = Some(FileDialog::open()),
+            Request::ChooseToSave => {
+                self.dialog = Some(FileDialog::save(self.controller.session().path()));
+            }
+            // The panels show the question.
+            Request::Ask(_) => {}
+            Request::Quit => {
+                self.is_closed = true;
+                self.close();
+            }
+            Request::Open(_) | Request::Save { .. } => {
+                let event = perform(request)?;
+                if let SessionEvent::Opened { path, .. } | SessionEvent::Saved { path, .. } = &event
+                {
+                    self.recent.push(path);
+                    // A list that cannot be saved only loses recent files.
+                    let _ = default_path().map(|place| self.recent.save(&place));
+                }
+                return Some(Input::Event(event));
+            }
+        }
+        None
+    }
+
+    fn request_draw(&self) {
+        let pose = self.controller.camera().pose();
+        let pose = Pose { position: pose.position + self.scene.origin(), ..pose };
+        let editor = self.controller.editor();
+        let (document, size) = (editor.shared_document(), self.size);
+        let picture = self.controller.viewport().size_px.to_array().map(|v| v as u32);
+        let has_cloud = editor.settings().display != DisplayMode::Boxes;
+        self.requests.change(|state| {
+            *state = DrawState { document, pose, has_cloud, size, picture, ..state.clone() };
+        });
+    }
+
+    fn keys(&self) -> ModifierKeys {
+        ModifierKeys {
+            ctrl: self.modifiers.control_key() || self.modifiers.super_key(),
+            shift: self.modifiers.shift_key(),
+        }
+    }
+
+    fn press(&mut self, event: &KeyEvent) {
+        if event.logical_key == Key::Named(NamedKey::Enter) {
+            self.texts.wants_focus = true;
+            self.update_panels();
+        } else if let Some(key) = key_of(&event.logical_key) {
+            let (ModifierKeys { ctrl, shift }, alt) = (self.keys(), self.modifiers.alt_key());
+            self.handle(Input::Chord(Chord { key, ctrl, shift, alt }));
+        }
+    }
+
+    /// Updates the panels, and handles the inputs that follow.
+    fn update_panels(&mut self) {
+        let (Some(layer), Some(window)) = (&mut self.layer, &self.window) else { return };
+        let state = PanelState {
+            controller: &self.controller,
+            acceptances: &self.acceptances,
+            recent: self.recent.paths(),
+            failure: self.render_failure.as_deref(),
+        };
+        let (texts, dialog) = (&mut self.texts, &mut self.dialog);
+        let mut inputs = vec![];
+        // egui may run the closure twice, but reports a click once.
+        layer.update(window, |ui| {
+            inputs.extend(panels::show(ui, &state, texts, dialog));
+            None
+        });
+        inputs.into_iter().for_each(|input| self.handle(input));
+        // The widgets over the picture have changed.
+        self.requests.change(|_| ());
+        self.update_title();
+    }
+
+    /// Updates the panels twice: egui moves the focus in one pass and reports the move in the next.
+    /// The next event must find the field that has the focus, however fast the user types.
+    fn settle_focus(&mut self) {
+        self.update_panels();
+        self.update_panels();
+    }
+
+    fn update_title(&self) {
+        let session = self.controller.session();
+        let name = session.path().map_or("new cloud".to_owned(), |path| path.display().to_string());
+        let mark = if session.is_dirty() { "*" } else { "" };
+        self.window.iter().for_each(|window| window.set_title(&format!("{mark}{name} | nimbus")));
+    }
+}
+
+impl ApplicationHandler<RenderEvent> for App {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        if self.window.is_none()
+            && let Err(error) = self.open(events)
+        {
+            self.failure = Some(error);
+            events.exit();
+        }
+    }
+
+    fn user_event(&mut self, events: &ActiveEventLoop, event: RenderEvent) {
+        match event {
+            RenderEvent::Acceptances(document, acceptances) => {
+                if document.is_same(self.controller.editor().document()) {
+                    self.acceptances = acceptances;
+                }
+            }
+            RenderEvent::Failure(failure) => self.render_failure = failure,
+            RenderEvent::Ended => events.exit(),
+        }
+    }
+
+    fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        if self.stop.load(Ordering::Relaxed) {
+            self.close();
+        }
+        if self.layer.as_ref().is_some_and(EguiLayer::is_due) {
+            self.update_panels();
+        }
+        let due = self.layer.as_ref().and_then(EguiLayer::due);
+        let due = due.unwrap_or_else(|| Instant::now() + IDLE_INTERVAL);
+        events.set_control_flow(ControlFlow::WaitUntil(due));
+    }
+
+    fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        // Panels know the pointer's place and the open dialog only after an update.
+        if let WindowEvent::MouseInput { .. } = &event {
+            self.update_panels();
+        }
+        let (Some(layer), Some(window)) = (&mut self.layer, &self.window) else { return };
+        // egui has the keys only while text is entered; else Tab would move its focus.
+        let is_key = matches!(event, WindowEvent::KeyboardInput { .. });
+        let is_typing = layer.has_keyboard_focus() || self.dialog.is_some();
+        let is_consumed = (!is_key || is_typing) && layer.handle(window, &event);
+        let px_per_point = window.scale_factor();
+        match event {
+            WindowEvent::CloseRequested => {
+                self.handle(Input::Event(SessionEvent::Intend(Intent::Quit)));
+            }
+            WindowEvent::Destroyed => self.close(),
+            WindowEvent::Resized(size) => self.resize(size, px_per_point),
+            WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
+            WindowEvent::Focused(false) => self.handle(Input::FocusLost),
+            // A drag goes on over the panels, and ends there.
+            WindowEvent::CursorMoved { position: PhysicalPosition { x, y }, .. } => {
+                self.handle(Input::PointerMoved { pixel: DVec2::new(x, y), keys: self.keys() });
+            }
+            WindowEvent::CursorLeft { .. } => self.handle(Input::PointerLeft),
+            WindowEvent::MouseInput { state, button, .. } => {
+                let is_down = state.is_pressed();
+                if let (Some(button), true) = (button_of(button), !is_down || !is_consumed) {
+                    // Entered text belongs to the boxes that were selected before the click.
+                    if is_down {
+                        self.texts.take().into_iter().for_each(|typed| self.handle(typed));
+                    }
+                    self.handle(Input::Button { button, is_down, keys: self.keys() });
+                }
+            }
+            WindowEvent::MouseWheel { delta, .. } if !is_consumed => {
+                self.handle(Input::Wheel(wheel_notches(delta)));
+            }
+            WindowEvent::KeyboardInput { event, .. } if event.state.is_pressed() => {
+                if !is_typing {
+                    self.press(&event);
+                }
+                if is_typing || self.texts.wants_focus || self.dialog.is_some() {
+                    self.settle_focus();
+                }
+            }
+            _ => {}
+        }
+    }
+}

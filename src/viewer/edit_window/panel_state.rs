@@ -1,0 +1,15 @@
+//! State that the editor's panels show.
+
+use std::path::PathBuf;
+
+use crate::viewer::editor::{BoxAcceptance, EditorController};
+
+/// State that the editor's panels show.
+pub struct PanelState<'a> {
+    pub controller: &'a EditorController,
+    /// Acceptance of each box; fewer where the device has not generated them yet.
+    pub acceptances: &'a [BoxAcceptance],
+    pub recent: &'a [PathBuf],
+    /// Why the picture does not show the document.
+    pub failure: Option<&'a str>,
+}

@@ -1,0 +1,357 @@
+//! The scene window: passes events of the window system to the view state, and answers commands.
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+use glam::DVec2;
+use winit::application::ApplicationHandler;
+use winit::dpi::{PhysicalPosition, PhysicalSize};
+use winit::event::{ElementState, MouseButton, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
+use winit::keyboard::{Key, NamedKey};
+use winit::window::{Window, WindowId};
+
+use super::commands::CaptureFormat;
+use super::error_meter::ErrorMeter;
+use super::file_watch::FileWatch;
+use super::frame_loop::LoopTimes;
+use super::panels;
+use super::render_links::{RenderEvent, RenderLinks};
+use super::render_thread::SceneRenderer;
+use super::scene_source::SceneSource;
+use super::status::SharedStatus;
+use super::view_state::{Response, ViewState};
+use crate::error::{Error, Result};
+use crate::frame::stage::DeviceChoice;
+use crate::gpu::PresentMode;
+use crate::io::image;
+use crate::model::film::Film;
+use crate::viewer::egui_layer::{EguiLayer, SharedWidgets};
+use crate::viewer::free_path::free_path;
+use crate::viewer::native_window::{RenderThread, event_loop, open_window, wheel_notches};
+use crate::viewer::sync::lock;
+
+/// Options of a scene window.
+pub struct Options {
+    pub source: SceneSource,
+    pub choice: DeviceChoice,
+    /// Whether frames skip passes that they do not need.
+    pub skips: bool,
+    pub mode: PresentMode,
+    /// Frames until the window closes; `None`: no limit.
+    pub n_frames: Option<u32>,
+    /// Closes the window when set.
+    pub stop: &'static AtomicBool,
+    pub is_quiet: bool,
+    /// Whether panels are shown at the start.
+    pub has_panels: bool,
+}
+
+/// Times measured while a window was open.
+pub struct WindowTimes {
+    pub loops: Vec<LoopTimes>,
+    /// Time that each update of the panels took on the window's thread, ms.
+    pub panels_ms: Vec<f64>,
+}
+
+/// Interval between two updates of the panels, and between two looks at the scene's files.
+const IDLE_INTERVAL: Duration = Duration::from_millis(250);
+
+/// Opens a window and shows the scene until the user closes it.
+///
+/// # Errors
+/// There is no display, no device can present to it, the device failed, or validation has found a
+/// fault.
+pub fn run(options: Options) -> Result<WindowTimes> {
+    let mut state = ViewState::new(options.source.first.clone(), options.skips)
+        .ok_or_else(|| Error::usage("the scene's camera has no direction at its first frame"))?;
+    state.has_panels = options.has_panels;
+    let events = event_loop::<RenderEvent>("`nimbus render SCENE -o FILE.png` needs none")?;
+    let files = FileWatch::new(&options.source.files, options.choice.shaders.as_deref());
+    let mut app = App {
+        proxy: events.create_proxy(),
+        state: Arc::new(Mutex::new(state)),
+        options,
+        files,
+        thread: None,
+        window: None,
+        layer: None,
+        status: SharedStatus::default(),
+        widgets: SharedWidgets::default(),
+        pointer: Pointer::default(),
+        error_meter: ErrorMeter::default(),
+        failure: None,
+    };
+    let ran = events.run_app(&mut app).map_err(|e| Error::vulkan("window", e));
+    app.state().is_closing = true;
+    // The render thread ends before the window that it draws into.
+    let rendered = app.thread.take().map(RenderThread::join);
+    drop(app.window.take());
+    if let Some(error) = app.failure {
+        return Err(error);
+    }
+    ran?;
+    let loops = rendered.unwrap_or_else(|| Ok(vec![]))?;
+    let panels_ms = std::mem::take(&mut lock(&app.widgets).update_ms);
+    Ok(WindowTimes { loops, panels_ms })
+}
+
+/// Position of the pointer, and the buttons that turn the camera.
+#[derive(Default)]
+struct Pointer {
+    position: Option<DVec2>,
+    looks: bool,
+    orbits: bool,
+}
+
+struct App {
+    options: Options,
+    state: Arc<Mutex<ViewState>>,
+    proxy: EventLoopProxy<RenderEvent>,
+    files: FileWatch,
+    thread: Option<RenderThread<Vec<LoopTimes>>>,
+    window: Option<Window>,
+    layer: Option<EguiLayer>,
+    status: SharedStatus,
+    widgets: SharedWidgets,
+    pointer: Pointer,
+    error_meter: ErrorMeter,
+    /// Why the window could not open.
+    failure: Option<Error>,
+}
+
+impl ApplicationHandler<RenderEvent> for App {
+    fn resumed(&mut self, events: &ActiveEventLoop) {
+        if self.window.is_none()
+            && let Err(error) = self.open(events)
+        {
+            self.failure = Some(error);
+            events.exit();
+        }
+    }
+
+    fn user_event(&mut self, events: &ActiveEventLoop, event: RenderEvent) {
+        match event {
+            RenderEvent::Title(text) => self.window.iter().for_each(|w| w.set_title(&text)),
+            RenderEvent::Message(text) => self.print(&text),
+            RenderEvent::Capture { format, film, rgba } => {
+                let message = capture(format, &film, &rgba);
+                self.print(&message.unwrap_or_else(|e| e.to_string()));
+            }
+            RenderEvent::Readback(readback) => {
+                let message = self.error_meter.compare(&readback);
+                message.iter().for_each(|text| self.print(text));
+            }
+            RenderEvent::ErrorChanged => self.request_panels(),
+            RenderEvent::Ended => events.exit(),
+        }
+    }
+
+    fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        self.reload_files();
+        self.error_meter.update(&self.state, &self.status);
+        let is_shown = self.update_panels();
+        let idle = Instant::now() + IDLE_INTERVAL;
+        let due = self.layer.as_ref().filter(|_| is_shown).and_then(EguiLayer::due);
+        events.set_control_flow(ControlFlow::WaitUntil(due.map_or(idle, |due| due.min(idle))));
+    }
+
+    fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        // Releases count wherever the pointer is, and whichever widget has the focus.
+        match &event {
+            WindowEvent::KeyboardInput { event, .. } if !event.state.is_pressed() => {
+                if let Some(name) = key_name(&event.logical_key) {
+                    self.state().release(&name);
+                }
+            }
+            WindowEvent::MouseInput { state: ElementState::Released, .. } => {
+                (self.pointer.looks, self.pointer.orbits) = (false, false);
+            }
+            _ => {}
+        }
+        if self.state().has_panels
+            && let (Some(layer), Some(window)) = (&mut self.layer, &self.window)
+            && layer.handle(window, &event)
+        {
+            return;
+        }
+        match event {
+            // The render thread ends, and its event closes the window.
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => self.state().is_closing = true,
+            WindowEvent::Resized(PhysicalSize { width, height }) => {
+                self.state().size = [width, height];
+            }
+            WindowEvent::Focused(false) => self.state().release_all(),
+            WindowEvent::KeyboardInput { event, .. }
+                if event.state.is_pressed() && !event.repeat =>
+            {
+                if let Some(name) = key_name(&event.logical_key) {
+                    let response = self.state().press(&name);
+                    self.respond(response);
+                }
+            }
+            WindowEvent::MouseInput { state: ElementState::Pressed, button, .. } => match button {
+                MouseButton::Left => self.pointer.looks = true,
+                MouseButton::Right => self.pointer.orbits = true,
+                _ => {}
+            },
+            WindowEvent::CursorMoved { position: PhysicalPosition { x, y }, .. } => {
+                let position = DVec2::new(x, y);
+                let before = self.pointer.position.replace(position).unwrap_or(position);
+                if self.pointer.looks || self.pointer.orbits {
+                    self.state().drag(position - before, self.pointer.orbits);
+                }
+            }
+            WindowEvent::CursorLeft { .. } => self.pointer = Pointer::default(),
+            WindowEvent::MouseWheel { delta, .. } => self.state().approach(wheel_notches(delta)),
+            _ => {}
+        }
+    }
+}
+
+impl App {
+    fn state(&self) -> MutexGuard<'_, ViewState> {
+        lock(&self.state)
+    }
+
+    fn open(&mut self, events: &ActiveEventLoop) -> Result<()> {
+        let Options { source, choice, mode, n_frames, stop, .. } = &self.options;
+        let scene = &source.first;
+        let title = if scene.title.is_empty() { "nimbus" } else { &scene.title };
+        let size = [scene.film.width, scene.film.height];
+        let (window, surface) = open_window(events, title, size, choice.validation)?;
+        self.state().size = window.inner_size().into();
+        let proxy = self.proxy.clone();
+        let links = RenderLinks {
+            state: self.state.clone(),
+            status: self.status.clone(),
+            widgets: self.widgets.clone(),
+            // Sending fails only after the event loop has ended, when no event matters any more.
+            send: Box::new(move |event| drop(proxy.send_event(event))),
+            stop,
+        };
+        let renderer = SceneRenderer::new(surface, choice, *mode, *n_frames, links)?;
+        self.layer = Some(EguiLayer::new(&window, self.widgets.clone(), IDLE_INTERVAL, false));
+        let proxy = self.proxy.clone();
+        let on_end = move || drop(proxy.send_event(RenderEvent::Ended));
+        self.thread = Some(RenderThread::start(move || renderer.run(), on_end)?);
+        self.window = Some(window);
+        Ok(())
+    }
+
+    /// Reads changed files again. An error is shown over the last good picture.
+    fn reload_files(&mut self) {
+        let changed = self.files.take_changed();
+        if changed.shaders {
+            self.state().n_shader_loads += 1;
+        }
+        if !changed.scene {
+            return;
+        }
+        let state = self.state().clone();
+        let read = self.options.source.read(&state);
+        self.files.set_scene_files(&self.options.source.files);
+        lock(&self.status).file_error = read.as_ref().err().map(Error::to_string);
+        match read {
+            Ok(scene) => {
+                self.state().reload(scene);
+                self.print(&format!("{} has changed", self.options.source.path.display()));
+            }
+            Err(error) => self.print(&error.to_string()),
+        }
+        self.request_panels();
+    }
+
+    fn request_panels(&mut self) {
+        self.layer.iter_mut().for_each(EguiLayer::request_update);
+    }
+
+    /// Updates the panels where due. Returns whether any widget is shown.
+    fn update_panels(&mut self) -> bool {
+        let has_panels = self.state().has_panels;
+        let is_shown = has_panels || lock(&self.status).alarm().is_some();
+        let (Some(layer), Some(window)) = (&mut self.layer, &self.window) else { return is_shown };
+        if !is_shown {
+            layer.hide();
+            return false;
+        }
+        if !layer.is_due() {
+            return true;
+        }
+        // Copies, so that the render thread never waits for the panels.
+        let (state, status) = (lock(&self.state).clone(), lock(&self.status).clone());
+        let mut commands = vec![];
+        layer.update(window, |ui| {
+            let backdrop = has_panels.then(|| {
+                let (clicked, backdrop) = panels::show(ui, &state, &status);
+                commands.extend(clicked);
+                backdrop
+            });
+            if let Some(text) = status.alarm() {
+                panels::alarm(ui, &text);
+            }
+            backdrop
+        });
+        if !commands.is_empty() {
+            layer.request_update();
+        }
+        for command in commands {
+            let response = self.state().act(command);
+            self.respond(response);
+        }
+        true
+    }
+
+    fn respond(&self, response: Response) {
+        let source = &self.options.source;
+        match response {
+            Response::Nothing => {}
+            Response::Message(text) => self.print(&text),
+            Response::PrintCommandLine => {
+                let path = source.path.display().to_string();
+                let line = self.state().command_line(&path, &source.first);
+                println!("{line}");
+                self.layer.iter().for_each(|layer| layer.copy(&line));
+            }
+            Response::SaveScene => {
+                let state = self.state().clone();
+                let saved = source.save(&state).map(|path| format!("saved {}", path.display()));
+                self.print(&saved.unwrap_or_else(|e| e.to_string()));
+            }
+        }
+    }
+
+    fn print(&self, text: &str) {
+        if !self.options.is_quiet {
+            eprintln!("{}", text.trim_end());
+        }
+    }
+}
+
+/// Saves a picture in the current folder under a free name. Returns a message.
+fn capture(format: CaptureFormat, film: &Film, rgba: &[f32]) -> Result<String> {
+    let extension = match format {
+        CaptureFormat::Png => "png",
+        CaptureFormat::Exr => "exr",
+    };
+    let path = free_path(|n| PathBuf::from(format!("view-{n}.{extension}")));
+    image::write(&path, film, film.width, film.height, rgba)?;
+    Ok(format!("saved {}", path.display()))
+}
+
+/// Returns the name of a key as the shortcuts have it.
+fn key_name(key: &Key) -> Option<String> {
+    let name = match key {
+        Key::Character(text) => return Some(text.to_lowercase()),
+        Key::Named(NamedKey::Space) => "space",
+        Key::Named(NamedKey::Home) => "home",
+        Key::Named(NamedKey::Escape) => "escape",
+        Key::Named(NamedKey::F10) => "f10",
+        Key::Named(NamedKey::F11) => "f11",
+        Key::Named(NamedKey::F12) => "f12",
+        _ => return None,
+    };
+    Some(name.to_owned())
+}

@@ -1,0 +1,69 @@
+//! State and events between the scene window and its render thread.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+
+use super::commands::CaptureFormat;
+use super::status::SharedStatus;
+use super::view_state::ViewState;
+use crate::model::film::Film;
+use crate::viewer::egui_layer::SharedWidgets;
+use crate::viewer::fly_camera::FlyCamera;
+use crate::viewer::sync::lock;
+
+/// An event that the render thread sends to the window.
+#[derive(Debug)]
+pub enum RenderEvent {
+    /// A new window title.
+    Title(String),
+    /// A message for the terminal.
+    Message(String),
+    /// A picture to save: premultiplied linear RGBA, rows from the top.
+    Capture {
+        format: CaptureFormat,
+        film: Film,
+        rgba: Vec<f32>,
+    },
+    Readback(Readback),
+    /// The status has a new error.
+    ErrorChanged,
+    /// The thread has ended.
+    Ended,
+}
+
+/// Pictures of one frame, as [`ViewState::wants_readback`] asked for them.
+#[derive(Debug)]
+pub struct Readback {
+    /// [`ViewState::version`] of the frame.
+    pub version: u64,
+    pub camera: FlyCamera,
+    pub i_frame: u32,
+    pub film: Film,
+    /// Picture of A: premultiplied linear RGBA, rows from the top.
+    pub a: Vec<f32>,
+    /// Picture of B, if there is one.
+    pub b: Option<Vec<f32>>,
+}
+
+/// State that the window and its render thread share.
+pub struct RenderLinks {
+    pub state: Arc<Mutex<ViewState>>,
+    pub status: SharedStatus,
+    pub widgets: SharedWidgets,
+    /// Sends an event to the window.
+    pub send: Box<dyn Fn(RenderEvent) + Send>,
+    /// Ends the thread when set.
+    pub stop: &'static AtomicBool,
+}
+
+impl RenderLinks {
+    /// Sends a message for the terminal.
+    pub fn message(&self, text: String) {
+        (self.send)(RenderEvent::Message(text));
+    }
+
+    /// Returns whether the thread is to end.
+    pub fn is_closing(&self) -> bool {
+        lock(&self.state).is_closing || self.stop.load(Ordering::Relaxed)
+    }
+}

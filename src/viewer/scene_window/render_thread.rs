@@ -1,0 +1,220 @@
+//! The render thread of the scene window: it makes the scene ready on the device, runs the frame
+//! loop, and falls back to the last good scene where a change cannot be drawn.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::comparison::CameraQueue;
+use super::frame_loop::{FrameLoop, LoopSamples, LoopTimes};
+use super::render_links::{RenderEvent, RenderLinks};
+use super::view_state::{Variant, ViewState};
+use crate::error::{Error, Result};
+use crate::frame::stage::{DeviceChoice, Player};
+use crate::gpu::{Compiler, Instance, PresentMode, Surface};
+use crate::model::film::Film;
+use crate::model::scene::Scene;
+use crate::viewer::posed_player::PosedPlayer;
+use crate::viewer::sync::lock;
+use crate::viewer::window_target::{PictureDraw, WindowTarget};
+
+/// A scene on the device, and the draw that shows it. Fields are dropped in this order.
+struct ActiveScene {
+    draw: PictureDraw,
+    player: Player,
+    variant: Option<PosedPlayer>,
+}
+
+/// A scene, and its variant B, that could be drawn.
+type GoodScene = (Arc<Scene>, Option<Variant>);
+
+/// Delay before another attempt while the window has no visible area.
+const HIDDEN_DELAY: Duration = Duration::from_millis(50);
+
+/// Renders a scene into a window.
+pub struct SceneRenderer {
+    target: WindowTarget,
+    choice: DeviceChoice,
+    links: RenderLinks,
+    n_shader_loads: u64,
+    n_mode_steps: u32,
+    /// Version and shader count of the state that could not be drawn.
+    failed_at: Option<(u64, u64)>,
+    /// Frames until the window closes; `None`: no limit.
+    n_left: Option<u32>,
+    samples: LoopSamples,
+}
+
+impl SceneRenderer {
+    /// Opens a device for `surface`. Presents by `mode` where the window supports it, else by fifo.
+    ///
+    /// # Errors
+    /// No device can be opened, or it cannot present to the window.
+    pub fn new(
+        surface: (Arc<Instance>, Surface),
+        choice: &DeviceChoice,
+        mode: PresentMode,
+        n_frames: Option<u32>,
+        links: RenderLinks,
+    ) -> Result<SceneRenderer> {
+        let target = WindowTarget::open(surface, choice, mode)?;
+        if target.mode() != mode {
+            let (mode, used) = (mode.name(), target.mode().name());
+            links.message(format!("this window does not support {mode}; it uses {used}"));
+        }
+        lock(&links.status).device_name = target.bed.device.info().name.clone();
+        Ok(SceneRenderer {
+            target,
+            choice: choice.clone(),
+            links,
+            n_shader_loads: 0,
+            n_mode_steps: 0,
+            failed_at: None,
+            n_left: n_frames,
+            samples: LoopSamples::default(),
+        })
+    }
+
+    /// Renders until the window closes. Returns the times of each loop that ran.
+    ///
+    /// # Errors
+    /// The device failed, or the first scene cannot be drawn.
+    pub fn run(mut self) -> Result<Vec<LoopTimes>> {
+        let mut good: Option<GoodScene> = None;
+        while !self.links.is_closing() && self.n_left != Some(0) {
+            let state = lock(&self.links.state).clone();
+            if !self.recreate_target(&state)? {
+                std::thread::sleep(HIDDEN_DELAY);
+                continue;
+            }
+            let old_shaders = self.reload_shaders(&state);
+            match self.activate(&state) {
+                Ok(Some(active)) => {
+                    // An error stays visible until something else is drawn than what failed.
+                    if self.failed_at.is_some_and(|at| at != (state.version, state.n_shader_loads))
+                    {
+                        self.failed_at = None;
+                        lock(&self.links.status).render_error = None;
+                    }
+                    good = Some((state.scene.clone(), state.variant.clone()));
+                    self.play(active, &state)?;
+                }
+                Ok(None) => {}
+                Err(error @ (Error::Limit { .. } | Error::Shader { .. })) => {
+                    self.fall_back(error, old_shaders, good.as_ref(), &state)?;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        self.target.close()?;
+        Ok(self.samples.times())
+    }
+
+    /// Recreates the swapchain by the state's size and present mode. Returns false where the window
+    /// has no visible area.
+    fn recreate_target(&mut self, state: &ViewState) -> Result<bool> {
+        let n_before = std::mem::replace(&mut self.n_mode_steps, state.n_mode_steps);
+        let n_steps = state.n_mode_steps.wrapping_sub(n_before) as usize;
+        self.target.advance_mode(n_steps);
+        if n_steps > 0 {
+            self.links.message(format!("present mode: {}", self.target.mode().name()));
+        }
+        lock(&self.links.status).present_mode = Some(self.target.mode());
+        self.target.recreate(state.size)
+    }
+
+    /// Reads the shaders again where they have changed. Returns the compiler of the old ones, if
+    /// they were replaced. Shaders that cannot be read are reported, and the old ones stay.
+    fn reload_shaders(&mut self, state: &ViewState) -> Option<Compiler> {
+        let n_before = std::mem::replace(&mut self.n_shader_loads, state.n_shader_loads);
+        if n_before == state.n_shader_loads {
+            return None;
+        }
+        let sources = self.choice.sources();
+        let replaced = sources.and_then(|sources| self.target.bed.set_sources(sources));
+        replaced.map_err(|error| self.report(&error, state)).ok()
+    }
+
+    fn report(&mut self, error: &Error, state: &ViewState) {
+        self.failed_at = Some((state.version, state.n_shader_loads));
+        let text = format!("{}; the last good state stays", error.to_string().trim_end());
+        lock(&self.links.status).render_error = Some(text.clone());
+        (self.links.send)(RenderEvent::ErrorChanged);
+        self.links.message(text);
+    }
+
+    /// Restores the old shaders, or else the last good scene.
+    ///
+    /// # Errors
+    /// There is neither; the error is the given one.
+    fn fall_back(
+        &mut self,
+        error: Error,
+        old_shaders: Option<Compiler>,
+        good: Option<&GoodScene>,
+        failed: &ViewState,
+    ) -> Result<()> {
+        match (old_shaders, good) {
+            (Some(compiler), _) => self.target.bed.set_compiler(compiler),
+            (None, Some((scene, variant)))
+                if *scene != failed.scene || variant.is_none() && failed.variant.is_some() =>
+            {
+                let mut state = lock(&self.links.state);
+                // A newer change by the user is tried as it is.
+                if state.version == failed.version {
+                    (state.scene, state.variant) = (scene.clone(), variant.clone());
+                }
+            }
+            _ => return Err(error),
+        }
+        self.report(&error, failed);
+        Ok(())
+    }
+
+    /// Makes the state's scenes ready on the device; `None` without a visible area.
+    fn activate(&self, state: &ViewState) -> Result<Option<ActiveScene>> {
+        let bed = &self.target.bed;
+        let player = bed.player(self.with_window_size(&state.scene), state.skips)?;
+        let variant = state.variant.as_ref().map(|v| {
+            let player = bed.player(self.with_window_size(&v.scene), v.skips)?;
+            Ok(PosedPlayer::new(player, state.camera.pose()))
+        });
+        let variant = variant.transpose()?;
+        let draw = self.target.picture_draw(&player.renderer, &player.scene.film)?;
+        Ok(draw.map(|draw| ActiveScene { draw, player, variant }))
+    }
+
+    fn with_window_size(&self, scene: &Arc<Scene>) -> Arc<Scene> {
+        let mut scene = scene.clone();
+        if let Some([width, height]) = self.target.size() {
+            let film = scene.film;
+            Arc::make_mut(&mut scene).film = Film { width, height, ..film };
+        }
+        scene
+    }
+
+    /// Runs the frame loop until the state asks for something that it cannot follow.
+    fn play(&mut self, active: ActiveScene, state: &ViewState) -> Result<()> {
+        let ActiveScene { draw, player, variant } = active;
+        let Player { mut renderer, game, scene, choices, impostor_choice } = player;
+        let texts = choices.iter().map(|c| c.text()).chain(impostor_choice.map(|c| c.text()));
+        texts.for_each(|text| self.links.message(text));
+        let (shared, cameras) = (self.links.state.clone(), CameraQueue::default());
+        let queue = cameras.clone();
+        let mut game = game.seen_from(Box::new(move || queue.push(lock(&shared).camera)));
+        let mut frames = FrameLoop {
+            target: &mut self.target,
+            links: &self.links,
+            samples: &mut self.samples,
+            n_left: &mut self.n_left,
+            draw: &draw,
+            scene: &scene,
+            variant,
+            cameras,
+            begun: state,
+        };
+        let ended = frames.run(&mut game, &mut renderer);
+        self.target.finish();
+        lock(&self.links.status).variant_ms = None;
+        ended
+    }
+}

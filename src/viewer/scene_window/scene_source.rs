@@ -1,0 +1,57 @@
+//! The scene file behind a window: it is read again when a file changes, and the view is saved as
+//! a new scene.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::view_state::ViewState;
+use crate::error::Result;
+use crate::io::{scene_file, scene_view};
+use crate::model::scene::Scene;
+use crate::viewer::free_path::free_path;
+
+/// A scene file with the overrides it is read with.
+pub struct SceneSource {
+    pub path: PathBuf,
+    /// Overrides of the command line: `--set` and `--size`.
+    pub overrides: Vec<String>,
+    pub seed: Option<u32>,
+    /// The scene as last read, before any knob was changed.
+    pub first: Arc<Scene>,
+    /// The scene's file and the files that it names.
+    pub files: Vec<PathBuf>,
+}
+
+impl SceneSource {
+    /// Reads the scene again, with the knobs of `state`. The list of files is updated also where
+    /// reading fails.
+    ///
+    /// # Errors
+    /// A file cannot be read, or its content is not valid.
+    pub fn read(&mut self, state: &ViewState) -> Result<Arc<Scene>> {
+        let (loaded, files) = scene_file::load_and_name(&self.path, &self.overrides, self.seed);
+        self.files = files;
+        let changed = state.changed_knobs(&self.first);
+        let first = Arc::new(loaded?.scene);
+        let scene = if changed.is_empty() {
+            first.clone()
+        } else {
+            let overrides = [&self.overrides[..], &changed].concat();
+            Arc::new(scene_file::load(&self.path, &overrides, self.seed)?.scene)
+        };
+        self.first = first;
+        Ok(scene)
+    }
+
+    /// Saves the view as a scene file in the current folder, and returns its path.
+    ///
+    /// # Errors
+    /// The scene cannot be read, or the new file cannot be written.
+    pub fn save(&self, state: &ViewState) -> Result<PathBuf> {
+        let stem = self.path.file_stem().unwrap_or("scene".as_ref()).to_string_lossy();
+        let overrides = [self.overrides.clone(), state.overrides(&self.first)].concat();
+        let to = free_path(|n| Path::new(&format!("{stem}-view-{n}.toml")).to_owned());
+        scene_view::save(&self.path, &to, &overrides, self.seed)?;
+        Ok(to)
+    }
+}

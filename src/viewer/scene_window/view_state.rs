@@ -1,0 +1,344 @@
+//! State of the scene window: camera, playback, settings, and what the user has asked for.
+//!
+//! Input changes the state through [`ViewState`]'s methods, and the render thread draws by it.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+
+use super::commands::{CaptureFormat, Command, Comparison, FLYING_KEYS, SHORTCUTS, help};
+use super::knobs::Knob;
+use super::playback::Playback;
+use crate::model::scene::Scene;
+use crate::viewer::fly_camera::{FlyCamera, Motion};
+
+/// Settings that are drawn as B.
+#[derive(Debug, Clone)]
+pub struct Variant {
+    pub scene: Arc<Scene>,
+    pub skips: bool,
+}
+
+/// State of the scene window.
+#[derive(Debug, Clone)]
+pub struct ViewState {
+    /// The camera of A and B.
+    pub camera: FlyCamera,
+    /// The playback position.
+    pub playback: Playback,
+    /// The scene with its knobs as set. The window replaces the size of its film.
+    pub scene: Arc<Scene>,
+    /// Whether frames skip passes that they do not need.
+    pub skips: bool,
+    /// Counts changes that the running loop cannot follow: of the scene, of skipping, of B.
+    pub version: u64,
+    /// Counts requests for the next present mode.
+    pub n_mode_steps: u32,
+    /// Width and height of the window in pixels.
+    pub size: [u32; 2],
+    /// A picture to save.
+    pub capture: Option<CaptureFormat>,
+    /// Whether panels are shown.
+    pub has_panels: bool,
+    /// The next frame's values are to be counted.
+    pub wants_counts: bool,
+    /// The settings that A is compared with.
+    pub variant: Option<Variant>,
+    /// How A is compared with B.
+    pub comparison: Comparison,
+    /// Whether the error is measured.
+    pub measures_error: bool,
+    /// The next frame's pictures are to be read back.
+    pub wants_readback: bool,
+    /// Counts changes of the shader files.
+    pub n_shader_loads: u64,
+    /// Whether the window is to close.
+    pub is_closing: bool,
+    held_keys: BTreeSet<&'static str>,
+}
+
+/// Work that a command leaves to the window.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Response {
+    Nothing,
+    Message(String),
+    PrintCommandLine,
+    SaveScene,
+}
+
+/// Gain at which a difference of a tenth of white is nearly white.
+const GAIN: f64 = 8.0;
+/// Angle that the camera turns when the mouse crosses the window, rad.
+const TURN: f64 = std::f64::consts::FRAC_PI_2;
+
+impl ViewState {
+    /// Starts at the scene's first frame and camera; `None` where the camera has no direction.
+    pub fn new(scene: Arc<Scene>, skips: bool) -> Option<ViewState> {
+        let camera = &scene.camera;
+        let pose = camera.pose(scene.time.start_s)?;
+        let camera = FlyCamera::new(&pose, camera.up, camera.keys.first()?.target);
+        Some(ViewState {
+            camera,
+            playback: Playback::new(scene.time.n_frames),
+            size: [scene.film.width, scene.film.height],
+            scene,
+            skips,
+            version: 0,
+            n_mode_steps: 0,
+            capture: None,
+            has_panels: false,
+            wants_counts: false,
+            variant: None,
+            comparison: Comparison::Split(0.5),
+            measures_error: false,
+            wants_readback: false,
+            n_shader_loads: 0,
+            is_closing: false,
+            held_keys: BTreeSet::new(),
+        })
+    }
+
+    /// Replaces the scene, keeps the camera, and drops B.
+    pub fn reload(&mut self, scene: Arc<Scene>) {
+        self.playback = self.playback.with_n_frames(scene.time.n_frames);
+        (self.scene, self.variant) = (scene, None);
+        self.version += 1;
+    }
+
+    /// Handles a key press; keys are named as in `SHORTCUTS`.
+    pub fn press(&mut self, key: &str) -> Response {
+        if let Some((name, _)) = FLYING_KEYS.iter().find(|(name, _)| *name == key) {
+            self.held_keys.insert(name);
+        } else if let Some(shortcut) = SHORTCUTS.iter().find(|s| s.key == key) {
+            return self.act(shortcut.command);
+        }
+        Response::Nothing
+    }
+
+    /// Handles the release of a key.
+    pub fn release(&mut self, key: &str) {
+        self.held_keys.retain(|held| *held != key);
+    }
+
+    /// Releases every key, because the window has lost the keyboard.
+    pub fn release_all(&mut self) {
+        self.held_keys.clear();
+    }
+
+    /// Carries out `command`.
+    pub fn act(&mut self, command: Command) -> Response {
+        match command {
+            Command::Advance(knob) => {
+                let scene = Arc::make_mut(&mut self.scene);
+                let (key, advanced) = (knob.key(), knob.advance(scene));
+                let value = knob.value(scene);
+                return Response::Message(match advanced {
+                    Ok(()) => {
+                        self.version += 1;
+                        format!("{key} = {value}")
+                    }
+                    Err(why) => format!("{key} stays {value}: {why}"),
+                });
+            }
+            Command::ToggleSkipping => {
+                self.skips = !self.skips;
+                self.version += 1;
+                let text = if self.skips { "skipping is on" } else { "skipping is off" };
+                return Response::Message(text.to_owned());
+            }
+            Command::ToggleB => {
+                self.version += 1;
+                let text = if self.variant.take().is_some() {
+                    "B is dropped"
+                } else {
+                    self.variant = Some(Variant { scene: self.scene.clone(), skips: self.skips });
+                    "B keeps the present settings; further changes are those of A"
+                };
+                return Response::Message(text.to_owned());
+            }
+            Command::NextComparison => {
+                self.comparison = match self.comparison {
+                    Comparison::Split(_) => Comparison::Difference(GAIN),
+                    Comparison::Difference(_) => Comparison::OnlyB,
+                    Comparison::OnlyB => Comparison::Split(0.5),
+                };
+            }
+            Command::Speed(doublings) => {
+                self.camera = self.camera.after(Motion::Speed { doublings })
+            }
+            Command::NextPresentMode => self.n_mode_steps += 1,
+            Command::Seek(seek) => self.playback = self.playback.after(seek),
+            Command::Capture(format) => self.capture = Some(format),
+            Command::TogglePanels => self.has_panels = !self.has_panels,
+            Command::Count => self.wants_counts = true,
+            Command::Compare(comparison) => self.comparison = comparison,
+            Command::ToggleError => self.measures_error = !self.measures_error,
+            Command::SaveScene => return Response::SaveScene,
+            Command::PrintCommandLine => return Response::PrintCommandLine,
+            Command::Help => return Response::Message(help()),
+            Command::Quit => self.is_closing = true,
+        }
+        Response::Nothing
+    }
+
+    /// Turns the camera after the mouse has moved by `pixels`, right and down, with a button held.
+    pub fn drag(&mut self, pixels: DVec2, orbits: bool) {
+        let turn = pixels * TURN / f64::from(self.size[0].max(1));
+        let motion = match orbits {
+            true => Motion::Orbit { right: -turn.x, upward: turn.y },
+            false => Motion::Look { right: turn.x, upward: -turn.y },
+        };
+        self.camera = self.camera.after(motion);
+    }
+
+    /// Moves the camera toward its target by notches of the wheel.
+    pub fn approach(&mut self, notches: f64) {
+        self.camera = self.camera.after(Motion::Approach { notches });
+    }
+
+    /// Flies for `seconds` along the held keys.
+    pub fn fly(&mut self, seconds: f64) {
+        let held = FLYING_KEYS.iter().filter(|(name, _)| self.held_keys.contains(name));
+        let along: DVec3 = held.map(|(_, along)| *along).sum();
+        if along != DVec3::ZERO {
+            self.camera = self.camera.after(Motion::Fly { along, seconds });
+        }
+    }
+
+    /// Takes the capture and the readback that were asked for, for a frame drawn at `version` of
+    /// this state.
+    pub fn take_readbacks(&mut self, version: u64) -> (Option<CaptureFormat>, bool) {
+        if self.version != version {
+            return (None, false);
+        }
+        (self.capture.take(), std::mem::take(&mut self.wants_readback))
+    }
+
+    /// Returns the knobs that differ from those of `first`, as `--set` takes them.
+    pub fn changed_knobs(&self, first: &Scene) -> Vec<String> {
+        let changed = Knob::ALL.iter().filter(|knob| knob.value(first) != knob.value(&self.scene));
+        changed.map(|knob| format!("{}={}", knob.key(), knob.value(&self.scene))).collect()
+    }
+
+    /// Returns the changes that turn `first`, the scene as opened, into this view, as `--set` takes
+    /// them: knobs and camera. The size is [`ViewState::size`].
+    fn changes(&self, first: &Scene) -> Vec<String> {
+        let vector = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+        let [position, target] = [self.camera.position(), self.camera.target()].map(vector);
+        let mut changes = self.changed_knobs(first);
+        if first.camera.keys.len() == 1 {
+            changes.push(format!("camera.position={position}"));
+            changes.push(format!("camera.target={target}"));
+        } else {
+            changes.push(format!(
+                "camera.path=[{{ time_s = 0.0, position = {position}, target = {target} }}]"
+            ));
+        }
+        changes
+    }
+
+    /// Returns the same changes with the window's size.
+    pub fn overrides(&self, first: &Scene) -> Vec<String> {
+        let [width, height] = self.size;
+        let size = [format!("film.width={width}"), format!("film.height={height}")];
+        size.into_iter().chain(self.changes(first)).collect()
+    }
+
+    /// Returns the command that draws this view of the scene at `path`; `first` is the scene as
+    /// opened.
+    pub fn command_line(&self, path: &str, first: &Scene) -> String {
+        let changes = self.changes(first).into_iter().map(|change| format!(" --set '{change}'"));
+        let no_skip = if self.skips { "" } else { " --no-skip" };
+        let ([width, height], i_frame) = (self.size, self.playback.i_frame());
+        format!(
+            "nimbus render {path} -o view.png --frame {i_frame} --size {width}x{height}{no_skip}{}",
+            changes.collect::<String>()
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::scene_file;
+
+    fn state() -> ViewState {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
+        ViewState::new(Arc::new(scene_file::load(&path, &[], None).unwrap().scene), true).unwrap()
+    }
+
+    #[test]
+    fn every_key_has_one_command_and_is_listed() {
+        let names: Vec<&str> =
+            SHORTCUTS.iter().map(|s| s.key).chain(FLYING_KEYS.iter().map(|f| f.0)).collect();
+        assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
+        let text = help();
+        assert!(SHORTCUTS.iter().all(|s| text.contains(s.key) && text.contains(s.description)));
+        let mut s = state();
+        let message = |text: &str| Response::Message(text.to_owned());
+        assert_eq!(s.press("t"), message("threads.mode = \"serial\""));
+        assert_eq!((s.press("k"), s.version), (message("skipping is off"), 2));
+        assert_eq!(
+            (s.press("nothing"), s.press("i")),
+            (Response::Nothing, Response::PrintCommandLine)
+        );
+        s.press("f12");
+        s.press("escape");
+        assert!(s.capture == Some(CaptureFormat::Png) && s.is_closing);
+    }
+
+    #[test]
+    fn held_keys_fly_until_they_are_released() {
+        let mut s = state();
+        let from = s.camera.position();
+        s.fly(1.0);
+        assert_eq!(s.camera.position(), from);
+        s.press("w");
+        s.press("w");
+        s.fly(0.5);
+        let ahead = s.camera.position() - from;
+        assert!((ahead.length() - 0.5 * s.camera.speed()).abs() < 1e-9 * s.camera.speed());
+        assert!(ahead.normalize().dot(s.camera.pose().forward) > 1.0 - 1e-12);
+        s.release("w");
+        s.fly(1.0);
+        assert_eq!(s.camera.position() - from, ahead);
+        // Opposite keys cancel.
+        s.press("a");
+        s.press("d");
+        s.fly(1.0);
+        assert_eq!(s.camera.position() - from, ahead);
+        s.release_all();
+        s.drag(DVec2::new(100.0, 0.0), false);
+        assert!(s.camera.pose().forward.dot(ahead.normalize()) < 0.999);
+    }
+
+    /// Reads the printed settings back as a scene with the same camera and knobs.
+    #[test]
+    fn the_command_line_draws_the_view() {
+        let mut s = state();
+        let first = s.scene.clone();
+        for key in ["l", "b", "r", "k", ".", "."] {
+            s.press(key);
+        }
+        s.drag(DVec2::new(31.0, -17.0), true);
+        let line = s.command_line("scenes/hello.toml", &first);
+        assert!(
+            line.starts_with("nimbus render scenes/hello.toml -o view.png --frame 2 --size "),
+            "{line}"
+        );
+        assert!(line.contains(" --no-skip"));
+        let set: Vec<String> = line
+            .split(" --set '")
+            .skip(1)
+            .map(|part| part.split('\'').next().unwrap().to_owned())
+            .collect();
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
+        let read = scene_file::load(&path, &set, None).unwrap().scene;
+        for knob in Knob::ALL {
+            assert_eq!(knob.value(&read), knob.value(&s.scene));
+        }
+        let key = read.camera.keys[0];
+        assert!(key.position == s.camera.position() && key.target == s.camera.target(), "{line}");
+    }
+}

@@ -19,7 +19,9 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// All pages of the repository, relative to its root.
 fn pages() -> Vec<PathBuf> {
     let mut pages: Vec<PathBuf> =
-        ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(PathBuf::from).into();
+        ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"]
+            .map(PathBuf::from)
+            .into();
     let mut folders = vec![PathBuf::from("docs")];
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(Path::new(ROOT).join(&folder)).expect("a folder of docs") {
@@ -119,7 +121,9 @@ fn shrink(mut args: Vec<String>) -> Vec<String> {
     };
     // A sweep over sizes, and arguments behind `--`, have values of their own.
     let sweeps_size = args.iter().any(|a| a.starts_with("size="));
-    for (option, value) in options.iter().filter(|(option, _)| !(sweeps_size && *option == "--size")) {
+    for (option, value) in
+        options.iter().filter(|(option, _)| !(sweeps_size && *option == "--size"))
+    {
         match args.iter().position(|a| a == option) {
             Some(i) => value.clone_into(&mut args[i + 1]),
             None => {

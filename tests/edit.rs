@@ -245,8 +245,9 @@ fn the_window_looks_as_it_did() {
         assert!(n_red > 500, "{n_red}");
     }
     // A box less is seen.
-    let kept =
-        image::open(root.join("docs/edit-both.png")).expect("the picture that is kept").to_rgb8();
+    let kept = image::open(root.join("docs/pictures/edit-both.png"))
+        .expect("the picture that is kept")
+        .to_rgb8();
     window.key("Delete");
     wait_for("a box less", || {
         apart(&window.display.seen(&window.id).2, kept.as_raw(), kept.width()) > 2.0 * ALIKE

@@ -245,9 +245,10 @@ fn every_fault_is_found_by_its_case() {
 
 #[test]
 fn the_page_lists_every_fault() {
-    let page = std::fs::read_to_string("docs/stability.md").expect("docs/stability.md");
+    let page = std::fs::read_to_string("docs/explanation/stability.md")
+        .expect("docs/explanation/stability.md");
     for (what, file, _, _, case) in FAULTS {
         let row = format!("| {what} | `{file}` | `{case}` |");
-        assert!(page.contains(&row), "docs/stability.md has no row\n{row}");
+        assert!(page.contains(&row), "docs/explanation/stability.md has no row\n{row}");
     }
 }

@@ -38,7 +38,9 @@ pub fn anchors(text: &str) -> Vec<String> {
             .collect();
         let is_repeat = |other: &&String| {
             **other == anchor
-                || other.strip_prefix(&format!("{anchor}-")).is_some_and(|n| n.parse::<u32>().is_ok())
+                || other
+                    .strip_prefix(&format!("{anchor}-"))
+                    .is_some_and(|n| n.parse::<u32>().is_ok())
         };
         let n = found.iter().filter(is_repeat).count();
         found.push(if n == 0 { anchor } else { format!("{anchor}-{n}") });

@@ -125,7 +125,7 @@ fn shrink(mut args: Vec<String>) -> Vec<String> {
         options.iter().filter(|(option, _)| !(sweeps_size && *option == "--size"))
     {
         match args.iter().position(|a| a == option) {
-            Some(i) => value.clone_into(&mut args[i + 1]),
+            Some(i) => args[i + 1] = (*value).to_owned(),
             None => {
                 let at = command.split(' ').count();
                 args.splice(at..at, [(*option).to_owned(), (*value).to_owned()]);

@@ -327,7 +327,7 @@ fn plot() {
         let order: Vec<f64> = points.windows(2).map(|w| (w[0].1 / w[1].1).log2()).collect();
         println!("{name}: {points:?}, order {order:?}");
     }
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/second-convergence.svg");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/pictures/second-convergence.svg");
     std::fs::write(path, svg(&curves)).expect("the plot");
 }
 

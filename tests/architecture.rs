@@ -1,8 +1,8 @@
 //! The rules of ARCHITECTURE.md that a machine can check: imports between rooms, one name per pass,
 //! meaningful names, file lengths, no `.unwrap()`. The checker is tested on faulty trees first.
 
-#[path = "architecture/faulty_trees.rs"]
-mod faulty_trees;
+#[path = "architecture/files.rs"]
+mod files;
 #[path = "architecture/source.rs"]
 mod source;
 
@@ -10,7 +10,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use source::{Import, Source, Token};
+use files::Graph;
+use source::{Source, Token};
 
 /// The rooms that every room may import, besides itself and `error`.
 const MAY_IMPORT: [(&str, &str); 18] = [
@@ -54,6 +55,65 @@ const SHADER_KINDS: [&str; 3] = ["comp", "vert", "frag"];
 fn sources_follow_the_architecture() {
     let complaints = check(Path::new(env!("CARGO_MANIFEST_DIR")));
     assert!(complaints.is_empty(), "{} breaches:\n{}", complaints.len(), complaints.join("\n"));
+}
+
+/// Rust files under src/.
+fn sources(root: &Path) -> Vec<Source> {
+    let paths = files_under(&root.join("src"));
+    let is_rust = |path: &&PathBuf| path.extension().is_some_and(|extension| extension == "rs");
+    let read = |path: &PathBuf| {
+        let relative = path.strip_prefix(root.join("src")).unwrap();
+        Source::read(relative, &fs::read_to_string(path).unwrap())
+    };
+    paths.iter().filter(is_rust).map(read).collect()
+}
+
+#[test]
+fn no_two_files_import_each_other_in_a_circle() {
+    let graph = Graph::new(&sources(Path::new(env!("CARGO_MANIFEST_DIR"))));
+    let circles: Vec<String> = graph.circles().iter().map(|circle| circle.join(", ")).collect();
+    assert!(circles.is_empty(), "{} circles:\n{}", circles.len(), circles.join("\n"));
+}
+
+#[test]
+fn the_diagram_shows_the_imports_between_rooms() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(root.join("ARCHITECTURE.md")).unwrap();
+    let rooms = Graph::new(&sources(root)).rooms();
+    let complaints = files::compare(&files::diagram(&text), &rooms);
+    assert!(rooms.len() > 20 && complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+#[test]
+fn circles_and_wrong_diagrams_are_reported() {
+    let tree = |files: &[(&str, &str)]| {
+        let read = |(path, text): &(&str, &str)| Source::read(Path::new(path), text);
+        Graph::new(&files.iter().map(read).collect::<Vec<_>>())
+    };
+    let circles = |files: &[(&str, &str)]| {
+        tree(files).circles().iter().map(|c| c.join(" ")).collect::<Vec<_>>()
+    };
+    let a = ("gpu/a.rs", "use super::b::B;");
+    assert_eq!(circles(&[a, ("gpu/b.rs", "")]), [""; 0]);
+    assert_eq!(circles(&[a, ("gpu/b.rs", "use crate::gpu::a;")]), ["gpu/a.rs gpu/b.rs"]);
+    assert_eq!(
+        circles(&[a, ("gpu/b.rs", "#[cfg(test)] mod tests { use crate::gpu::a; }")]),
+        [""; 0]
+    );
+    // Through a third file, and through a name that the folder hands on.
+    let c = ("gpu/c.rs", "fn f() { super::a::g() }");
+    assert_eq!(circles(&[a, ("gpu/b.rs", "use super::c::C;"), c]), ["gpu/a.rs gpu/b.rs gpu/c.rs"]);
+    let door = ("gpu/mod.rs", "mod a; mod b; pub use a::A; pub use b::{B, D as E};");
+    assert_eq!(circles(&[a, ("gpu/b.rs", "use super::A;"), door]), ["gpu/a.rs gpu/b.rs"]);
+    assert_eq!(circles(&[a, ("gpu/b.rs", ""), door]), [""; 0]);
+    // A folder that uses its own child, which uses the folder.
+    let both = [("gpu/mod.rs", "mod a; use a::A; pub struct G;"), ("gpu/a.rs", "use super::G;")];
+    assert_eq!(circles(&both), ["gpu/mod.rs gpu/a.rs"]);
+    let rooms = tree(&[("io/a.rs", "use crate::model::b;"), ("model/b.rs", "")]).rooms();
+    let drawn = |text: &str| files::compare(&files::diagram(text), &rooms);
+    assert_eq!(drawn("```mermaid\ngraph TD\n    io --> model\n```"), [""; 0]);
+    assert!(drawn("```mermaid\n```")[0].contains("no way there"));
+    assert_eq!(drawn("```mermaid\n io --> gpu\n gpu --> model\n```").len(), 2);
 }
 
 fn check(root: &Path) -> Vec<String> {

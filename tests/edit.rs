@@ -246,9 +246,10 @@ fn the_window_looks_as_in_the_documentation() {
         let n_red = last.2.chunks_exact(3).filter(|p| p[0] > 120 && p[1] < 90 && p[2] < 90).count();
         assert!(n_red > 500, "{n_red}");
     }
-    // A deleted box changes the picture.
-    let kept =
-        image::open(root.join("docs/edit-both.png")).expect("the documented picture").to_rgb8();
+    // A box less is seen.
+    let kept = image::open(root.join("docs/pictures/edit-both.png"))
+        .expect("the picture that is kept")
+        .to_rgb8();
     window.key("Delete");
     wait_for("picture without the box", || {
         difference(&window.display.pixels(&window.id).2, kept.as_raw(), kept.width())

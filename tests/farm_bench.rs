@@ -200,7 +200,8 @@ fn readers(dir: &TempDir, merged: &Path, alone: &Path) {
     let value: Value =
         serde_json::from_slice(&fs::read(merged.join("run.json")).expect("a run")).expect("JSON");
     let schema: Value =
-        serde_json::from_str(include_str!("../docs/run.schema.json")).expect("the schema");
+        serde_json::from_str(include_str!("../docs/reference/schemas/run.schema.json"))
+            .expect("the schema");
     let validator = jsonschema::draft202012::new(&schema).expect("a schema");
     assert_eq!(validator.iter_errors(&value).map(|e| e.to_string()).collect::<Vec<_>>(), [""; 0]);
 }

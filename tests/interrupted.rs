@@ -121,7 +121,8 @@ fn check_results(threading: &str, out: &str, whole: &str) {
     assert!(run.interrupted);
     let text = fs::read_to_string(Path::new(out).join("run.json")).expect("run.json");
     let schema: Value =
-        serde_json::from_str(include_str!("../docs/run.schema.json")).expect("the schema");
+        serde_json::from_str(include_str!("../docs/reference/schemas/run.schema.json"))
+            .expect("the schema");
     let json: Value = serde_json::from_str(&text).expect("JSON");
     assert!(jsonschema::is_valid(&schema, &json), "{:?}", jsonschema::validate(&schema, &json));
     // A loop of which only frames to warm up were run has no timed ones.

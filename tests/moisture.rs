@@ -2,7 +2,7 @@
 
 use nimbus::model::moisture::{Parcel, Saturation, T0_K, Vapour};
 
-const PAGE: &str = include_str!("../docs/moisture.md");
+const PAGE: &str = include_str!("../docs/explanation/moisture.md");
 
 fn law(saturation: Saturation) -> Vapour {
     Vapour { saturation, ice: false }

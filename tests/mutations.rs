@@ -238,10 +238,11 @@ fn every_fault_fails_its_case() {
 }
 
 #[test]
-fn docs_list_every_fault() {
-    let page = std::fs::read_to_string("docs/stability.md").expect("docs/stability.md");
+fn the_page_lists_every_fault() {
+    let page = std::fs::read_to_string("docs/explanation/stability.md")
+        .expect("docs/explanation/stability.md");
     for (what, file, _, _, case) in FAULTS {
         let row = format!("| {what} | `{file}` | `{case}` |");
-        assert!(page.contains(&row), "docs/stability.md has no row\n{row}");
+        assert!(page.contains(&row), "docs/explanation/stability.md has no row\n{row}");
     }
 }

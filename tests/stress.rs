@@ -19,7 +19,8 @@ fn every_case_passes() {
     let (code, stdout, stderr) = stress(&["--json", "--validation", "-q"]);
     let report: Value = serde_json::from_str(&stdout).expect("JSON");
     let schema: Value =
-        serde_json::from_str(include_str!("../docs/stress.schema.json")).expect("the schema");
+        serde_json::from_str(include_str!("../docs/reference/schemas/stress.schema.json"))
+            .expect("the schema");
     let errors: Vec<String> = jsonschema::draft202012::new(&schema)
         .expect("a schema")
         .iter_errors(&report)
@@ -39,14 +40,15 @@ fn every_case_passes() {
 }
 
 #[test]
-fn docs_explain_every_case() {
-    let page = std::fs::read_to_string("docs/stability.md").expect("docs/stability.md");
+fn every_case_is_explained() {
+    let page = std::fs::read_to_string("docs/explanation/stability.md")
+        .expect("docs/explanation/stability.md");
     let mut names = BTreeSet::new();
     for case in cases() {
         assert!(names.insert(case.name), "{} twice", case.name);
         assert!(
             page.contains(&format!("`{}`", case.name)),
-            "docs/stability.md does not name {}",
+            "docs/explanation/stability.md does not name {}",
             case.name
         );
         assert!(
@@ -59,7 +61,7 @@ fn docs_explain_every_case() {
     for word in page.split('`').skip(1).step_by(2) {
         let is_family = |f: &str| cases().iter().any(|c| c.family() == f);
         if word.split_once('/').is_some_and(|(family, _)| is_family(family)) {
-            assert!(names.contains(word), "docs/stability.md names {word}");
+            assert!(names.contains(word), "docs/explanation/stability.md names {word}");
         }
     }
     let (code, stdout, _) = stress(&["--list"]);

@@ -92,14 +92,63 @@ impl Source {
         imports
     }
 
-    /// Returns the modules that the file declares with `mod name;`.
-    fn declared_modules(&self) -> impl Iterator<Item = &str> {
-        let is_declared = |i: &usize| self.text(*i) == "mod" && self.text(i + 2) == ";";
-        (0..self.tokens.len()).filter(is_declared).map(|i| self.text(i + 1))
+    /// The module that this file is, from the crate's root.
+    pub fn module(&self) -> &[String] {
+        &self.module
     }
 
-    /// Returns the first words of paths to other crates: `ash` of `ash::vk`, but not of
-    /// `crate::ash::vk`.
+    /// Names that this file hands on by `pub use`, and the paths that they stand for.
+    pub fn handed_on(&self) -> Vec<(Vec<String>, Vec<String>)> {
+        let mut found = Vec::new();
+        for i in self.uses().filter(|&i| self.is_public(i)) {
+            for path in self.tree_at(i + 1) {
+                let Some(name) = path.last().cloned() else { continue };
+                found.push(([self.module.as_slice(), &[name]].concat(), path));
+            }
+        }
+        found
+    }
+
+    /// Paths that begin with a module which this file declares, outside `pub use` and tests.
+    pub fn paths_into_children(&self) -> Vec<Vec<String>> {
+        let children: Vec<&str> = (1..self.tokens.len())
+            .filter(|&i| self.text(i - 1) == "mod" && self.text(i + 1) == ";")
+            .map(|i| self.text(i))
+            .collect();
+        let begins = |i: &usize| {
+            children.contains(&self.text(*i))
+                && self.text(i + 1) == "::"
+                && !self.continues_a_path(*i)
+                && !self.tokens[*i].in_test
+        };
+        let starts: Vec<usize> = (0..self.tokens.len()).filter(begins).collect();
+        let is_handed_on = |i: usize| i > 0 && self.text(i - 1) == "use" && self.is_public(i - 1);
+        starts.into_iter().filter(|&i| !is_handed_on(i)).flat_map(|i| self.tree_at(i)).collect()
+    }
+
+    fn uses(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.tokens.len()).filter(|&i| self.text(i) == "use" && !self.tokens[i].in_test)
+    }
+
+    /// Whether the `use` at token `i` has `pub` or `pub(…)` before it.
+    fn is_public(&self, i: usize) -> bool {
+        let before = |n: usize| i.checked_sub(n).map_or("", |i| self.text(i));
+        before(1) == "pub" || before(1) == ")" && (2..6).any(|n| before(n) == "pub")
+    }
+
+    /// The paths of a use tree, those of this module's children made absolute.
+    fn tree_at(&self, i: usize) -> Vec<Vec<String>> {
+        let mut imports = Vec::new();
+        match self.text(i) {
+            "super" | "self" | "crate" | "nimbus" => self.read_path(i, [].iter(), &mut imports),
+            _ => {
+                self.read_tree(i, &self.module, &mut imports);
+            }
+        }
+        imports.into_iter().map(|import| import.path).collect()
+    }
+
+    /// First words of paths into other crates: `ash` of `ash::vk`, not of `crate::ash::vk`.
     pub fn crate_mentions<'a>(&'a self, crates: &'a [String]) -> impl Iterator<Item = &'a Token> {
         self.tokens.iter().enumerate().filter_map(move |(i, token)| {
             let begins_path = self.text(i + 1) == "::" || (i > 0 && self.text(i - 1) == "use");

@@ -1,0 +1,211 @@
+//! The documentation is true: links lead somewhere, lines fit, commands run, and the pages that are
+//! generated are those that the program would generate now.
+
+#[cfg(feature = "window")]
+#[path = "harness/display.rs"]
+mod display;
+#[path = "harness/markdown.rs"]
+mod markdown;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use clap::CommandFactory;
+use nimbus::cli::args::Args;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// All pages of the repository, relative to its root.
+fn pages() -> Vec<PathBuf> {
+    let mut pages: Vec<PathBuf> =
+        ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"]
+            .map(PathBuf::from)
+            .into();
+    let mut folders = vec![PathBuf::from("docs")];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(Path::new(ROOT).join(&folder)).expect("a folder of docs") {
+            let path = folder.join(entry.expect("an entry").file_name());
+            if Path::new(ROOT).join(&path).is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "md") {
+                pages.push(path);
+            }
+        }
+    }
+    pages.sort();
+    pages
+}
+
+fn read(page: &Path) -> String {
+    fs::read_to_string(Path::new(ROOT).join(page)).expect("a page")
+}
+
+#[test]
+fn links_lead_to_files_and_headings_that_exist() {
+    let mut broken = Vec::new();
+    for page in pages() {
+        for link in markdown::links(&read(&page)) {
+            if link.contains("://") {
+                continue;
+            }
+            let (file, anchor) = link.split_once('#').unwrap_or((&link, ""));
+            let target = match file {
+                "" => Path::new(ROOT).join(&page),
+                _ => Path::new(ROOT).join(&page).with_file_name("").join(file),
+            };
+            let has_anchor = || {
+                let text = fs::read_to_string(&target).unwrap_or_default();
+                anchor.is_empty() || markdown::anchors(&text).iter().any(|a| a == anchor)
+            };
+            if !target.exists() || !has_anchor() {
+                broken.push(format!("{}: {link}", page.display()));
+            }
+        }
+    }
+    assert!(broken.is_empty(), "broken links:\n{}", broken.join("\n"));
+}
+
+#[test]
+fn lines_fit_into_100_columns() {
+    let is_long = |line: &&str| line.chars().count() > 100 && !line.contains("http");
+    let long: Vec<String> = pages()
+        .iter()
+        .map(|page| (page, read(page).lines().filter(is_long).count()))
+        .filter(|(_, n)| *n > 0)
+        .map(|(page, n)| format!("{}: {n} lines", page.display()))
+        .collect();
+    assert!(long.is_empty(), "lines of more than 100 columns:\n{}", long.join("\n"));
+}
+
+#[test]
+fn readme_and_architecture_stay_short() {
+    for page in ["README.md", "ARCHITECTURE.md"] {
+        let n_lines = read(Path::new(page)).lines().count();
+        assert!(n_lines <= 120, "{page} has {n_lines} lines, the limit is 120");
+    }
+}
+
+/// Set `NIMBUS_BLESS=1` to write the page instead of comparing it.
+#[test]
+fn the_page_of_commands_is_what_help_prints() {
+    let page = "docs/reference/commands.md";
+    let expected = markdown::commands(Args::command());
+    if std::env::var_os("NIMBUS_BLESS").is_some() {
+        fs::write(Path::new(ROOT).join(page), &expected).expect("the page");
+    }
+    assert!(read(Path::new(page)) == expected, "{page} is out of date: run with NIMBUS_BLESS=1");
+}
+
+/// Options that make a command of the docs small; "" stands for a command without subcommand.
+const SMALL: [(&str, &[(&str, &str)]); 8] = [
+    ("render", &[("--size", "64x48")]),
+    ("bench", &[("--size", "64x48"), ("--frames", "2"), ("--warmup", "1"), ("--repeat", "2")]),
+    ("error", &[("--size", "64x48"), ("--pixels", "64"), ("--rounds", "2"), ("--frames", "1")]),
+    ("ledger", &[("--size", "64x48"), ("--pixels", "64"), ("--rounds", "2"), ("--frames", "1")]),
+    ("inspect", &[("--size", "64x48")]),
+    ("view", &[("--size", "64x48"), ("--frames", "3")]),
+    ("farm plan", &[("--size", "64x48")]),
+    ("farm calibrate", &[("--size", "64x48")]),
+];
+
+/// The arguments of a command, with its small options in place of those that the page shows.
+fn shrink(mut args: Vec<String>) -> Vec<String> {
+    let name = args.iter().take_while(|a| !a.starts_with('-')).take(2).cloned().collect::<Vec<_>>();
+    let is_named = |command: &str| {
+        let words: Vec<&str> = command.split(' ').collect();
+        name.len() >= words.len() && words.iter().zip(&name).all(|(word, arg)| word == arg)
+    };
+    let Some((command, options)) = SMALL.iter().find(|(command, _)| is_named(command)) else {
+        return args;
+    };
+    // A sweep over sizes, and arguments behind `--`, have values of their own.
+    let sweeps_size = args.iter().any(|a| a.starts_with("size="));
+    for (option, value) in
+        options.iter().filter(|(option, _)| !(sweeps_size && *option == "--size"))
+    {
+        match args.iter().position(|a| a == option) {
+            Some(i) => args[i + 1] = (*value).to_owned(),
+            None => {
+                let at = command.split(' ').count();
+                args.splice(at..at, [(*option).to_owned(), (*value).to_owned()]);
+            }
+        }
+    }
+    args
+}
+
+/// The words that a shell makes of `text`.
+fn words(text: &str) -> Vec<String> {
+    let output = Command::new("bash")
+        .args(["-c", &format!("printf '%s\\0' {text}")])
+        .current_dir(ROOT)
+        .output()
+        .expect("bash runs");
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    text.split_terminator('\0').map(str::to_owned).collect()
+}
+
+/// Runs the commands of one page, in order, in a folder of their own.
+fn run_page(page: &Path) -> Vec<String> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for name in ["scenes", "shaders"] {
+        std::os::unix::fs::symlink(Path::new(ROOT).join(name), folder.path().join(name))
+            .expect("a link");
+    }
+    #[cfg(feature = "window")]
+    let display = display::Display::open();
+    let mut failures = Vec::new();
+    for line in markdown::shell_lines(&read(page)) {
+        let mut command = match line.strip_prefix("tools/nimbus ") {
+            Some(rest) => {
+                let mut command = Command::new(env!("CARGO_BIN_EXE_nimbus"));
+                command.args(shrink(words(rest)));
+                command
+            }
+            None if line.starts_with("cp ") || line.starts_with("mkdir ") => {
+                let mut command = Command::new("bash");
+                command.args(["-c", &line]);
+                command
+            }
+            None => continue,
+        };
+        #[cfg(feature = "window")]
+        command.env("DISPLAY", display.name());
+        let output =
+            command.current_dir(folder.path()).stdin(Stdio::null()).output().expect("it runs");
+        if !output.status.success() {
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            failures.push(format!("{}: {line}: {}\n{said}", page.display(), output.status));
+        }
+    }
+    failures
+}
+
+#[test]
+fn commands_of_the_pages_run() {
+    let mut failures = Vec::new();
+    for page in pages() {
+        failures.extend(run_page(&page));
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+#[test]
+fn a_command_is_made_small_wherever_its_options_stand() {
+    let args = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(shrink(args("render a.toml")), args("render --size 64x48 a.toml"));
+    assert_eq!(shrink(args("render a.toml --size 9x9")), args("render a.toml --size 64x48"));
+    assert_eq!(shrink(args("devices --json")), args("devices --json"));
+    let sweep = shrink(args("bench a.toml --sweep size=8x8,9x9"));
+    assert!(!sweep.contains(&"--size".to_owned()) && sweep.contains(&"--warmup".to_owned()));
+}
+
+#[test]
+fn pages_are_read_as_they_are_shown() {
+    let text = "# A `b` C\n[x](y.md#z) ![p](q.png)\n```sh\ntools/nimbus render \\\n  a # c\nls\n```\n\
+                ```toml\n[a](b)\n```\n## A `b` C\n";
+    assert_eq!(markdown::links(text), ["y.md#z", "q.png"]);
+    assert_eq!(markdown::anchors(text), ["a-b-c", "a-b-c-1"]);
+    assert_eq!(markdown::shell_lines(text), ["tools/nimbus render a", "ls"]);
+}

@@ -14,7 +14,7 @@ use nimbus::io::scene_file;
 use nimbus::model::cutoff::Cutoff;
 use nimbus::model::scene::{LightingMode, Scene, Threading};
 use nimbus::reference::picture::{BlobModel, Pixels, ReferenceKind, RenderStage, drawn_as_set};
-use nimbus::viewer::judge::{Judge, Progress, Standing, View};
+use nimbus::viewer::error_probe::{ErrorProbe, ProbeRequest, ProbeStatus, Progress};
 
 /// Returns a view of hello.toml without texture, from the side.
 fn view(set: &[&str]) -> ProbeRequest {
@@ -27,12 +27,12 @@ fn view(set: &[&str]) -> ProbeRequest {
     ProbeRequest { scene, position, target, time_s: 0.0, size: [64, 48], kind }
 }
 
-/// As `Renderer::image` would give it, of an exact device.
-fn exact_picture(view: &View) -> Vec<f32> {
+/// Returns the picture that `Renderer::image` would return on an exact device.
+fn exact_picture(view: &ProbeRequest) -> Vec<f32> {
     let drawing =
-        if view.against == ReferenceKind::Thin { BlobModel::Thin } else { BlobModel::Volume };
+        if view.kind == ReferenceKind::Thin { BlobModel::Thin } else { BlobModel::Volume };
     let rgba = drawn_as_set(
-        &ReferenceKind::without_approximations(&view.exact()),
+        &ReferenceKind::without_approximations(&view.exact_scene()),
         view.time_s,
         drawing,
         &|_, _| (),
@@ -127,8 +127,8 @@ fn without_a_budget_the_reference_has_a_few_pixels() {
 #[test]
 fn a_few_pixels_are_bitwise_those_of_the_whole_picture() {
     for set in [&["lighting.mode=first", "cloud.0.texture=\"2\""][..], &["lighting.mode=none"]] {
-        let view = View { size: [61, 47], against: ReferenceKind::Thin, ..view(set) };
-        let scene = ReferenceKind::without_approximations(&view.exact());
+        let view = ProbeRequest { size: [61, 47], kind: ReferenceKind::Thin, ..view(set) };
+        let scene = ReferenceKind::without_approximations(&view.exact_scene());
         let whole = drawn_as_set(&scene, 0.0, BlobModel::Thin, &|_, _| ()).unwrap().rgba;
         for n in [1, 30, 200, usize::MAX] {
             let pixels = Pixels::sample(61, 47, n);
@@ -187,8 +187,8 @@ fn a_long_computation_reports_progress_and_stops_when_replaced() {
     // The budget pays for all rows.
     probe.request(ProbeRequest { size: [1024, 1024], ..view(&[]) });
     let begin = Instant::now();
-    let counts = |judge: &Judge| {
-        judge.standing().progress.filter(|p| p.work == RenderStage::Drawing && p.n_done > 1)
+    let counts = |probe: &ErrorProbe| {
+        probe.status().progress.filter(|p| p.work == RenderStage::Drawing && p.n_done > 1)
     };
     let mut seen = None;
     while seen.is_none() {
@@ -230,12 +230,11 @@ fn the_devices_picture_has_the_expected_error() {
         (&[], LIT),
     ] {
         let mut view = view(set);
-        view.against = ReferenceKind::Thin;
-        let judge = Judge::new(None, LONG).unwrap();
-        judge.ask(view.clone());
-        // As the truth is drawn, of which nothing is left out; only the device's f32 and f16 are
-        // between them.
-        let exact = ReferenceKind::without_approximations(&view.exact());
+        view.kind = ReferenceKind::Thin;
+        let probe = ErrorProbe::new(None, LONG).unwrap();
+        probe.request(view.clone());
+        // The scene of the reference leaves nothing out, so only the device's f32 and f16 differ.
+        let exact = ReferenceKind::without_approximations(&view.exact_scene());
         let pose = exact.camera.pose(0.0).unwrap();
         let size = view.size;
         let scene_of_window = Scene { camera: view.scene.camera.clone(), ..exact };

@@ -112,7 +112,7 @@ fn cut_of(picture: &Picture) -> Vec<Omitted> {
     let sheets = picture.sheets();
     let factor = |j: usize, delta: DVec2| picture.factor(&sheets, j, delta);
     // Pixels with an uncertain background have no bound.
-    cut(&picture.view, &behind, &picture.blobs(), Some(&factor))
+    omitted(&picture.view, &behind, &picture.blobs(), Some(&factor))
 }
 
 /// Returns by how much omitted parts may change each of a pixel's four values.

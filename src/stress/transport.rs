@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::layout::facet::LitRecord;
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
-use crate::reference::picture::stages::FrameReference;
+use crate::reference::picture::FrameReference;
 use crate::reference::rounding::U_F32;
 
 pub const CASES: &[Case] = &[
@@ -135,7 +135,7 @@ fn touching(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     let [floor, wall, _] = corner(7);
     let scene = surface_scene(EXACT, &sun("[0.2, -1, -0.7]"), GREY, [floor, wall])?;
     let frame = ctx.render(&scene, 0)?;
-    let truth = FrameReference::of(&scene, 0.0)?;
+    let truth = FrameReference::new(&scene, 0.0)?;
     second(c, &frame);
     let most = truth.second.iter().map(|l| l.max_element()).fold(0.0, f64::max);
     for (i, (lit, truth)) in frame.lit.iter().zip(&truth.second).enumerate() {

@@ -92,6 +92,12 @@ impl Source {
         imports
     }
 
+    /// Returns the modules that the file declares with `mod name;`.
+    fn declared_modules(&self) -> impl Iterator<Item = &str> {
+        let is_declared = |i: &usize| self.text(*i) == "mod" && self.text(i + 2) == ";";
+        (0..self.tokens.len()).filter(is_declared).map(|i| self.text(i + 1))
+    }
+
     /// The module that this file is, from the crate's root.
     pub fn module(&self) -> &[String] {
         &self.module
@@ -148,7 +154,8 @@ impl Source {
         imports.into_iter().map(|import| import.path).collect()
     }
 
-    /// First words of paths into other crates: `ash` of `ash::vk`, not of `crate::ash::vk`.
+    /// Returns the first words of paths to other crates: `ash` of `ash::vk`, but not of
+    /// `crate::ash::vk`.
     pub fn crate_mentions<'a>(&'a self, crates: &'a [String]) -> impl Iterator<Item = &'a Token> {
         self.tokens.iter().enumerate().filter_map(move |(i, token)| {
             let begins_path = self.text(i + 1) == "::" || (i > 0 && self.text(i - 1) == "use");

@@ -1,5 +1,5 @@
-//! A virtual display with input for its windows: Xvfb and xdotool, which `tools/bootstrap tests`
-//! installs. If they are missing, the test fails.
+//! A virtual display with its keyboard and mouse: Xvfb and xdotool, which `tools/bootstrap tests`
+//! installs. A test fails where they are missing.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -30,11 +30,11 @@ impl Drop for Display {
 }
 
 impl Display {
-    /// Starts a display on a free number.
+    /// Starts a server on a free display number.
     pub fn open() -> Display {
         let mut server = Command::new("Xvfb")
-            // -noreset: otherwise the server resets when its last client leaves, and a client that
-            // connects at that moment fails. Every call of xdotool is a client.
+            // By default the server resets when its last client leaves. xdotool is a new client for
+            // each command, and a client that connects during a reset is lost.
             .args([
                 "-displayfd",
                 "1",
@@ -59,31 +59,24 @@ impl Display {
         &self.name
     }
 
-    /// Returns the output of xdotool.
+    /// Runs xdotool. Returns its output where it succeeds.
     pub fn xdotool(&self, args: &[&str]) -> Option<String> {
         let output = Command::new("xdotool").args(args).env("DISPLAY", &self.name).output();
         let output = output.expect("xdotool: tools/bootstrap tests installs it");
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     }
 
-    /// Waits for the window of a process.
+    /// Waits for the window of a process, and gives it the keyboard.
     pub fn window_of(&self, pid: u32) -> String {
         let mut window = None;
         wait_for("window", || {
             let found = self.xdotool(&["search", "--onlyvisible", "--pid", &pid.to_string()]);
-            if let Some(window) = found.and_then(|all| all.lines().next().map(str::to_owned)) {
-                return window;
-            }
-            assert!(begin.elapsed() < Duration::from_secs(60), "no window");
-            std::thread::sleep(Duration::from_millis(50));
-        }
-    }
-
-    /// Gives a window the keyboard focus.
-    pub fn focus(&self, window: &str) {
-        self.xdotool(&["windowfocus", "--sync", window]).expect("the focus");
-        // The window receives the focus event later.
-        std::thread::sleep(Duration::from_millis(500));
+            window = found.and_then(|all| all.lines().next().map(str::to_owned));
+            window.is_some()
+        });
+        let window = window.expect("found");
+        self.xdotool(&["windowfocus", "--sync", &window]).expect("the focus");
+        window
     }
 
     /// Presses and releases a key.
@@ -91,7 +84,7 @@ impl Display {
         self.xdotool(&["key", "--delay", "30", name]).expect("a key");
     }
 
-    /// Types characters.
+    /// Types characters, one after the other.
     pub fn types(&self, text: &str) {
         self.xdotool(&["type", "--delay", "30", "--", text]).expect("text");
     }
@@ -101,9 +94,8 @@ impl Display {
         self.xdotool(&["getwindowname", window]).unwrap_or_default()
     }
 
-    /// Returns the picture of a window: columns, rows, and red, green and blue bytes of every
-    /// pixel.
-    pub fn seen(&self, window: &str) -> (u32, u32, Vec<u8>) {
+    /// Returns width, height and RGB bytes of a window's content.
+    pub fn pixels(&self, window: &str) -> (u32, u32, Vec<u8>) {
         use x11rb::connection::Connection;
         use x11rb::protocol::xproto::{ConnectionExt, ImageFormat};
         let (connection, _) = x11rb::connect(Some(&self.name)).expect("the display");
@@ -128,7 +120,7 @@ impl Display {
             .expect("a size");
     }
 
-    /// Drags from one position of a window to another with a button pressed.
+    /// Moves the pointer between two places of the window with a button held.
     pub fn drag(&self, window: &str, button: u32, from: [u32; 2], to: [u32; 2]) {
         let [x, y] = from.map(|v| v.to_string());
         let [to_x, to_y] = to.map(|v| v.to_string());

@@ -12,9 +12,7 @@ use rayon::ThreadPool;
 use super::request::{ProbeRequest, ReferencePicture};
 use crate::error::Result;
 use crate::model::scene::Scene;
-use crate::reference::picture::kind::Reference;
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::whole::Work;
+use crate::reference::picture::{Pixels, Reference, RenderStage};
 use crate::studies::reference_cache::{self, Kept};
 use crate::viewer::sync::lock;
 
@@ -22,7 +20,7 @@ use crate::viewer::sync::lock;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
     /// Kind of the parts.
-    pub work: Work,
+    pub work: RenderStage,
     /// Facets or rows that are done.
     pub n_done: usize,
     /// Facets or rows in all.
@@ -173,7 +171,7 @@ impl Worker {
     /// request has changed.
     fn reference(&self, job: &Job, pixels: Pixels) -> Result<Arc<ReferencePicture>> {
         let n_pixels = pixels.at.len();
-        let on_progress = |work: Work, n: usize| {
+        let on_progress = |work: RenderStage, n: usize| {
             let mut state = self.lock_current(job);
             let before = state.status.progress.filter(|p| p.work == work && p.n_pixels == n_pixels);
             let n_done = before.map_or(1, |p| p.n_done + 1);

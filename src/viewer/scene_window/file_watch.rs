@@ -185,7 +185,7 @@ mod tests {
         fs::write(dir.path().join("a~"), "y").unwrap();
         // Events arrive in order, so the first one reported is that of `c`.
         let c = dir.path().join("c");
-        watch.set_scene_files(&[c.clone()]);
+        watch.set_scene_files(std::slice::from_ref(&c));
         fs::write(&a, "z").unwrap();
         fs::write(&c, "z").unwrap();
         assert_eq!(next(&mut watch), SCENE);

@@ -36,16 +36,29 @@ impl<'a> Window<'a> {
         let id = display.window_of(child.id());
         let window = Window { display, id, child };
         window.wait_for_title(|title| title.contains("| nimbus"));
-        // A change makes the title begin with a star. Undoing all of them restores the file.
-        wait_for("answer to a key", || {
-            window.key("a");
-            window.is_dirty()
-        });
-        wait_for("undone change", || {
-            window.key("ctrl+z");
-            !window.is_dirty()
-        });
+        if box_file::read(&dir.join(file)).is_err() {
+            // A change makes the title begin with a star.
+            window.press_until("a", || window.is_dirty());
+            window.press_until("ctrl+z", || !window.is_dirty());
+        } else {
+            // Selecting leaves no trace in the history, which the buttons show.
+            window.press_until("Tab", || window.has_red_box());
+            window.press_until("Escape", || !window.has_red_box());
+        }
         window
+    }
+
+    /// Presses a key again and again until `condition` holds: a window may miss the first ones.
+    fn press_until(&self, key: &str, condition: impl Fn() -> bool) {
+        wait_for("answer to a key", || {
+            self.key(key);
+            condition()
+        });
+    }
+
+    /// Returns whether the active box, which is red, is in the picture.
+    fn has_red_box(&self) -> bool {
+        n_red(&self.display.pixels(&self.id).2) > 500
     }
 
     fn key(&self, name: &str) {
@@ -94,6 +107,10 @@ impl<'a> Window<'a> {
         assert!(output.status.success(), "{text}");
         text
     }
+}
+
+fn n_red(rgb: &[u8]) -> usize {
+    rgb.chunks_exact(3).filter(|p| p[0] > 120 && p[1] < 90 && p[2] < 90).count()
 }
 
 /// The first lines of P, Table 2, as printed.
@@ -243,8 +260,7 @@ fn the_window_looks_as_in_the_documentation() {
                 && difference(&last.2, expected.as_raw(), last.0) < MAX_DIFFERENCE
         });
         // The active box is red.
-        let n_red = last.2.chunks_exact(3).filter(|p| p[0] > 120 && p[1] < 90 && p[2] < 90).count();
-        assert!(n_red > 500, "{n_red}");
+        assert!(n_red(&last.2) > 500);
     }
     // A box less is seen.
     let kept = image::open(root.join("docs/pictures/edit-both.png"))

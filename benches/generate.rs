@@ -10,14 +10,15 @@ use std::path::Path;
 use divan::Bencher;
 use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, MemoryUsage};
 use nimbus::io::box_file;
-use nimbus::layout::particle::{BoxLaw, BoxRecord, ParticleRecord};
+use nimbus::layout::particle::{BoxRecord, ParticleRecord};
 use nimbus::measure::stats::Summary;
-use nimbus::model::boxes::{CloudBox, Form, MAX_ATTEMPTS};
+use nimbus::model::boxes::{BoxLaw, CloudBox, Form, MAX_ATTEMPTS};
 use nimbus::passes::{self, generate::Generate};
 use nimbus::reference::generate::{Acceptance, generate_box};
 
 const COUNTS: [u32; 5] = [1_000, 10_000, 50_000, 100_000, 1_000_000];
-const LAW: BoxLaw = BoxLaw { form: Form::Centred, optical_depth: 1.0, radius_scale: 0.6, seed: 1 };
+const LAW: BoxLaw = BoxLaw { radius_scale: 0.6, ..BoxLaw::new(Form::Centred) };
+const SEED: u32 = 1;
 
 /// The paper's seventeen boxes with `n` particles in place of 554, each box its share.
 fn boxes(n: u32) -> Vec<CloudBox> {
@@ -51,7 +52,7 @@ impl OnGpu {
         let mut commands = Commands::new(&device, "bench").expect("commands");
         let (mut records, mut i_group) = (Vec::new(), Vec::new());
         for (b, i_box) in boxes(n).iter().zip(0u32..) {
-            records.push(BoxRecord::new(b, &LAW, i_box, i_group.len() as u32));
+            records.push(BoxRecord::new(b, &LAW, SEED, i_box, i_group.len() as u32));
             i_group.resize(i_group.len() + b.n_particles as usize, i_box);
         }
         let mut upload = |words: &[u32]| {
@@ -95,7 +96,7 @@ impl OnGpu {
 
 fn loop_f64(boxes: &[CloudBox]) {
     for (b, i_box) in boxes.iter().zip(0u32..) {
-        black_box(generate_box(b, i_box, LAW.seed, LAW.form, LAW.optical_depth, LAW.radius_scale));
+        black_box(generate_box(b, i_box, SEED, &LAW));
     }
 }
 
@@ -110,7 +111,7 @@ fn table() {
     let made: Vec<_> = boxes(50_000)
         .iter()
         .zip(0u32..)
-        .flat_map(|(b, i)| generate_box(b, i, 1, LAW.form, 1.0, 0.6))
+        .flat_map(|(b, i)| generate_box(b, i, SEED, &LAW))
         .collect();
     let rate = Acceptance::of(&made).rate().unwrap_or(f64::NAN);
     println!(

@@ -1,52 +1,96 @@
 //! One error type, by cause. Each message says what was wrong, where (file:line:column, key, or
-//! pass and Vulkan call) and what was expected, so that a command prints it and nothing else.
+//! pass and Vulkan call) and what was expected, so that a command prints the message alone.
 
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
+/// Result of an operation of nimbus.
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// A failure, by cause.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Error {
     /// Bad input: a scene file, a box file, a particle list, a value given with `--set`.
-    Scene { at: Place, what: String },
+    Scene {
+        /// Place of the fault.
+        at: Place,
+        /// Message.
+        what: String,
+    },
     /// A shader that does not compile or does not match the host's declaration of it.
-    Shader { name: String, what: String },
+    Shader {
+        /// Name of the shader.
+        name: String,
+        /// Message.
+        what: String,
+    },
     /// A Vulkan call that failed, or no device to make it on.
-    Vulkan { call: String, what: String },
-    /// A wish beyond what the device or nimbus can hold; found before anything is allocated.
-    Limit { what: String },
+    Vulkan {
+        /// Name of the Vulkan call.
+        call: String,
+        /// Message.
+        what: String,
+    },
+    /// A request beyond a limit of the device or of nimbus, found before anything is allocated.
+    Limit {
+        /// Message.
+        what: String,
+    },
     /// A file that cannot be read or written.
-    Io { path: PathBuf, what: String },
+    Io {
+        /// Path of the file.
+        path: PathBuf,
+        /// Message.
+        what: String,
+    },
     /// Arguments that do not fit together.
-    Usage { what: String },
+    Usage {
+        /// Message.
+        what: String,
+    },
     /// A check that was asked for and failed (validation messages, a comparison).
-    Check { what: String },
+    Check {
+        /// Message.
+        what: String,
+    },
     /// A fault of nimbus itself: a thread that panicked.
-    Fault { what: String },
-    /// What may be otherwise later or elsewhere: a shard of a farm is worth another try.
-    Transient { what: String },
+    Fault {
+        /// Message.
+        what: String,
+    },
+    /// A failure that may pass later or on another node, so that another try is worth it.
+    Transient {
+        /// Message.
+        what: String,
+    },
     /// Two results of the same work that differ.
-    Conflict { what: String },
-    /// Ctrl-C; what was finished is kept.
+    Conflict {
+        /// Message.
+        what: String,
+    },
+    /// Ctrl-C. Finished results are kept.
     Interrupted,
 }
 
-/// Where an input went wrong. Lines and columns count from 1; 0 means "the whole file".
+/// Place of a fault in an input.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Place {
     /// File name as given, or `--set key=value`.
     pub source: String,
+    /// Line, from 1; 0 for the whole file.
     pub line: usize,
+    /// Column in characters, from 1; 0 for the whole line.
     pub column: usize,
 }
 
 impl Place {
+    /// Returns a place that is a whole file.
     pub fn file(path: &Path) -> Self {
         Place { source: path.display().to_string(), line: 0, column: 0 }
     }
 
+    /// Returns a line and a column, both from 1, of a file.
     pub fn line(path: &Path, line: usize, column: usize) -> Self {
         Place { source: path.display().to_string(), line, column }
     }
@@ -63,10 +107,12 @@ impl fmt::Display for Place {
 }
 
 impl Error {
+    /// Returns an [`Error::Scene`].
     pub fn scene(at: Place, what: impl Into<String>) -> Self {
         Error::Scene { at, what: what.into() }
     }
 
+    /// Returns an [`Error::Io`].
     pub fn io(path: &Path, cause: impl fmt::Display) -> Self {
         Error::Io { path: path.to_owned(), what: cause.to_string() }
     }
@@ -98,19 +144,22 @@ impl Error {
         Error::Transient { what: format!("{}: {cause}", path.display()) }
     }
 
+    /// Returns an [`Error::Vulkan`].
     pub fn vulkan(call: impl Into<String>, cause: impl fmt::Display) -> Self {
         Error::Vulkan { call: call.into(), what: cause.to_string() }
     }
 
+    /// Returns an [`Error::Limit`].
     pub fn limit(what: impl Into<String>) -> Self {
         Error::Limit { what: what.into() }
     }
 
+    /// Returns an [`Error::Usage`].
     pub fn usage(what: impl Into<String>) -> Self {
         Error::Usage { what: what.into() }
     }
 
-    /// The same error with where it happened, such as which part of a run.
+    /// Adds to the message where the error happened, such as a part of a run.
     pub fn within(mut self, place: &str) -> Self {
         match &mut self {
             Error::Scene { what, .. }
@@ -128,9 +177,9 @@ impl Error {
         self
     }
 
-    /// 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 70 results that
-    /// contradict each other; 75 worth another try (as sysexits.h has the two); 101 a fault of
-    /// nimbus itself; 130 interrupted.
+    /// Returns the exit code of the program: 1 a check failed, 2 bad input or usage, 3 device or
+    /// driver, 70 results that contradict each other, 75 worth another try, 101 a fault of nimbus
+    /// itself, 130 interrupted. 70 and 75 are those of sysexits.h.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Check { .. } => 1,

@@ -1,4 +1,4 @@
-//! Scene keys of clouds from a disc, and of the air: what they come to, and what is refused.
+//! Scene keys of clouds from a disc and of the air: accepted and refused values.
 
 use std::path::Path;
 
@@ -56,7 +56,7 @@ fn a_disc_alone_is_a_complete_cloud() {
 }
 
 #[test]
-fn bases_are_numbers_or_the_airs() {
+fn a_base_is_a_number_or_the_condensation_height() {
     let condensation = |keys: &str| disc(&good(keys).clouds[0]).condensation;
     let at = |keys: &str| condensation(&format!("{DISC}position = [0, 2, 0]\n{keys}"));
     assert_eq!(at("base = 'none'"), None);
@@ -95,7 +95,7 @@ fn air_has_a_humidity_or_a_dew_point() {
 }
 
 #[test]
-fn what_a_disc_or_air_cannot_be_is_refused_by_key() {
+fn wrong_values_of_discs_and_air_are_refused_by_key() {
     for (text, what) in [
         ("grow_to = 2", "unknown key `cloud.0.grow_to`"),
         ("file = 'a'", "unknown key `cloud.0.file`"),
@@ -109,7 +109,11 @@ fn what_a_disc_or_air_cannot_be_is_refused_by_key() {
             "`cloud.0.base`: expected a number from -1e15 to 1e15, \"lcl\" or \"none\", found \
              string \"lcm\"",
         ),
-        ("base = true", "`cloud.0.base`: expected a number, found boolean true"),
+        (
+            "base = true",
+            "`cloud.0.base`: expected a number from -1e15 to 1e15, \"lcl\" or \"none\", found \
+             boolean true",
+        ),
         (
             "wind = [1e15, 0, 0]",
             "`cloud.0.from`: its particles' places: expected at most 1e15, found 2.000e16",

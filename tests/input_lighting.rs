@@ -1,4 +1,4 @@
-//! What scene files say of light: surfaces, lights, materials, the second reflection.
+//! Scene keys of light: surfaces, lights, materials, the second reflection.
 
 #[path = "harness/scene_text.rs"]
 mod scene_text;
@@ -15,7 +15,7 @@ use serde_json::json;
 
 const FLOOR: &str = "[[surface]]\ncenter = [0, -1, 0]\nu = [0, 0, 2]\nv = [3, 0, 0]\n";
 
-/// What it came to is a scene that says the same.
+/// Checks that the resolved scene, read as a scene file, is the same scene.
 fn assert_reads_back(loaded: &LoadedScene) {
     let again = good(&to_toml(&loaded.resolved));
     assert_eq!(
@@ -38,7 +38,8 @@ fn a_surface_is_a_rectangle_of_facets() {
     assert_eq!((loaded.scene.n_facets(), loaded.scene.n_regions()), (64, 1));
     assert_eq!(
         loaded.resolved["surface"],
-        json!([{ "center": [0.0, -1.0, 0.0], "u": [0.0, 0.0, 2.0], "v": [3.0, 0.0, 0.0], "material": "cloud", "subdivide": [8, 8] }])
+        json!([{ "center": [0.0, -1.0, 0.0], "u": [0.0, 0.0, 2.0], "v": [3.0, 0.0, 0.0],
+        "material": "cloud", "subdivide": [8, 8] }])
     );
     assert_reads_back(&loaded);
     // As steep to each other as typed digits leave them, and as large as nimbus carries.
@@ -96,7 +97,8 @@ fn point_lights_and_spots() {
     assert_eq!(
         loaded.resolved["light"][1],
         json!({
-            "kind": "spot", "position": [1.0, 2.0, 3.0], "direction": [0.0, -2.0, 0.0], "intensity": [4.0, 5.0, 6.0],
+            "kind": "spot", "position": [1.0, 2.0, 3.0], "direction": [0.0, -2.0, 0.0],
+            "intensity": [4.0, 5.0, 6.0],
             "inner_deg": 0.0, "outer_deg": 45.0, "radius": 1e-3,
         })
     );
@@ -111,8 +113,8 @@ fn a_material_can_change_over_time() {
     );
     let m = &loaded.scene.materials[0];
     let first = Brdf { kd: DVec3::splat(0.9), ks: 0.1 * DVec3::X, ns: 20.0 };
-    // What a key leaves out is as in the key before it; the first one's is as in a material without
-    // a path.
+    // An entry has the settings of the one before it where it sets none; the first entry those of a
+    // material without a path.
     assert_eq!(
         (m.at(0.0), m.at(1.0), m.at(3.0)),
         (first, first, Brdf { kd: DVec3::splat(0.5), ..first })
@@ -173,7 +175,7 @@ fn the_second_reflection_has_its_keys() {
 }
 
 #[test]
-fn the_basis_is_made_for_the_exponents_that_there_are() {
+fn the_default_range_of_exponents_covers_the_materials() {
     let with = |given: &str, materials: &str| {
         let scene = format!("[lighting]\n{given}\n{materials}");
         load_with(&scene, &[], None).map(|loaded| loaded.scene.lighting.exponents)
@@ -202,7 +204,7 @@ fn the_basis_is_made_for_the_exponents_that_there_are() {
 }
 
 #[test]
-fn whatever_is_lit_otherwise_has_another_hash() {
+fn scenes_lit_differently_have_different_hashes() {
     let texts = [
         FLOOR.to_owned(),
         FLOOR.replace("[0, -1, 0]", "[0, -1.5, 0]"),

@@ -5,8 +5,8 @@ mod harness;
 use glam::DVec3;
 use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::{Compiler, Kernel};
-use nimbus::layout::particle::{BoxLaw, BoxRecord, FORM_GIVEN, ParticleRecord};
-use nimbus::model::boxes::{CloudBox, Form, MAX_ATTEMPTS};
+use nimbus::layout::particle::{BoxRecord, FORM_GIVEN, ParticleRecord};
+use nimbus::model::boxes::{BoxLaw, CloudBox, Form, MAX_ATTEMPTS};
 use nimbus::model::cloud::SIGMA_PER_RADIUS;
 use nimbus::passes::generate::{FOLDED, Generate, Push};
 use nimbus::reference::generate::{Generated, generate_particle};
@@ -14,8 +14,14 @@ use nimbus::reference::rounding::{ParticleBound, U_F32, particle_bound};
 
 const FORMS: [Form; 2] = [Form::Centred, Form::Printed];
 
-fn law(form: Form) -> BoxLaw {
-    BoxLaw { form, optical_depth: 1.3, radius_scale: 0.6, seed: 1 }
+/// Law of the boxes and seed of their cloud.
+struct SeededLaw {
+    law: BoxLaw,
+    seed: u32,
+}
+
+fn law(form: Form) -> SeededLaw {
+    SeededLaw { law: BoxLaw { form, optical_depth: 1.3, radius_scale: 0.6 }, seed: 1 }
 }
 
 fn paper_boxes(name: &str) -> Vec<CloudBox> {
@@ -28,10 +34,10 @@ fn one_box(n_particles: u32, extent: [f64; 3], radius_max: f64) -> CloudBox {
 }
 
 /// Records and the group of every particle.
-fn records(boxes: &[CloudBox], law: &BoxLaw) -> (Vec<BoxRecord>, Vec<u32>) {
+fn records(boxes: &[CloudBox], law: &SeededLaw) -> (Vec<BoxRecord>, Vec<u32>) {
     let (mut list, mut i_group) = (vec![], vec![]);
     for (b, i_box) in boxes.iter().zip(0..) {
-        list.push(BoxRecord::new(b, law, i_box, i_group.len() as u32));
+        list.push(BoxRecord::new(b, &law.law, law.seed, i_box, i_group.len() as u32));
         i_group.extend(std::iter::repeat_n(i_box, b.n_particles as usize));
     }
     (list, i_group)
@@ -39,7 +45,7 @@ fn records(boxes: &[CloudBox], law: &BoxLaw) -> (Vec<BoxRecord>, Vec<u32>) {
 
 type Made = (Vec<ParticleRecord>, Vec<u32>);
 
-fn generate_with(gpu: &mut Gpu, compiler: &Compiler, boxes: &[CloudBox], law: &BoxLaw) -> Made {
+fn generate_with(gpu: &mut Gpu, compiler: &Compiler, boxes: &[CloudBox], law: &SeededLaw) -> Made {
     let generate = Generate::new(&gpu.device, compiler).unwrap();
     let (list, i_group) = records(boxes, law);
     let n = i_group.len();
@@ -51,22 +57,21 @@ fn generate_with(gpu: &mut Gpu, compiler: &Compiler, boxes: &[CloudBox], law: &B
     (gpu.download(&particles, n), gpu.download(&status, n))
 }
 
-fn generate(gpu: &mut Gpu, boxes: &[CloudBox], law: &BoxLaw) -> Made {
+fn generate(gpu: &mut Gpu, boxes: &[CloudBox], law: &SeededLaw) -> Made {
     let compiler = Compiler::new(nimbus::passes::sources(), Compiler::default_cache()).unwrap();
     generate_with(gpu, &compiler, boxes, law)
 }
 
 /// The reference and its bounds, particle by particle, on all cores.
-fn reference(boxes: &[CloudBox], law: &BoxLaw) -> Vec<(Generated, ParticleBound)> {
+fn reference(boxes: &[CloudBox], law: &SeededLaw) -> Vec<(Generated, ParticleBound)> {
     let of_box = boxes
         .iter()
         .zip(0u32..)
         .flat_map(|(b, i_box)| (0..b.n_particles).map(move |i| (b, i_box, i)));
     let all: Vec<_> = of_box.collect();
     let one = |&(b, i_box, i): &(&CloudBox, u32, u32)| {
-        let exact =
-            generate_particle(b, i_box, law.seed, law.form, law.optical_depth, law.radius_scale, i);
-        (exact, particle_bound(b, i_box, law.seed, law.form, i, U_F32))
+        let exact = generate_particle(b, i_box, law.seed, &law.law, i);
+        (exact, particle_bound(b, i_box, law.seed, law.law.form, i, U_F32))
     };
     let n_threads = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
@@ -80,13 +85,13 @@ fn reference(boxes: &[CloudBox], law: &BoxLaw) -> Vec<(Generated, ParticleBound)
 /// Bound on σ = fl(fl(factor)·R), R the radius before factor and scale. Centred, the reference's
 /// bound holds a rounded factor and its product already, and σ's factor only is another number: it
 /// scales. As printed it holds neither, so both come on top: (1 + u)² − 1 = 2u + u².
-fn sigma_bound(exact: &Generated, bound: &ParticleBound, law: &BoxLaw) -> f64 {
+fn sigma_bound(exact: &Generated, bound: &ParticleBound, law: &SeededLaw) -> f64 {
     let u = U_F32;
-    let radius = match law.form {
+    let radius = match law.law.form {
         Form::Centred => bound.radius,
         Form::Printed => bound.radius * (1.0 + u).powi(2) + exact.radius * (2.0 * u + u * u),
     };
-    radius * law.radius_scale * SIGMA_PER_RADIUS
+    radius * law.law.radius_scale * SIGMA_PER_RADIUS
 }
 
 /// Values, truths and bounds of one quantity.
@@ -124,7 +129,7 @@ struct Outcome {
     farthest_other: f64,
 }
 
-fn compare(truth: &[(Generated, ParticleBound)], made: &Made, law: &BoxLaw) -> Outcome {
+fn compare(truth: &[(Generated, ParticleBound)], made: &Made, law: &SeededLaw) -> Outcome {
     let mut o = Outcome::default();
     assert!(truth.len() == made.0.len() && truth.len() == made.1.len());
     for (i, ((exact, bound), (particle, status))) in
@@ -423,7 +428,7 @@ fn positions_are_distributed_as_the_references() {
     let mut gpu = Gpu::new();
     for form in FORMS {
         let boxes = [one_box(200_000, [7.4, 4.0, 6.0], 2.1)];
-        let other_seed = BoxLaw { seed: 99, ..law(form) };
+        let other_seed = SeededLaw { seed: 99, ..law(form) };
         let truth = reference(&boxes, &law(form));
         let expected = histograms(truth.iter().map(|(g, _)| g.position), boxes[0].extent);
         let of_gpu = |made: Made| {

@@ -9,7 +9,7 @@ use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
 use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{ParticleRecord, PlacedRecord};
-use nimbus::model::boxes::Form;
+use nimbus::model::boxes::{BoxLaw, Form};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use nimbus::passes::grid::Grid;
 use nimbus::reference::Blob;
@@ -18,6 +18,7 @@ use nimbus::reference::grid::{axis_weights, deposit};
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32, erf_bound};
 
 const U: f64 = U_F32;
+const LAW: BoxLaw = BoxLaw { radius_scale: 0.6, ..BoxLaw::new(Form::Centred) };
 
 /// What the pass is given, and the f64 numbers that its f32 records stand for.
 struct Scene {
@@ -191,7 +192,7 @@ fn paper() -> Vec<Blob> {
     let boxes = nimbus::io::box_file::read(&path).unwrap();
     let of_box = |(b, i): (&nimbus::model::boxes::CloudBox, u32)| {
         let center = b.center;
-        generate_box(b, i, 1, Form::Centred, 1.0, 0.6)
+        generate_box(b, i, 1, &LAW)
             .into_iter()
             .map(move |g| Blob {
                 aspect: g.aspect,

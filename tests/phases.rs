@@ -94,12 +94,25 @@ fn a_phase_is_the_scene_with_what_it_sets() {
     );
     assert_eq!((unlit.clouds[0].position.x, alone.clouds[0].position.x), (1.0, 0.0));
     assert_eq!((alone.threads.mode, lit.threads.mode), (Threading::Serial, Threading::Parallel));
-    // What was typed has the last word, in every phase.
+    // The command line wins in every phase.
     let typed = loaded(SCENE, &["film.width=16", "lighting.grid=8"]).expect("the scene loads");
     assert!(typed.phases.iter().all(|p| (p.scene.film.width, p.scene.lighting.grid) == (16, 8)));
     assert_eq!(typed.phases[1].scene.film.height, 24);
     assert_eq!(all.resolved["phase"][1]["set"]["film.width"], 32);
     assert_eq!(all.resolved["time"]["frames"], 12);
+}
+
+#[test]
+fn phases_can_be_set_on_the_command_line() {
+    let scene = SCENE.split("[[phase]]").next().expect("a scene before its phases");
+    let phase = |set: &str| format!("phase=[{{name='a',frames=3,set={{{set}}}}}]");
+    let good = loaded(scene, &[&phase("film.width=9")]).expect("the scene loads");
+    assert_eq!((good.phases[0].scene.film.width, good.phases[0].n_frames), (9, 3));
+    let bad = phase("film.width=0");
+    let message = loaded(scene, &[&bad]).expect_err("refused").to_string();
+    assert!(message.contains("`film.width`: expected an integer from 1 to 16384"), "{message}");
+    let message = loaded(scene, &[&phase("'film.width.x'=1")]).expect_err("refused").to_string();
+    assert!(message.contains("`film.width` is no table"), "{message}");
 }
 
 #[test]
@@ -114,7 +127,7 @@ fn frames_are_of_the_phase_they_fall_in() {
 }
 
 #[test]
-fn the_hash_knows_what_phases_set() {
+fn the_hash_depends_on_the_keys_that_phases_set() {
     let hash = |scene: &str| loaded(scene, &[]).expect("the scene loads").hash;
     assert_eq!(hash(SCENE), hash(SCENE));
     assert_ne!(hash(SCENE), hash(&SCENE.replace("height = 24", "height = 25")));
@@ -122,7 +135,7 @@ fn the_hash_knows_what_phases_set() {
 }
 
 #[test]
-fn what_is_wrong_in_a_phase_is_said_where_it_stands() {
+fn faults_in_a_phase_are_reported_at_their_place() {
     let refusal = |from: &str, to: &str| {
         assert!(SCENE.contains(from), "{from}");
         loaded(&SCENE.replace(from, to), &[]).expect_err(to).to_string()
@@ -250,7 +263,8 @@ fn each_setting_of_a_sweep_reaches_the_picture() {
     let mut hashes: Vec<&Value> = cases.iter().map(|c| &c["modes"][0]["image_hash"]).collect();
     hashes.dedup();
     assert_eq!(hashes.len(), 4, "four pictures");
-    assert!(cases.iter().all(|c| c["modes"].as_array().map(Vec::len) == Some(1) && c["skipping"] == Value::Null));
+    let has_one_mode = |c: &Value| c["modes"].as_array().map(Vec::len) == Some(1);
+    assert!(cases.iter().all(|c| has_one_mode(c) && c["skipping"] == Value::Null));
     assert_eq!(cases[1]["sweep"][1], json!({ "key": "cloud.0.position", "value": "[1,0,0]" }));
 }
 

@@ -235,10 +235,8 @@ fn a_radius_that_makes_particles_thin_recreates_the_pipelines() {
     let bed = bed();
     let base = scene("[lighting]\nmode = 'none'", "");
     let mut base = Scene { clouds: base.clouds[..1].to_vec(), ..base };
-    let CloudSource::Boxes { optical_depth, .. } = &mut base.clouds[0].source else {
-        unreachable!("boxes")
-    };
-    *optical_depth = 0.08;
+    let CloudSource::Boxes { law, .. } = &mut base.clouds[0].source else { unreachable!("boxes") };
+    law.optical_depth = 0.08;
     // A largest radius of 3 is 1.4 times the mean, one of 0.5 twice.
     let mut wide = document(&base);
     wide.boxes.iter_mut().for_each(|b| b.radius_max = 3.0);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec2;
-use nimbus::io::scene_file::{LoadedScene, load, load_and_name, parse};
+use nimbus::io::scene_file::{LoadedScene, load, load_and_list, parse};
 use nimbus::io::scene_view::{save, text_of};
 use nimbus::model::cloud::CloudSource;
 use nimbus::model::scene::Scene;
@@ -89,7 +89,7 @@ fn every_scene_reads_back_as_it_was_seen_from_any_folder() {
         assert!(!fs::read_to_string(&to).unwrap().contains("file = \"/"));
         // The files are the same ones.
         let files = |path: &Path| -> Vec<PathBuf> {
-            let named = load_and_name(path, &[], None).1;
+            let named = load_and_list(path, &[], None).1;
             named[1..].iter().map(|file| file.canonicalize().unwrap()).collect()
         };
         assert_eq!(files(&elsewhere.path().join(name)), files(&path));

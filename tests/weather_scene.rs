@@ -101,7 +101,7 @@ fn at(scene: &Scene, time_s: f64) -> std::sync::Arc<Vec<Particle>> {
 }
 
 #[test]
-fn between_steps_masses_run_straight_and_particles_stay_who_they_are() {
+fn between_steps_mass_is_linear_and_particles_keep_their_numbers() {
     let scene = load(SUPERCELL).expect("a scene");
     // Steps of 120 s at 60 s a second: at 0, 2 and 4 s, and for ever before and after.
     let [first, second, third] = [0.0, 2.0, 4.0].map(|t| at(&scene, t));
@@ -112,7 +112,7 @@ fn between_steps_masses_run_straight_and_particles_stay_who_they_are() {
         assert_eq!((now.len(), a.len()), (3000, 3000));
         let expected = (1.0 - share) * mass(a) + share * mass(b);
         assert!((mass(&now) / expected - 1.0).abs() < 1e-12, "{t}");
-        // Whose places differ by the levels' heights alone.
+        // Their places differ by the heights of the levels alone.
         assert!(now.iter().zip(a.iter()).all(|(p, q)| (p.position - q.position).length() < 100.0));
         assert_eq!(at(&scene, t), now, "again");
     }
@@ -180,7 +180,7 @@ fn the_sun_stands_where_the_almanac_has_it() {
 }
 
 #[test]
-fn what_is_wrong_with_a_file_is_told_with_its_place() {
+fn faults_of_a_file_are_reported_with_its_name() {
     let of = |more: &str, file: &str| {
         load(
             &KATRINA

@@ -43,7 +43,7 @@ use crate::frame::limits::advice;
 use crate::frame::stage::{DeviceChoice, Stage};
 use crate::inspect::basis::basis_warnings;
 use crate::io::atomic;
-use crate::io::magnitude::{GREATEST, is_carried_place, shortest};
+use crate::io::bounds::{GREATEST, is_carried_place, shortest};
 use crate::io::scene_file::{self, LoadedScene};
 use crate::model::scene::Scene;
 use args::{Args, Command, SceneArgs};
@@ -136,12 +136,12 @@ fn overrides(args: &SceneArgs) -> Vec<String> {
 
 /// Loads a scene with all that was typed about it; prints what is allowed but hardly meant.
 fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
-    load_and_name(path, args).map(|(loaded, _)| loaded)
+    load_and_list(path, args).map(|(loaded, _)| loaded)
 }
 
 /// The same, and the files that it was read from.
-fn load_and_name(path: &Path, args: &SceneArgs) -> Result<(LoadedScene, Vec<PathBuf>)> {
-    let (loaded, files) = scene_file::load_and_name(path, &overrides(args), args.seed);
+fn load_and_list(path: &Path, args: &SceneArgs) -> Result<(LoadedScene, Vec<PathBuf>)> {
+    let (loaded, files) = scene_file::load_and_list(path, &overrides(args), args.seed);
     let loaded = loaded?;
     for warning in warnings_of(&loaded).iter().filter(|_| !args.quiet) {
         eprintln!("warning: {warning}");

@@ -6,14 +6,14 @@ use std::sync::atomic::AtomicBool;
 use serde_json::{Value, json};
 
 use super::args::{PresentArg, ViewArgs};
-use super::{device_choice, load_and_name, output, overrides};
+use super::{device_choice, load_and_list, output, overrides};
 use crate::error::Result;
 use crate::gpu::PresentMode;
 use crate::measure::stats::Summary;
 use crate::viewer::scene_window::{self, LoopTimes, Options, SceneSource, WindowTimes, help};
 
 pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
-    let (loaded, files) = load_and_name(&args.scene, &args.options)?;
+    let (loaded, files) = load_and_list(&args.scene, &args.options)?;
     if !args.options.quiet {
         eprint!("{}", help());
     }

@@ -7,7 +7,7 @@ use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::TexturedRecord;
 use crate::layout::particle::{
-    BoxLaw, BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord,
+    BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord,
 };
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{CloudSource, Group};
@@ -295,11 +295,10 @@ pub(super) fn box_records(scene: &Scene, groups: &[Group]) -> Vec<BoxRecord> {
     let mut records = Vec::with_capacity(groups.len());
     for cloud in &scene.clouds {
         match &cloud.source {
-            CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => {
-                let (form, optical_depth, radius_scale) = (*form, *optical_depth, *radius_scale);
-                let law = BoxLaw { form, optical_depth, radius_scale, seed: cloud.seed };
+            CloudSource::Boxes { boxes, law } => {
                 for (b, i_box) in boxes.iter().zip(0u32..) {
-                    records.push(BoxRecord::new(b, &law, i_box, groups[records.len()].i_first));
+                    let i_first = groups[records.len()].i_first;
+                    records.push(BoxRecord::new(b, law, cloud.seed, i_box, i_first));
                 }
             }
             CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Animated(_) => {

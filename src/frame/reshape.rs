@@ -273,15 +273,9 @@ fn differs_in_boxes_alone(a: &Scene, b: &Scene) -> bool {
 fn is_same_but_for_boxes(a: &Cloud, b: &Cloud) -> bool {
     let Cloud { source, position, wind, gust, growth, texture, i_material, facing, seed } = a;
     let same_source = match (source, &b.source) {
-        (
-            CloudSource::Boxes { boxes: _, form, optical_depth, radius_scale },
-            CloudSource::Boxes {
-                boxes: _,
-                form: b_form,
-                optical_depth: b_depth,
-                radius_scale: b_scale,
-            },
-        ) => (form, optical_depth, radius_scale) == (b_form, b_depth, b_scale),
+        (CloudSource::Boxes { boxes: _, law }, CloudSource::Boxes { boxes: _, law: b_law }) => {
+            law == b_law
+        }
         (source, b_source) => source == b_source && *seed == b.seed,
     };
     same_source

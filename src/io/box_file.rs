@@ -7,8 +7,8 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::atomic::write_atomic;
-use super::magnitude::{LEAST_EXTENT, shortest, wrong_coordinate, wrong_size};
-use super::suggest::shown;
+use super::bounds::{LEAST_EXTENT, shortest, wrong_coordinate, wrong_size};
+use super::document::suggest::shown;
 use super::text_file::{DATA_LIMIT, line_column, read_text};
 use crate::error::{Error, Place, Result};
 use crate::model::boxes::CloudBox;
@@ -16,15 +16,22 @@ use crate::model::boxes::CloudBox;
 const FIELDS: [&str; 8] =
     ["particles", "x extent", "y extent", "z extent", "x", "y", "z", "radius"];
 
-/// What a box file begins with.
+/// Beginning of a box file, for messages.
 pub const FIRST: &str = "the number of particles";
 
+/// Reads a box file.
+///
+/// # Errors
+/// When the file cannot be read or holds a fault.
 pub fn read(path: &Path) -> Result<Vec<CloudBox>> {
     parse(&read_text(path, DATA_LIMIT, FIRST)?, path)
 }
 
-/// Boxes from text; `path` is for messages. Commas, spaces and tabs separate, blank lines are
-/// passed over.
+/// Reads boxes from text; `path` is its name in messages. Fields are separated by commas, spaces or
+/// tabs, and blank lines are skipped.
+///
+/// # Errors
+/// When the text holds a fault, with line and column.
 pub fn parse(text: &str, path: &Path) -> Result<Vec<CloudBox>> {
     let lines = text.lines().enumerate().map(|(i, line)| Line { number: i + 1, text: line, path });
     let mut lines = lines.filter(|line| !line.text.trim().is_empty());
@@ -45,7 +52,7 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<CloudBox>> {
     Ok(boxes)
 }
 
-/// Text that [`parse`] reads back as equal values.
+/// Returns text that [`parse`] reads back as equal values.
 pub fn format(boxes: &[CloudBox]) -> String {
     let sum: u64 = boxes.iter().map(|b| u64::from(b.n_particles)).sum();
     let mut text = format!("{sum}\n{}\n", boxes.len());
@@ -58,8 +65,10 @@ pub fn format(boxes: &[CloudBox]) -> String {
     text
 }
 
-/// [`format`], in place of what was there only once it is whole. More than [`parse`] is ever given
-/// is an [`Error::Limit`], and nothing is written.
+/// Replaces the file at `path`, or the file that a link at `path` leads to.
+///
+/// # Errors
+/// When the file cannot be written, or [`Error::Limit`] when it would be too large to be read.
 pub fn write(path: &Path, boxes: &[CloudBox]) -> Result<()> {
     let text = format(boxes);
     if text.len() as u64 > DATA_LIMIT {
@@ -68,32 +77,38 @@ pub fn write(path: &Path, boxes: &[CloudBox]) -> Result<()> {
             "a box file has at most {DATA_LIMIT} bytes, and this one {n_bytes}"
         )));
     }
-    // Through a link, or the link itself would be replaced.
+    // A rename would replace the link itself.
     let place = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     write_atomic(&place, |file| file.write_all(text.as_bytes()))
 }
 
-/// The first field of a box that [`parse`] would refuse, and what it would expect.
+/// Returns a message about the first field of a box that [`parse`] would refuse.
 pub fn wrong(b: &CloudBox) -> Option<String> {
-    let numbers = [b.extent.to_array(), b.center.to_array()].concat();
-    let mut checked = FIELDS[1..].iter().zip(numbers.into_iter().chain([b.radius_max])).enumerate();
-    checked.find_map(|(i, (name, v))| {
-        let expected = match i {
-            0..3 => wrong_size(v, LEAST_EXTENT),
-            3..6 => wrong_coordinate(v),
-            _ => wrong_size(v, 0.0),
-        };
-        expected.map(|expected| format!("{name}: expected {expected}, found {}", shortest(v)))
+    let numbers = [&b.extent.to_array()[..], &b.center.to_array(), &[b.radius_max]].concat();
+    numbers.into_iter().zip(1..).find_map(|(v, i)| {
+        let expected = wrong_number(i, v)?;
+        Some(format!("{}: expected {expected}, found {}", FIELDS[i], shortest(v)))
     })
 }
 
+/// Returns the expected range when `v` is outside the one of field `i`.
+fn wrong_number(i: usize, v: f64) -> Option<String> {
+    match i {
+        1..4 => wrong_size(v, LEAST_EXTENT),
+        4..7 => wrong_coordinate(v),
+        // The lower limit of a radius depends on `radius_scale`.
+        _ => wrong_size(v, 0.0),
+    }
+}
+
+/// A line of a box file, for messages.
 struct Line<'a> {
     number: usize,
     text: &'a str,
     path: &'a Path,
 }
 
-/// One field and its byte offset in the line.
+/// Byte offset of a field in its line, and its text.
 type Field<'a> = (usize, &'a str);
 
 fn header(line: Option<Line>, meaning: &str, text: &str, path: &Path) -> Result<(u64, Place)> {
@@ -127,9 +142,9 @@ impl<'a> Line<'a> {
         Error::scene(self.place(offset), what)
     }
 
-    /// The words of a line that is not blank, at least one, and their number; of too many only the
-    /// first too many is kept, or a line of 64 MiB would take a GiB. An empty place between commas
-    /// is an error, since passing over it would shift every number after it.
+    /// Returns the words of a line that is not blank, and their number. At most one word too many
+    /// is kept, because those of a line of 64 MiB would take a GiB. An empty place between commas
+    /// is an error: skipping it would shift every number after it.
     fn fields(&self) -> Result<(Vec<Field<'a>>, usize)> {
         let mut fields = Vec::new();
         let mut n_fields = 0;
@@ -138,7 +153,7 @@ impl<'a> Line<'a> {
             let before = n_fields;
             let mut rest = start;
             for word in piece.split_whitespace() {
-                // Words come in order, so each is found at or after the end of the one before.
+                // Words come in order, so each is at or after the end of the one before.
                 let offset = rest + self.text[rest..].find(word).unwrap_or(0);
                 if n_fields <= FIELDS.len() {
                     fields.push((offset, word));
@@ -158,68 +173,41 @@ impl<'a> Line<'a> {
     fn cloud_box(&self) -> Result<CloudBox> {
         let (fields, n_fields) = self.fields()?;
         if n_fields != FIELDS.len() {
-            // At the first one too many, or where the first missing one would stand.
+            // At the first word too many, or where the first missing one would be.
             let offset =
                 fields.get(FIELDS.len()).map_or(self.text.trim_end().len(), |field| field.0);
             let what = format!("expected 8 fields ({}), found {n_fields}", FIELDS.join(", "));
             return Err(self.fault(offset, what));
         }
-        let size =
-            |i: usize, least: f64| self.bounded(FIELDS[i], fields[i], &|v| wrong_size(v, least));
-        let coordinate = |i: usize| self.bounded(FIELDS[i], fields[i], &wrong_coordinate);
-        let (offset, word) = fields[0];
-        let n_particles = word.parse().map_err(|_| {
-            self.fault(
-                offset,
-                format!(
-                    "particles: expected an integer from 0 to {}, found `{}`",
-                    u32::MAX,
-                    shown(word)
-                ),
-            )
-        })?;
-        Ok(CloudBox {
-            n_particles,
-            extent: DVec3::new(
-                size(1, LEAST_EXTENT)?,
-                size(2, LEAST_EXTENT)?,
-                size(3, LEAST_EXTENT)?,
-            ),
-            center: DVec3::new(coordinate(4)?, coordinate(5)?, coordinate(6)?),
-            // How small it may be depends on `radius_scale`.
-            radius_max: size(7, 0.0)?,
-        })
-    }
-
-    /// A number in which `wrong` finds nothing; else it says what was expected.
-    fn bounded(
-        &self,
-        name: &str,
-        field: Field,
-        wrong: &dyn Fn(f64) -> Option<String>,
-    ) -> Result<f64> {
-        let v = self.number(name, field)?;
-        match wrong(v) {
-            None => Ok(v),
-            Some(expected) => Err(self.fault(
-                field.0,
-                format!("{name}: expected {expected}, found `{}`", shown(field.1)),
-            )),
-        }
-    }
-
-    fn number(&self, name: &str, (offset, word): Field) -> Result<f64> {
-        match word.parse::<f64>() {
-            Ok(v) if v.is_finite() => Ok(v),
-            Ok(_) => Err(self.fault(
-                offset,
-                format!("{name}: expected a finite number, found `{}`", shown(word)),
-            )),
-            Err(_) => {
-                Err(self
-                    .fault(offset, format!("{name}: expected a number, found `{}`", shown(word))))
+        let (mut n_particles, mut v) = (0, [0.0; FIELDS.len()]);
+        for (i, (offset, word)) in fields.into_iter().enumerate() {
+            let expected = match (i, word.parse::<f64>()) {
+                (0, _) => match word.parse() {
+                    Ok(n) => {
+                        n_particles = n;
+                        None
+                    }
+                    Err(_) => Some(format!("an integer from 0 to {}", u32::MAX)),
+                },
+                (_, Err(_)) => Some("a number".to_owned()),
+                (_, Ok(number)) if !number.is_finite() => Some("a finite number".to_owned()),
+                (_, Ok(number)) => {
+                    v[i] = number;
+                    wrong_number(i, number)
+                }
+            };
+            if let Some(expected) = expected {
+                let found = shown(word);
+                let what = format!("{}: expected {expected}, found `{found}`", FIELDS[i]);
+                return Err(self.fault(offset, what));
             }
         }
+        Ok(CloudBox {
+            n_particles,
+            extent: DVec3::new(v[1], v[2], v[3]),
+            center: DVec3::new(v[4], v[5], v[6]),
+            radius_max: v[7],
+        })
     }
 }
 
@@ -253,16 +241,8 @@ mod tests {
     fn faults_have_their_place_and_say_what_was_expected() {
         let one = |line: &str| message(&format!("3\n1\n{line}\n"));
         for (found, expected) in [
-            (
-                one("3, 1, 1, 1, 0, 0, 0"),
-                "3:20: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, \
-                 radius), found 7",
-            ),
-            (
-                one("3, 1, 1, 1, 0, 0, 0, 1, 5"),
-                "3:25: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, \
-                 radius), found 9",
-            ),
+            (one("3, 1, 1, 1, 0, 0, 0"), "3:20: EIGHT, found 7"),
+            (one("3, 1, 1, 1, 0, 0, 0, 1, 5"), "3:25: EIGHT, found 9"),
             (
                 one("3, 1, -1, 1, 0, 0, 0, 1"),
                 "3:7: y extent: expected 0 or a number from 1e-30 to 1e15, found `-1`",
@@ -311,11 +291,7 @@ mod tests {
                 one("ä, 1, 1, 1, 0, 0, 0, ö"),
                 "3:1: particles: expected an integer from 0 to 4294967295, found `ä`",
             ),
-            (
-                message(&format!("3\n1\n{}", "1 ".repeat(99))),
-                "3:17: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, \
-                 radius), found 99",
-            ),
+            (message(&format!("3\n1\n{}", "1 ".repeat(99))), "3:17: EIGHT, found 99"),
             (
                 message("4\n1\n3, 1, 1, 1, 0, 0, 0, 1"),
                 "1:1: the file says 4 particles and its boxes have 3",
@@ -330,7 +306,8 @@ mod tests {
             (message("3\nx"), "2:1: expected the number of boxes, found `x`"),
             (message("-1\n0"), "1:1: expected the number of particles, found `-1`"),
         ] {
-            assert_eq!(found, format!("b.dat:{expected}"));
+            let eight = format!("expected 8 fields ({})", FIELDS.join(", "));
+            assert_eq!(found, format!("b.dat:{}", expected.replace("EIGHT", &eight)));
         }
     }
 
@@ -338,21 +315,8 @@ mod tests {
     fn wrong_is_what_the_reader_refuses() {
         let good =
             CloudBox { n_particles: 1, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 1.0 };
-        let numbers = [
-            0.0,
-            -0.0,
-            1e-31,
-            1e-30,
-            1e-300,
-            3.0,
-            -3.0,
-            1e15,
-            -1e15,
-            1.1e15,
-            1e300,
-            f64::NAN,
-            f64::INFINITY,
-        ];
+        let numbers = "0 -0 1e-31 1e-30 1e-300 3 -3 1e15 -1e15 1.1e15 1e300 nan inf";
+        let numbers = numbers.split(' ').map(|v| v.parse::<f64>().unwrap());
         let mut n_wrong = 0;
         for v in numbers {
             for i in 0..7 {

@@ -1,12 +1,12 @@
-//! Files that belong together, replaced together: a reader, or whoever looks after the process was
-//! killed at any moment, finds all old ones or all new ones, and whatever else lies in their folder
-//! where it lay.
+//! Folders of results whose files are replaced together. A reader, or a user after the process was
+//! killed at any moment, finds all old files or all new ones, and every other file of the folder
+//! unchanged.
 //!
-//! A folder with the new files, and with hard links to everything else, is made beside the old one,
-//! and the two exchange their names in one step. Where that cannot be (see [`exchanged`]) the files
-//! are replaced one by one: there a kill within the few microseconds between the renames leaves the
-//! folder without its last file, never with files of two kinds that seem to be of one. Nothing here
-//! outlasts a power cut that the file system's own order of writes does not.
+//! A new folder is made beside the old one, with the new files and with hard links to every other
+//! file, and the two exchange their names in one step. Where that is impossible (see
+//! [`exchanged`]), the files are replaced one by one. A kill in the few microseconds between those
+//! renames leaves the folder without its last file, but never with files of two runs. The order of
+//! writes to the disk is the file system's; a power cut may undo it.
 
 use std::fs;
 use std::path::Path;
@@ -14,9 +14,12 @@ use std::path::Path;
 use super::atomic::{Temporary, in_progress};
 use crate::error::{Error, Result};
 
-/// Makes `folder` hold the `files` that `write` puts into the folder it is given, which may be
-/// asked for twice; those of `files` that it does not make are gone then. Readers look for the last
-/// of `files`, which it must make, first. When `write` fails the old files stay.
+/// Replaces the `files` of a folder with those that `write` puts into the folder it is given.
+/// `write` may be called twice, and must make the last of `files`, which readers look for first.
+/// Any other of `files` that it does not make is removed. When `write` fails, the old files stay.
+///
+/// # Errors
+/// When `write` fails or the folder cannot be changed.
 pub fn replace_files(
     folder: &Path,
     files: &[&str],
@@ -25,17 +28,20 @@ pub fn replace_files(
     if exchanged(folder, files, &write)? { Ok(()) } else { one_by_one(folder, files, &write) }
 }
 
-/// An error where no file can be made in `folder`.
+/// Checks that files can be made in `folder`.
+///
+/// # Errors
+/// When they cannot.
 pub fn check_writable(folder: &Path) -> Result<()> {
     let made = Temporary::folder(folder, "results");
     made.map(drop)
         .map_err(|cause| Error::io(folder, format!("nothing can be written in it: {cause}")))
 }
 
-/// Takes the last file away, replaces the others, and puts the new last file there.
+/// Moves the last file away, replaces the others, and puts the new last file there.
 fn one_by_one(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>) -> Result<()> {
     let failed = |cause| Error::io(folder, cause);
-    // In the folder itself: another one may lie on another file system.
+    // Inside the folder, because another folder may be on another file system.
     let staged = Temporary::folder(folder, "results").map_err(failed)?;
     write(&staged.path)?;
     let Some(last) = files.last().map(|name| folder.join(name)) else { return Ok(()) };
@@ -47,8 +53,8 @@ fn one_by_one(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>
     }
     for (i, name) in files.iter().enumerate() {
         if let Err(cause) = moved_or_removed(&staged.path.join(name), &folder.join(name)) {
-            // With no file replaced the old ones are whole again; else the old last one is kept
-            // where it is.
+            // If no file was replaced yet, the old files are complete again. Otherwise the old last
+            // file stays in the temporary folder.
             if i == 0 && had_one {
                 fs::rename(&aside, &last).map_err(failed)?;
                 return Err(failed(cause));
@@ -64,7 +70,7 @@ fn one_by_one(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>
     Ok(())
 }
 
-/// `new` in the place of `old`, or nothing there where there is no new one.
+/// Renames `new` to `old`, or removes `old` if there is no new file.
 fn moved_or_removed(new: &Path, old: &Path) -> std::io::Result<()> {
     match new.symlink_metadata() {
         Ok(_) => fs::rename(new, old),
@@ -80,18 +86,17 @@ fn exchanged(_: &Path, _: &[&str], _: &dyn Fn(&Path) -> Result<()>) -> Result<bo
     Ok(false)
 }
 
-/// Replaces the folder as a whole; false, with nothing changed, where that cannot be:
-/// - the file system knows no exchange or no hard links, or the folder is a mount point or a file
-///   system's root;
-/// - the parent may not be written, or folder or file belong to somebody else, who would lose them
-///   to us;
-/// - it holds folders, in which somebody may be at work, or this process, and most likely the shell
-///   that started it, stands
-///   in it: it would vanish under their feet.
+/// Replaces the folder as a whole. Returns false, with nothing changed, where that is impossible:
+/// - The file system has no exchange or no hard links.
+/// - The folder is a mount point or the root of a file system.
+/// - The parent is not writable.
+/// - The folder or a file belongs to another user, who would lose it.
+/// - The folder holds folders, which may be a process's working directory.
+/// - It is the working directory of this process, and so probably of the shell that started it.
 #[cfg(target_os = "linux")]
 fn exchanged(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
-    // Not a link to it: that stays, and points to the new folder.
+    // A link to the folder stays and points to the new folder.
     let Ok(folder) = fs::canonicalize(folder) else { return moved_in(folder, write) };
     let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) else {
         return Ok(false);
@@ -104,20 +109,20 @@ fn exchanged(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>)
     }
     let Ok(staged) = Temporary::folder(parent, &name.to_string_lossy()) else { return Ok(false) };
     write(&staged.path)?;
-    // From here on Ctrl-C waits until all is done.
+    // Ctrl-C waits from here until the exchange is done.
     let mut paths = in_progress();
     if !beside::link_others(&folder, &staged.path, files)
         || renameat_with(CWD, &staged.path, CWD, &folder, RenameFlags::EXCHANGE).is_err()
     {
         return Ok(false);
     }
-    // What `staged` names is the old folder now.
+    // `staged` now names the old folder.
     beside::discard(&staged.path, &folder, files);
     staged.keep(&mut paths);
     Ok(true)
 }
 
-/// For a folder that is not there yet.
+/// Moves the new folder to a place where there is none yet.
 #[cfg(target_os = "linux")]
 fn moved_in(folder: &Path, write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
     let failed = |cause| Error::io(folder, cause);
@@ -129,13 +134,13 @@ fn moved_in(folder: &Path, write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> 
     let staged = Temporary::folder(parent, &name.to_string_lossy()).map_err(failed)?;
     write(&staged.path)?;
     let mut paths = in_progress();
-    // What came into being meanwhile is not replaced unless it is empty.
+    // The rename fails if a folder that is not empty has been made there meanwhile.
     fs::rename(&staged.path, folder).map_err(failed)?;
     staged.keep(&mut paths);
     Ok(true)
 }
 
-/// Two folders of which one is to stand in for the other.
+/// Two folders, one of which takes the place of the other.
 #[cfg(target_os = "linux")]
 mod beside {
     use std::fs::{self, Metadata};
@@ -143,8 +148,8 @@ mod beside {
     use std::os::unix::fs::MetadataExt;
     use std::path::Path;
 
-    /// Links everything in `from` but `left_out` into `to`; false where something cannot be linked
-    /// as it is, a folder among others.
+    /// Links all files in `from` except `left_out` into `to`. Returns false if one of them is a
+    /// folder or cannot be linked.
     pub fn link_others(from: &Path, to: &Path, left_out: &[&str]) -> bool {
         let link = || -> io::Result<bool> {
             if !is_owned_alike(from, to)? {
@@ -160,22 +165,22 @@ mod beside {
                     fs::hard_link(&old, &new)?;
                 }
             }
-            // Last: a folder that may not be written takes no links.
+            // Last, because a folder that is not writable takes no links.
             fs::set_permissions(to, fs::metadata(from)?.permissions())?;
             Ok(true)
         };
         link().unwrap_or(false)
     }
 
-    /// On the same file system and the same people's.
+    /// Returns whether both are on one file system and belong to the same user and group.
     fn is_owned_alike(a: &Path, b: &Path) -> io::Result<bool> {
         let of = |about: Metadata| (about.dev(), about.uid(), about.gid());
         Ok(of(fs::metadata(a)?) == of(fs::metadata(b)?))
     }
 
-    /// Removes the folder `old`, whose place `new` has taken: `replaced` files, and what both hold.
-    /// What came into the old one since its files were linked goes over to the new. What cannot be
-    /// removed stays, and the results are there all the same.
+    /// Removes the folder `old`, whose place `new` has taken, with the `replaced` files and those
+    /// that both hold. Files made in `old` since the others were linked are moved to `new`. A file
+    /// that cannot be removed stays, which does no harm to the results.
     pub fn discard(old: &Path, new: &Path, replaced: &[&str]) {
         for entry in fs::read_dir(old).into_iter().flatten().flatten() {
             let (gone, kept) = (entry.path(), new.join(entry.file_name()));
@@ -186,8 +191,8 @@ mod beside {
             let is_same = of_kept
                 .as_ref()
                 .is_ok_and(|k| (k.dev(), k.ino()) == (of_gone.dev(), of_gone.ino()));
-            // What was saved to the old folder goes over, unless the new one got something newer of
-            // that name since.
+            // A file saved to the old folder is moved, unless the new folder has a newer one of
+            // that name.
             let saved = |about: &Metadata| about.modified().ok();
             let is_newer = of_kept.map_or(true, |kept| saved(&of_gone) >= saved(&kept));
             let _ = match (is_replaced || is_same, is_newer) {
@@ -214,7 +219,7 @@ mod tests {
         }
     }
 
-    /// Names under `folder` and what the files hold; of a link where it points.
+    /// Returns the names under `folder` with the content of files and the targets of links.
     fn tree(folder: &Path) -> Vec<(String, String)> {
         let mut found = Vec::new();
         for entry in fs::read_dir(folder).unwrap() {
@@ -235,7 +240,7 @@ mod tests {
         found
     }
 
-    /// A folder of a user's with results `text`.
+    /// Makes a user's folder with results `text` and other files.
     fn kept(parent: &Path, text: &str) -> std::path::PathBuf {
         let folder = parent.join("run");
         fs::create_dir_all(folder.join("plots/deep")).unwrap();
@@ -266,7 +271,7 @@ mod tests {
     const FILES: [&str; 2] = ["rows", "head"];
 
     #[test]
-    fn both_ways_replace_the_files_and_keep_all_else() {
+    fn both_ways_replace_the_files_and_keep_all_others() {
         for at_once in [true, false] {
             let way = |folder: &Path, write: &dyn Fn(&Path) -> Result<()>| match at_once {
                 true => replace_files(folder, &FILES, write),
@@ -296,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_made_again_is_gone() {
+    fn files_that_are_not_made_again_are_removed() {
         for at_once in [true, false] {
             let dir = tempfile::tempdir().unwrap();
             let folder = dir.path().join("run");
@@ -305,7 +310,7 @@ mod tests {
             for name in ["stale", "mine"] {
                 fs::write(folder.join(name), "old").unwrap();
             }
-            // One that neither run has is no error.
+            // A file that neither run has is no error.
             let files = ["rows", "stale", "never", "head"];
             match at_once {
                 true => replace_files(&folder, &files, write_both("new")).unwrap(),
@@ -322,39 +327,39 @@ mod tests {
     fn the_folder_is_exchanged_where_it_can_be() {
         let dir = tempfile::tempdir().unwrap();
         let folder = kept(dir.path(), "old");
-        // Somebody may be at work in its folders.
+        // A process may work in the folder's folders.
         assert!(!exchanged(&folder, &FILES, &write_both("new")).unwrap());
         fs::remove_dir_all(folder.join("plots")).unwrap();
         let held = fs::File::open(&folder).unwrap();
         assert!(exchanged(&folder, &FILES, &write_both("new")).unwrap());
-        // The folder is another one; the old one is gone.
+        // The folder is a new one, and the old one is gone.
         assert_ne!(fs::metadata(&folder).unwrap().ino(), held.metadata().unwrap().ino());
         assert_eq!(held.metadata().unwrap().nlink(), 0);
-        // A link to a folder stays one.
+        // A link to a folder stays a link.
         symlink("run", dir.path().join("latest")).unwrap();
         assert!(exchanged(&dir.path().join("latest"), &FILES, &write_both("newer")).unwrap());
         assert_eq!(
             (fs::read_link(dir.path().join("latest")).unwrap(), tree(&folder)),
             ("run".into(), without_plots("newer"))
         );
-        // One that is not there is made.
+        // A missing folder is made.
         assert!(exchanged(&dir.path().join("first"), &FILES, &write_both("new")).unwrap());
         assert_eq!(tree(&dir.path().join("first")).len(), 2);
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 3);
-        // Not the file system's root.
+        // The root of the file system is refused.
         assert!(!exchanged(Path::new("/"), &FILES, &|_| panic!("must not be called")).unwrap());
     }
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn what_came_meanwhile_goes_over() {
+    fn files_made_meanwhile_are_moved() {
         let dir = tempfile::tempdir().unwrap();
         let (folder, other) = (kept(dir.path(), "old"), dir.path().join("other"));
         fs::remove_dir_all(folder.join("plots")).unwrap();
         fs::create_dir(&other).unwrap();
         write_both("new")(&other).unwrap();
         assert!(beside::link_others(&folder, &other, &FILES));
-        // Saved anew by an editor; made; a folder made.
+        // An editor saves a file by a rename; a file and a folder are made.
         fs::write(dir.path().join("saved"), "edited").unwrap();
         fs::rename(dir.path().join("saved"), folder.join("notes.txt")).unwrap();
         fs::write(folder.join("later.txt"), "later").unwrap();

@@ -1,6 +1,7 @@
-//! Images: PNG for looking at, EXR for measuring. What is written are premultiplied linear RGBA
-//! pixels, row 0 the top; what is read stays what it is.
+//! Images: PNG for looking at, EXR for measuring. Images are written from premultiplied linear RGBA
+//! pixels, row 0 at the top, and read with the numbers of the file.
 
+use std::io::Write;
 use std::path::Path;
 
 use glam::DVec3;
@@ -13,6 +14,7 @@ use super::atomic::write_atomic;
 use crate::error::{Error, Result};
 use crate::model::film::{Film, dither};
 
+/// Format of an image file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImageKind {
     /// 8-bit sRGB, tone-mapped, over the scene's background.
@@ -22,7 +24,10 @@ pub enum ImageKind {
 }
 
 impl ImageKind {
-    /// From the extension; to be asked before anything is rendered.
+    /// Returns the format that the extension of `path` names. Callers ask before they render.
+    ///
+    /// # Errors
+    /// When the extension is neither .png nor .exr.
     pub fn of(path: &Path) -> Result<ImageKind> {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
         match extension.as_deref() {
@@ -36,19 +41,26 @@ impl ImageKind {
     }
 }
 
-/// A picture as its file has it, row 0 the top: an EXR's numbers; a PNG's code values (of 8 or 16
-/// bits) by the greatest.
+/// A picture as its file has it, row 0 at the top: the numbers of an EXR, or the code values of a
+/// PNG (8 or 16 bits) divided by the greatest one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
+    /// Format of the file.
     pub kind: ImageKind,
+    /// Pixels of a row.
     pub width: u32,
+    /// Number of rows.
     pub height: u32,
+    /// Pixels, row by row.
     pub rgba: Vec<[f64; 4]>,
-    /// Otherwise A is 1 everywhere.
+    /// Whether the file has alpha; otherwise A is 1 everywhere.
     pub has_alpha: bool,
 }
 
-/// Reads what the extension says, and nothing else under that name.
+/// Reads an image of the format that the extension names.
+///
+/// # Errors
+/// When the file cannot be read or has another format.
 pub fn read(path: &Path) -> Result<Image> {
     let kind = ImageKind::of(path)?;
     let format = match kind {
@@ -78,25 +90,44 @@ fn four<T>(values: &[T], number: impl Fn(&T) -> f64) -> Vec<[f64; 4]> {
     values.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|i| number(&p[i]))).collect()
 }
 
-/// 8-bit sRGB as it is, three bytes a pixel. Panics where `rgb` is not width × height pixels.
+/// Writes 8-bit sRGB pixels, three bytes each, to a PNG file.
+///
+/// # Errors
+/// When the file cannot be written.
+///
+/// # Panics
+/// When `rgb` is not width × height pixels.
 pub fn write_bytes(path: &Path, width: u32, height: u32, rgb: &[u8]) -> Result<()> {
-    write_atomic(path, |writer| {
-        PngEncoder::new(writer).write_image(rgb, width, height, ExtendedColorType::Rgb8)
-    })
+    let bytes = png_bytes(width, height, rgb)?;
+    write_atomic(path, |writer| writer.write_all(&bytes))
 }
 
-/// 8-bit sRGB as the bytes of a PNG file. Panics where `rgb` is not width × height pixels.
+/// Returns 8-bit sRGB pixels, three bytes each, as the bytes of a PNG file.
+///
+/// # Errors
+/// When the encoder fails.
+///
+/// # Panics
+/// When `rgb` is not width × height pixels.
 pub fn png_bytes(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let encoded =
-        PngEncoder::new(&mut bytes).write_image(rgb, width, height, ExtendedColorType::Rgb8);
-    encoded.map_err(|cause| Error::Fault {
-        what: format!("a picture could not be encoded: {cause}"),
-    })?;
+    PngEncoder::new(&mut bytes)
+        .write_image(rgb, width, height, ExtendedColorType::Rgb8)
+        .map_err(not_encoded)?;
     Ok(bytes)
 }
 
-/// The bytes of the file that [`write`] makes.
+fn not_encoded(cause: image::ImageError) -> Error {
+    Error::Fault { what: format!("a picture could not be encoded: {cause}") }
+}
+
+/// Returns the bytes of the file that [`write`] makes.
+///
+/// # Errors
+/// When the encoder fails.
+///
+/// # Panics
+/// When `rgba` is not width × height pixels.
 pub fn encoded(
     kind: ImageKind,
     film: &Film,
@@ -104,49 +135,33 @@ pub fn encoded(
     height: u32,
     rgba: &[f32],
 ) -> Result<Vec<u8>> {
-    match kind {
-        ImageKind::Png => png_bytes(width, height, &display_bytes(film, width, height, rgba)),
-        ImageKind::Exr => {
-            check_size(width, height, rgba);
-            let mut bytes = std::io::Cursor::new(Vec::new());
-            let encoder = OpenExrEncoder::new(&mut bytes);
-            let encoded = encoder.write_image(
-                bytemuck::cast_slice(rgba),
-                width,
-                height,
-                ExtendedColorType::Rgba32F,
-            );
-            encoded.map_err(|cause| Error::Fault {
-                what: format!("a picture could not be encoded: {cause}"),
-            })?;
-            Ok(bytes.into_inner())
-        }
+    if kind == ImageKind::Png {
+        return png_bytes(width, height, &display_bytes(film, width, height, rgba));
     }
-}
-
-/// Writes what the extension asks for.
-pub fn write(path: &Path, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
-    match ImageKind::of(path)? {
-        ImageKind::Png => write_png(path, film, width, height, rgba),
-        ImageKind::Exr => write_exr(path, width, height, rgba),
-    }
-}
-
-/// Panics where `rgba` is not width × height pixels.
-pub fn write_png(path: &Path, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
-    write_bytes(path, width, height, &display_bytes(film, width, height, rgba))
-}
-
-/// Panics where `rgba` is not width × height pixels.
-pub fn write_exr(path: &Path, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
     check_size(width, height, rgba);
-    let bytes: &[u8] = bytemuck::cast_slice(rgba);
-    write_atomic(path, |writer| {
-        OpenExrEncoder::new(writer).write_image(bytes, width, height, ExtendedColorType::Rgba32F)
-    })
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    OpenExrEncoder::new(&mut bytes)
+        .write_image(bytemuck::cast_slice(rgba), width, height, ExtendedColorType::Rgba32F)
+        .map_err(not_encoded)?;
+    Ok(bytes.into_inner())
 }
 
-/// 8-bit sRGB pixels, dithered.
+/// Writes pixels to a file of the format that the extension names.
+///
+/// # Errors
+/// When the extension names no format or the file cannot be written.
+///
+/// # Panics
+/// When `rgba` is not width × height pixels.
+pub fn write(path: &Path, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
+    let bytes = encoded(ImageKind::of(path)?, film, width, height, rgba)?;
+    write_atomic(path, |writer| writer.write_all(&bytes))
+}
+
+/// Returns dithered 8-bit sRGB pixels, three bytes each.
+///
+/// # Panics
+/// When `rgba` is not width × height pixels.
 pub fn display_bytes(film: &Film, width: u32, height: u32, rgba: &[f32]) -> Vec<u8> {
     check_size(width, height, rgba);
     let mut bytes = Vec::with_capacity(rgba.len() / 4 * 3);
@@ -163,7 +178,7 @@ fn check_size(width: u32, height: u32, rgba: &[f32]) {
     assert_eq!(rgba.len() as u64, 4 * u64::from(width) * u64::from(height), "four floats a pixel");
 }
 
-/// SHA-256 (hex) over the pixels as little-endian f32, whatever the machine's own order.
+/// Returns the SHA-256 (hex) of the pixels as little-endian f32, on any machine.
 pub fn image_hash(rgba: &[f32]) -> String {
     let mut hasher = Sha256::new();
     for part in rgba.chunks(4096) {
@@ -178,7 +193,7 @@ mod tests {
     use crate::model::film::{FilmFormat, ToneMap};
 
     #[test]
-    fn bayers_matrix_holds_each_threshold_once() {
+    fn bayers_matrix_has_each_threshold_once() {
         // The first row of Bayer's 8×8 matrix as printed everywhere.
         let row: Vec<usize> = (0..8).map(|x| (dither(x, 0) * 64.0 - 0.5) as usize).collect();
         assert_eq!(row, [0, 32, 8, 40, 2, 34, 10, 42]);
@@ -228,7 +243,7 @@ mod tests {
 
     #[test]
     fn dither_keeps_the_mean_and_leaves_whole_code_values_alone() {
-        // Nothing covers the background; 64 pixels are one period of the matrix.
+        // Nothing covers the background, and 64 pixels are one period of the matrix.
         let empty = [0.0f32; 64 * 4];
         let shown = display_bytes(&film(8, 8), 8, 8, &empty);
         let exact = film(8, 8).display(DVec3::ZERO, 0.0) * 255.0;
@@ -249,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_read_is_what_the_file_has() {
+    fn read_returns_the_numbers_of_the_file() {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
         let rgba: Vec<f32> = vec![-1.5, 0.25, 1e6, 1.0, f32::NAN, f32::INFINITY, 1e-30, 0.5];
@@ -274,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_picture_is_one_error_with_its_name() {
+    fn a_file_that_is_no_picture_is_an_error_with_its_name() {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
         write(&path("whole.png"), &film(8, 8), 8, 8, &[0.5; 256]).unwrap();
@@ -299,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn other_extensions_are_a_usage_error() {
+    fn other_extensions_are_usage_errors() {
         for name in ["a.jpg", "a", ".png", "png"] {
             let error = write(Path::new(name), &film(1, 1), 1, 1, &[0.0; 4]).unwrap_err();
             assert_eq!(

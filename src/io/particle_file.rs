@@ -1,32 +1,49 @@
-//! Particle lists: CSV with the header `x,y,z,sigma,kappa[,sigma_y][,r,g,b]` in any order; `radius`
-//! may stand for sigma = radius / 3. With `sigma_y` sigma is that along x and z alone.
+//! Particle lists: CSV with the columns `x,y,z,sigma,kappa[,sigma_y][,r,g,b]` in any order. A
+//! column `radius` may stand for sigma = radius / 3. With `sigma_y`, sigma is the one along x and
+//! z.
 
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord};
 use glam::DVec3;
 
-use super::magnitude::{LEAST, rounded, wrong_coordinate, wrong_size};
-use super::suggest::{did_you_mean, list, shown};
+use super::bounds::{LEAST, rounded, wrong_coordinate, wrong_size};
+use super::document::suggest::{did_you_mean, list, shown};
 use super::text_file::{DATA_LIMIT, line_column, read_text};
 use crate::error::{Error, Place, Result};
 use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS};
 
 const COLUMNS: [&str; 10] = ["x", "y", "z", "sigma", "radius", "sigma_y", "kappa", "r", "g", "b"];
+const POSITION: std::ops::Range<usize> = 0..3;
+const SIGMA: usize = 3;
+const RADIUS: usize = 4;
+const SIGMA_Y: usize = 5;
+const KAPPA: usize = 6;
+const COLOR: std::ops::Range<usize> = 7..10;
 
-/// What a particle list begins with.
+/// Beginning of a particle list, for messages.
 pub const FIRST: &str = "a header x,y,z,sigma,kappa[,r,g,b]";
 
+/// Reads a particle list.
+///
+/// # Errors
+/// When the file cannot be read or holds a fault.
 pub fn read(path: &Path) -> Result<Vec<Particle>> {
     parse(&read_text(path, DATA_LIMIT, FIRST)?, path)
 }
 
-/// Particles from text; `path` is for messages.
+/// Reads particles from text; `path` is its name in messages.
+///
+/// # Errors
+/// When the text holds a fault, with line and column.
 pub fn parse(text: &str, path: &Path) -> Result<Vec<Particle>> {
     Ok(parse_with_lines(text, path)?.0)
 }
 
-/// The same, and the line of each particle.
+/// Reads particles from text, and the line of each.
+///
+/// # Errors
+/// As [`parse`].
 pub fn parse_with_lines(text: &str, path: &Path) -> Result<(Vec<Particle>, Vec<usize>)> {
     let file = File { text, path };
     let mut reader =
@@ -44,8 +61,8 @@ pub fn parse_with_lines(text: &str, path: &Path) -> Result<(Vec<Particle>, Vec<u
     file.check_quotes(&header)?;
     let columns = Columns::find(&file, &header)?;
     let (mut particles, mut lines) = (Vec::new(), Vec::new());
-    // Counted on from row to row: from the start each time, a long file would take its length
-    // squared.
+    // Lines are counted on from row to row; counting from the start would take the square of the
+    // file's length.
     let (mut line, mut counted) = (1, 0);
     while let Some(row) = next().map_err(lost)? {
         file.check_quotes(&row)?;
@@ -74,8 +91,7 @@ struct File<'a> {
 }
 
 impl File<'_> {
-    /// A quote that is not closed takes in all lines up to the next one; no name or number has two
-    /// lines.
+    /// Refuses a quote that is not closed, which would take in all lines up to the next quote.
     fn check_quotes(&self, row: &StringRecord) -> Result<()> {
         match row.iter().position(|field| field.contains('\n')) {
             Some(i) => Err(Error::scene(self.place(row, i), "the quote is not closed on its line")),
@@ -83,14 +99,14 @@ impl File<'_> {
         }
     }
 
-    /// The byte at which a row starts.
+    /// Returns the byte offset at which a row starts.
     fn start(&self, row: &StringRecord) -> usize {
         let start = row.position().map_or(0, |p| p.byte() as usize).min(self.text.len());
-        // The reader's position of a row may still be before line ends that it passes over.
+        // The reader's position may be before line ends that it skips.
         start + self.text[start..].bytes().take_while(|b| matches!(b, b'\r' | b'\n')).count()
     }
 
-    /// Where field `i` of a row starts; past the last one, where the row ends.
+    /// Returns the place of field `i` of a row, or of the row's end where it has no such field.
     fn place(&self, row: &StringRecord, i: usize) -> Place {
         let start = self.start(row);
         let mut is_quoted = false;
@@ -114,128 +130,91 @@ impl File<'_> {
     }
 }
 
-/// Which field of a row is what.
-struct Columns {
-    position: [usize; 3],
-    sigma: usize,
-    /// Factor from the column to σ: 1, or 1/3 of a radius.
-    sigma_factor: f64,
-    sigma_y: Option<usize>,
-    kappa: usize,
-    color: Option<[usize; 3]>,
-}
+/// Numbers of the fields of a row, in the order of [`COLUMNS`].
+struct Columns([Option<usize>; COLUMNS.len()]);
 
 impl Columns {
     fn find(file: &File, header: &StringRecord) -> Result<Columns> {
-        let fault = |i: usize, what: String| Err(Error::scene(file.place(header, i), what));
+        let fault = |i: usize, what: &str| Err(Error::scene(file.place(header, i), what));
         let names: Vec<&str> = header.iter().map(str::trim).collect();
         if names.iter().all(|name| name.parse::<f64>().is_ok()) {
-            return fault(
-                0,
-                "expected a header x,y,z,sigma,kappa[,r,g,b], found numbers".to_owned(),
-            );
+            return fault(0, "expected a header x,y,z,sigma,kappa[,r,g,b], found numbers");
         }
         for (i, name) in names.iter().enumerate() {
             if !COLUMNS.contains(name) {
-                let meant = did_you_mean(name, &COLUMNS);
-                return fault(
-                    i,
-                    format!("unknown column `{}`{meant} (known: {})", shown(name), list(&COLUMNS)),
-                );
+                let (meant, known) = (did_you_mean(name, &COLUMNS), list(&COLUMNS));
+                let name = shown(name);
+                return fault(i, &format!("unknown column `{name}`{meant} (known: {known})"));
             }
             if names[..i].contains(name) {
-                return fault(i, format!("column `{name}` stands twice"));
+                return fault(i, &format!("column `{name}` stands twice"));
             }
         }
-        let find = |name: &str| names.iter().position(|n| *n == name);
-        let need = |name: &str| {
-            find(name).ok_or_else(|| {
-                Error::scene(file.place(header, 0), format!("missing column `{name}`"))
-            })
+        let columns = COLUMNS.map(|column| names.iter().position(|name| *name == column));
+        let missing = |of: std::ops::Range<usize>| -> Vec<&str> {
+            of.filter(|i| columns[*i].is_none()).map(|i| COLUMNS[i]).collect()
         };
-        let (sigma, sigma_factor) = match (find("sigma"), find("radius")) {
+        match (columns[SIGMA], columns[RADIUS]) {
             (Some(i), Some(j)) => {
-                return fault(i.max(j), "expected `sigma` or `radius`, found both".to_owned());
+                return fault(i.max(j), "expected `sigma` or `radius`, found both");
             }
-            (Some(i), None) => (i, 1.0),
-            (None, Some(j)) => (j, SIGMA_PER_RADIUS),
-            (None, None) => {
-                return fault(0, "missing column `sigma` (or `radius` = 3 sigma)".to_owned());
-            }
-        };
-        let color = match [find("r"), find("g"), find("b")] {
-            [None, None, None] => None,
-            [Some(r), Some(g), Some(b)] => Some([r, g, b]),
-            some => {
-                let missing: Vec<&str> = ["r", "g", "b"]
-                    .into_iter()
-                    .zip(some)
-                    .filter(|(_, i)| i.is_none())
-                    .map(|(name, _)| name)
-                    .collect();
-                let i = some.into_iter().flatten().min().unwrap_or(0);
-                return fault(
-                    i,
-                    format!("expected all of `r`, `g`, `b` or none; missing {}", list(&missing)),
-                );
-            }
-        };
-        Ok(Columns {
-            position: [need("x")?, need("y")?, need("z")?],
-            sigma,
-            sigma_factor,
-            sigma_y: find("sigma_y"),
-            kappa: need("kappa")?,
-            color,
-        })
+            (None, None) => return fault(0, "missing column `sigma` (or `radius` = 3 sigma)"),
+            _ => {}
+        }
+        let colors = missing(COLOR);
+        if !colors.is_empty() && colors.len() < COLOR.len() {
+            let i = columns[COLOR].iter().flatten().min().copied().unwrap_or(0);
+            let missing = list(&colors);
+            return fault(i, &format!("expected all of `r`, `g`, `b` or none; missing {missing}"));
+        }
+        match [missing(POSITION), missing(KAPPA..KAPPA + 1)].concat().first() {
+            Some(name) => fault(0, &format!("missing column `{name}`")),
+            None => Ok(Columns(columns)),
+        }
     }
 
     fn particle(&self, file: &File, row: &StringRecord) -> Result<Particle> {
-        let number = |i: usize| {
+        // Returns the number in a column, if the list has the column.
+        let number = |column: usize, wrong: &dyn Fn(f64) -> Option<String>| {
+            let Some(i) = self.0[column] else { return Ok(None) };
             let word = row[i].trim();
-            word.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| {
-                Error::scene(
-                    file.place(row, i),
-                    format!("expected a finite number, found `{}`", shown(word)),
-                )
-            })
-        };
-        let bounded = |i: usize, name: &str, wrong: &dyn Fn(f64) -> Option<String>| {
-            let v = number(i)?;
-            match wrong(v) {
-                None => Ok(v),
-                Some(expected) => {
-                    let what =
-                        format!("{name}: expected {expected}, found `{}`", shown(row[i].trim()));
-                    Err(Error::scene(file.place(row, i), what))
-                }
+            let fault = |what: String| {
+                let what = format!("{what}, found `{}`", shown(word));
+                Err(Error::scene(file.place(row, i), what))
+            };
+            match word.parse::<f64>() {
+                Ok(v) if v.is_finite() => match wrong(v) {
+                    None => Ok(Some(v)),
+                    Some(expected) => fault(format!("{}: expected {expected}", COLUMNS[column])),
+                },
+                _ => fault("expected a finite number".to_owned()),
             }
         };
-        let size = |i: usize, name: &str| bounded(i, name, &|v| wrong_size(v, 0.0));
-        let coordinate = |i: usize, name: &str| bounded(i, name, &wrong_coordinate);
-        let [x, y, z] = self.position;
-        let name = if self.sigma_factor == 1.0 { "sigma" } else { "radius" };
-        let sigma = bounded(self.sigma, name, &|v| wrong_size(v, LEAST))? * self.sigma_factor;
-        let aspect = match self.sigma_y {
-            // Without a size there is no shape.
-            Some(_) if sigma == 0.0 => 1.0,
-            Some(i) => bounded(i, "sigma_y", &|v| wrong_height(v, sigma))? / sigma,
-            None => 1.0,
+        let size = |column: usize| number(column, &|v| wrong_size(v, 0.0));
+        let coordinate = |column: usize| Ok(number(column, &wrong_coordinate)?.unwrap_or(0.0));
+        let wide = |column: usize| number(column, &|v| wrong_size(v, LEAST));
+        let sigma = match wide(SIGMA)? {
+            Some(sigma) => sigma,
+            None => wide(RADIUS)?.unwrap_or(0.0) * SIGMA_PER_RADIUS,
         };
+        let aspect = match sigma {
+            // A blob without a size has no shape.
+            0.0 => 1.0,
+            _ => number(SIGMA_Y, &|v| wrong_height(v, sigma))?.map_or(1.0, |high| high / sigma),
+        };
+        let [x, y, z] = [0, 1, 2].map(|axis| coordinate(POSITION.start + axis));
+        let [r, g, b] = [0, 1, 2].map(|channel| size(COLOR.start + channel));
         Ok(Particle {
-            position: DVec3::new(coordinate(x, "x")?, coordinate(y, "y")?, coordinate(z, "z")?),
+            position: DVec3::new(x?, y?, z?),
             sigma,
             aspect,
-            kappa: size(self.kappa, "kappa")?,
-            color: match self.color {
-                None => DVec3::ONE,
-                Some([r, g, b]) => DVec3::new(size(r, "r")?, size(g, "g")?, size(b, "b")?),
-            },
+            kappa: size(KAPPA)?.unwrap_or(0.0),
+            color: DVec3::new(r?.unwrap_or(1.0), g?.unwrap_or(1.0), b?.unwrap_or(1.0)),
         })
     }
 }
 
-/// What is expected of σ along y, where `v` is none, beside `sigma` along x and z.
+/// Returns the expected range when `v` is no σ along y beside `sigma` along x and z.
 fn wrong_height(v: f64, sigma: f64) -> Option<String> {
     let expected = || {
         let [low, high] = [MIN_ASPECT, 1.0 / MIN_ASPECT].map(|of| rounded(of * sigma));

@@ -1,6 +1,6 @@
-//! A view saved as a scene: the file that it was opened from, with what was set since laid over its
-//! text. What was not set stays as it was written, comments and order included; names of files are
-//! made right for the folder that it is saved to.
+//! A view saved as a scene: the file that it was opened from, with the settings made since laid
+//! over its text. All other text stays as it was, comments and order included. Names of files are
+//! made relative to the folder that the scene is saved to.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -8,15 +8,18 @@ use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 
 use super::atomic::write_atomic;
-use super::scene_lights::{DEFAULT_LIGHTS, DEFAULT_MATERIAL};
+use super::document::overrides::is_word;
+use super::document::tree::Document;
+use super::scene_keys::{DEFAULT_LIGHTS, DEFAULT_MATERIAL, add_defaults};
 use super::text_file::{SCENE_LIMIT, read_text};
-use super::toml_override::is_word;
-use super::toml_tree::Document;
 use crate::error::{Error, Result};
 
 /// Writes to `to`, which must not exist, the scene at `from` with `overrides` (`key.path=VALUE`, as
-/// `--set` has them) and, with `seed` N, cloud i's seed N + i. Loaded without any it is the scene
-/// that `from` is with them.
+/// `--set` has them) and, with `seed` N, cloud i's seed N + i. The saved scene is the one that
+/// `from` is with these overrides and seeds.
+///
+/// # Errors
+/// When `from` cannot be read, an override does not fit, or `to` exists or cannot be written.
 pub fn save(from: &Path, to: &Path, overrides: &[String], seed: Option<u32>) -> Result<()> {
     let text = text_of(from, to, overrides, seed)?;
     if to.symlink_metadata().is_ok() {
@@ -25,13 +28,15 @@ pub fn save(from: &Path, to: &Path, overrides: &[String], seed: Option<u32>) -> 
     write_atomic(to, |file| file.write_all(text.as_bytes()))
 }
 
-/// What [`save`] writes. `to` need not be there; its folder has to.
+/// Returns the text that [`save`] writes. The folder of `to` must exist, `to` need not.
+///
+/// # Errors
+/// As [`save`], but for writing.
 pub fn text_of(from: &Path, to: &Path, overrides: &[String], seed: Option<u32>) -> Result<String> {
     let text = read_text(from, SCENE_LIMIT, "a scene's tables, such as [camera] and [[cloud]]")?;
-    // What is wrong is said as whoever typed it would be told.
+    // A fault gives the message that `--set` gives.
     let mut document = Document::parse(text.clone(), from)?;
-    document.default_to("light", DEFAULT_LIGHTS);
-    document.default_to("material", DEFAULT_MATERIAL);
+    add_defaults(&mut document);
     document.apply(overrides)?;
     let fault = |what: String| Error::io(from, format!("cannot be saved otherwise: {what}"));
     let mut edited: DocumentMut =
@@ -48,7 +53,7 @@ pub fn text_of(from: &Path, to: &Path, overrides: &[String], seed: Option<u32>) 
         move_files(&mut edited, &old, &new)?;
     }
     let saved = edited.to_string();
-    // Lines end as they did.
+    // Lines keep their ends.
     let is_crlf = text.contains('\n') && text.matches('\n').count() == text.matches("\r\n").count();
     Ok(if is_crlf { saved.replace("\r\n", "\n").replace('\n', "\r\n") } else { saved })
 }
@@ -59,7 +64,7 @@ fn seeds(document: &DocumentMut, seed: u32) -> Vec<String> {
         Some(Item::Value(Value::Array(clouds))) => clouds.len(),
         _ => 0,
     };
-    // With wrap-around, as they are numbered where they are read.
+    // Seeds wrap around, as they do when a scene is read.
     (0..n as u32).map(|i| format!("cloud.{i}.seed={}", seed.wrapping_add(i))).collect()
 }
 
@@ -76,18 +81,18 @@ fn value_of(text: &str) -> std::result::Result<Value, String> {
 
 type Done = std::result::Result<(), String>;
 
-/// Lays a value over the scene and its phases, which otherwise would lay theirs over it.
+/// Lays a value over the scene and over its phases, whose values would otherwise win.
 fn set(document: &mut DocumentMut, segments: &[&str], value: &Value) -> Done {
     for (name, default) in [("light", DEFAULT_LIGHTS), ("material", DEFAULT_MATERIAL)] {
-        // What is set is of those that a scene without any has.
+        // The path leads into the lights or the material of a scene that has none.
         if segments.len() > 1 && segments[0] == name && !document.contains_key(name) {
             let default: DocumentMut =
                 default.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
             document.extend(default.iter().map(|(key, item)| (key.to_owned(), item.clone())));
         }
     }
-    put_in_table(document.as_table_mut(), segments, value)?;
-    for phase in items(document.get_mut("phase")) {
+    put(Part::Table(document.as_table_mut()), segments, value)?;
+    for phase in phases(document) {
         let Some(of_phase) = phase.get_mut("set") else { continue };
         if over_phase(of_phase, &[], segments, value)?
             && let Some(table) = of_phase.as_table_like_mut()
@@ -98,93 +103,104 @@ fn set(document: &mut DocumentMut, segments: &[&str], value: &Value) -> Done {
     Ok(())
 }
 
-/// The tables of an array of tables, however it is written.
-fn items(array: Option<&mut Item>) -> Vec<&mut dyn TableLike> {
-    match array {
-        Some(Item::ArrayOfTables(tables)) => {
-            tables.iter_mut().map(|t| t as &mut dyn TableLike).collect()
+/// A part of a document, without regard to how it is written.
+enum Part<'a> {
+    Table(&'a mut (dyn TableLike + 'a)),
+    Array(Vec<Part<'a>>),
+    /// Any value; `open` tells tables and arrays apart.
+    Value(&'a mut Value),
+}
+
+impl<'a> Part<'a> {
+    fn of(item: &'a mut Item) -> Option<Part<'a>> {
+        match item {
+            Item::None => None,
+            Item::Value(value) => Some(Part::Value(value)),
+            Item::Table(table) => Some(Part::Table(table)),
+            Item::ArrayOfTables(tables) => {
+                Some(Part::Array(tables.iter_mut().map(|table| Part::Table(table)).collect()))
+            }
         }
-        Some(Item::Value(Value::Array(values))) => values
-            .iter_mut()
-            .filter_map(|v| v.as_inline_table_mut().map(|t| t as &mut dyn TableLike))
-            .collect(),
-        _ => vec![],
+    }
+
+    fn open(self) -> Part<'a> {
+        match self {
+            Part::Value(Value::InlineTable(table)) => Part::Table(table),
+            Part::Value(Value::Array(values)) => {
+                Part::Array(values.iter_mut().map(Part::Value).collect())
+            }
+            other => other,
+        }
+    }
+
+    fn into_table(self) -> Option<&'a mut (dyn TableLike + 'a)> {
+        match self.open() {
+            Part::Table(table) => Some(table),
+            _ => None,
+        }
     }
 }
 
-/// `toml_override::put`, of text.
-fn put(item: &mut Item, segments: &[&str], value: &Value) -> Done {
-    match item {
-        Item::ArrayOfTables(tables) if !segments.is_empty() => {
-            for i in picked(segments[0], tables.len())? {
-                match (tables.get_mut(i), segments.len()) {
-                    (Some(table), 2..) => put_in_table(table, &segments[1..], value)?,
-                    _ => return Err(format!("{} is a table", segments[0])),
-                }
+fn phases(document: &mut DocumentMut) -> Vec<&mut (dyn TableLike + '_)> {
+    let phases = document.get_mut("phase").and_then(Part::of);
+    let Some(Part::Array(phases)) = phases.map(Part::open) else { return Vec::new() };
+    phases.into_iter().filter_map(Part::into_table).collect()
+}
+
+/// Puts a value at `segments` below a part.
+fn put(part: Part<'_>, segments: &[&str], value: &Value) -> Done {
+    let Some((first, rest)) = segments.split_first() else {
+        let Part::Value(old) = part else { return Err("a table is no value".to_owned()) };
+        // The space before the value and the comment behind it stay.
+        let decor = old.decor().clone();
+        *old = value.clone();
+        *old.decor_mut() = decor;
+        return Ok(());
+    };
+    match part.open() {
+        Part::Value(_) => Err(format!("a value holds no {first}")),
+        Part::Array(mut parts) => {
+            let n = parts.len();
+            let i = first.parse().ok().filter(|i| *i < n);
+            if i.is_none() && *first != "*" {
+                return Err(format!("there are {n} items, and no {first}"));
             }
+            let picked = parts.drain(i.map_or(0..n, |i| i..i + 1));
+            picked.into_iter().try_for_each(|part| put(part, rest, value))
+        }
+        Part::Table(table) => {
+            if let Some(item) = table.get_mut(first) {
+                return put_item(item, rest, value);
+            }
+            let mut new = Item::Value(value.clone());
+            if !rest.is_empty() {
+                let mut table = Table::new();
+                table.decor_mut().set_prefix("\n");
+                put(Part::Table(&mut table), rest, value)?;
+                new = Item::Table(table);
+            }
+            table.insert(first, new);
             Ok(())
         }
-        Item::Value(old) => put_in_value(old, segments, value),
-        _ if segments.is_empty() => {
+    }
+}
+
+/// Puts a value at `segments` below an item, or in its place.
+fn put_item(item: &mut Item, segments: &[&str], value: &Value) -> Done {
+    match Part::of(item) {
+        Some(part) if !segments.is_empty() || matches!(part, Part::Value(_)) => {
+            put(part, segments, value)
+        }
+        _ => {
             *item = Item::Value(value.clone());
             Ok(())
         }
-        _ => match item.as_table_like_mut() {
-            Some(table) => put_in_table(table, segments, value),
-            None => Err(format!("nothing holds {}", segments[0])),
-        },
     }
 }
 
-fn put_in_value(old: &mut Value, segments: &[&str], value: &Value) -> Done {
-    match (old, segments) {
-        (old, []) => {
-            // The space before it, and the comment behind.
-            let decor = old.decor().clone();
-            *old = value.clone();
-            *old.decor_mut() = decor;
-            Ok(())
-        }
-        (Value::InlineTable(table), _) => put_in_table(table, segments, value),
-        (Value::Array(values), [first, rest @ ..]) => {
-            for i in picked(first, values.len())? {
-                values.get_mut(i).map_or(Ok(()), |old| put_in_value(old, rest, value))?;
-            }
-            Ok(())
-        }
-        (_, [first, ..]) => Err(format!("a value holds no {first}")),
-    }
-}
-
-fn put_in_table(table: &mut dyn TableLike, segments: &[&str], value: &Value) -> Done {
-    let Some((first, rest)) = segments.split_first() else {
-        return Err("a table is no value".to_owned());
-    };
-    if let Some(item) = table.get_mut(first) {
-        return put(item, rest, value);
-    }
-    if rest.is_empty() {
-        table.insert(first, Item::Value(value.clone()));
-        return Ok(());
-    }
-    let mut new = Table::new();
-    new.decor_mut().set_prefix("\n");
-    put_in_table(&mut new, rest, value)?;
-    table.insert(first, Item::Table(new));
-    Ok(())
-}
-
-/// Which of `n` items a segment means.
-fn picked(segment: &str, n: usize) -> std::result::Result<Vec<usize>, String> {
-    match segment.parse::<usize>() {
-        _ if segment == "*" => Ok((0..n).collect()),
-        Ok(i) if i < n => Ok(vec![i]),
-        _ => Err(format!("there are {n} items, and no {segment}")),
-    }
-}
-
-/// Changes what a phase sets (`item`, at `at` below its `set`) where it is what `segments` mean;
-/// true where the phase sets that for several items together, and `segments` mean one of them.
+/// Changes the values that a phase sets where `segments` lead to them. `item` is at `at` below the
+/// phase's `set`. Returns true if the phase sets the value for several items of an array together
+/// and `segments` lead to one of them.
 fn over_phase(
     item: &mut Item,
     at: &[String],
@@ -210,18 +226,18 @@ fn over_phase(
             continue;
         }
         if at.len() > segments.len() {
-            // The whole that it is of is set anew.
+            // The value that holds this one is replaced.
             table.remove(&key);
         } else if at.iter().zip(segments).any(|(own, asked)| own == "*" && *asked != "*") {
             is_of_several = true;
         } else {
-            put(item, &segments[at.len()..], value)?;
+            put_item(item, &segments[at.len()..], value)?;
         }
     }
     Ok(is_of_several)
 }
 
-/// The folder that names in a scene at `path` are relative to, by its true name.
+/// Returns the canonical name of the folder that names in a scene at `path` are relative to.
 fn folder_of(path: &Path) -> Result<PathBuf> {
     let folder = match path.parent() {
         Some(folder) if folder != Path::new("") => folder,
@@ -232,72 +248,48 @@ fn folder_of(path: &Path) -> Result<PathBuf> {
         .map_err(|e| Error::io(path, format!("its folder {}: {e}", folder.display())))
 }
 
-/// Names of files relative to `old` become relative to `new`, in the scene and in what its phases
-/// set.
+/// Makes names of files relative to `new` in place of `old`, in the scene and in its phases.
 fn move_files(document: &mut DocumentMut, old: &Path, new: &Path) -> Result<()> {
     let mut moved = |value: &mut Value| -> Result<()> {
         let Some(name) = value.as_str().filter(|name| Path::new(name).is_relative()) else {
             return Ok(());
         };
         let name = relative(&old.join(name), new)?;
-        put_in_value(value, &[], &Value::from(name)).map_err(|what| Error::io(new, what))
+        put(Part::Value(value), &[], &Value::from(name)).map_err(|what| Error::io(new, what))
     };
-    each_file(document.as_item_mut(), &mut vec![], &mut moved)?;
-    for phase in items(document.get_mut("phase")) {
-        if let Some(of_phase) = phase.get_mut("set") {
-            each_file(of_phase, &mut vec![], &mut moved)?;
+    each_file(Part::Table(document.as_table_mut()), &[], &mut moved)?;
+    for phase in phases(document) {
+        if let Some(of_phase) = phase.get_mut("set").and_then(Part::of) {
+            each_file(of_phase, &[], &mut moved)?;
         }
     }
     Ok(())
 }
 
-type OnFile<'a> = &'a mut dyn FnMut(&mut Value) -> Result<()>;
-
-/// `cloud.*.file` below `item`, which lies at `at`.
-fn each_file(item: &mut Item, at: &mut Vec<String>, on: OnFile<'_>) -> Result<()> {
-    match item {
-        Item::Value(value) => each_file_of_value(value, at, on),
-        Item::ArrayOfTables(tables) => tables.iter_mut().enumerate().try_for_each(|(i, table)| {
-            at.push(i.to_string());
-            let done = each_file_of_table(table, at, on);
-            at.pop();
-            done
-        }),
-        Item::Table(table) => each_file_of_table(table, at, on),
-        Item::None => Ok(()),
-    }
-}
-
-fn each_file_of_table(
-    table: &mut dyn TableLike,
-    at: &mut Vec<String>,
-    on: OnFile<'_>,
+/// Calls `on` with every `cloud.*.file` below a part, which is at `at`.
+fn each_file(
+    part: Part<'_>,
+    at: &[String],
+    on: &mut dyn FnMut(&mut Value) -> Result<()>,
 ) -> Result<()> {
-    table.iter_mut().try_for_each(|(key, item)| {
-        let n_before = at.len();
-        at.extend(key.get().split('.').map(str::to_owned));
-        let done = each_file(item, at, on);
-        at.truncate(n_before);
-        done
-    })
-}
-
-fn each_file_of_value(value: &mut Value, at: &mut Vec<String>, on: OnFile<'_>) -> Result<()> {
-    match value {
-        Value::InlineTable(table) => each_file_of_table(table, at, on),
-        Value::Array(values) => values.iter_mut().enumerate().try_for_each(|(i, value)| {
-            at.push(i.to_string());
-            let done = each_file_of_value(value, at, on);
-            at.pop();
-            done
+    match part.open() {
+        Part::Table(table) => table.iter_mut().try_for_each(|(key, item)| {
+            // A key in quotes may be a whole path.
+            let at: Vec<String> =
+                at.iter().cloned().chain(key.get().split('.').map(str::to_owned)).collect();
+            Part::of(item).map_or(Ok(()), |part| each_file(part, &at, on))
         }),
-        _ if at.len() == 3 && at[0] == "cloud" && at[2] == "file" => on(value),
-        _ => Ok(()),
+        Part::Array(parts) => parts
+            .into_iter()
+            .enumerate()
+            .try_for_each(|(i, part)| each_file(part, &[at, &[i.to_string()]].concat(), on)),
+        Part::Value(value) if at.len() == 3 && at[0] == "cloud" && at[2] == "file" => on(value),
+        Part::Value(_) => Ok(()),
     }
 }
 
-/// The name of `file` as seen from the folder `from`, a true name; with slashes, which every system
-/// knows.
+/// Returns the name of `file` relative to the folder `from`, a canonical name. Parts are separated
+/// by slashes, which every system reads.
 fn relative(file: &Path, from: &Path) -> Result<String> {
     let fault = |what: String| Error::io(file, what);
     let name = file.file_name().ok_or_else(|| fault("expected a file name".to_owned()))?;
@@ -308,7 +300,7 @@ fn relative(file: &Path, from: &Path) -> Result<String> {
     let n_shared = folder_parts.iter().zip(&from_parts).take_while(|(a, b)| a == b).count();
     let text = |part: &std::ffi::OsStr| part.to_str().map(str::to_owned);
     let unnamed = || fault("its path is no text that a scene could have".to_owned());
-    // On another drive nothing leads there but its whole name.
+    // Only an absolute name leads to another drive.
     if n_shared == 0 {
         return text(folder.join(name).as_os_str()).ok_or_else(unnamed);
     }

@@ -1,4 +1,4 @@
-//! Reading an input file as text, with a limit that is looked at before the first byte is read.
+//! Reads files as text, up to a limit that is checked before the first byte is read.
 
 use std::fs::{self, File};
 use std::io::{ErrorKind, Read};
@@ -6,28 +6,30 @@ use std::path::Path;
 
 use crate::error::{Error, Place, Result};
 
-/// A scene is written by hand; the greatest benchmark scene has a few KiB.
+/// Largest scene file. Scenes are written by hand; the largest benchmark scene has a few KiB.
 pub const SCENE_LIMIT: u64 = 4 << 20;
-/// Box files and particle lists: 64 MiB is about a million particles as text.
+/// Largest box file and particle list: 64 MiB is about a million particles as text.
 pub const DATA_LIMIT: u64 = 64 << 20;
-/// Results as JSON: a study of ten thousand configurations. As a tree it takes up to a hundred
+/// Largest result as JSON: a study of ten thousand configurations. Its tree takes up to a hundred
 /// times its text.
 pub const RECORD_LIMIT: u64 = 16 << 20;
-/// Results as tables: two million frames of 250 bytes.
+/// Largest result as a table: two million frames of 250 bytes.
 pub const TABLE_LIMIT: u64 = 512 << 20;
 
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// The text of `path`, whose kind begins with `first`. A byte-order mark is dropped. What the file
-/// system refuses is an [`Error::Io`]; content that is no text is an [`Error::Scene`] with its line
-/// and column.
+/// Reads an input file, whose kind begins with `first`, as text without a byte-order mark.
+///
+/// # Errors
+/// [`Error::Io`] when the file cannot be read or is larger than `limit`, and [`Error::Scene`] with
+/// line and column when it is empty or no text.
 pub fn read_text(path: &Path, limit: u64, first: &str) -> Result<String> {
     let about = fs::metadata(path).map_err(|e| Error::io(path, plain(&e)))?;
     if about.is_dir() {
         return Err(Error::io(path, "is a folder, expected a file"));
     }
     if !about.is_file() {
-        // A pipe or a device has no size to check, and may never end.
+        // A pipe or a device has no size that could be checked, and may never end.
         return Err(Error::io(path, "is not a regular file"));
     }
     if about.len() > limit {
@@ -35,7 +37,7 @@ pub fn read_text(path: &Path, limit: u64, first: &str) -> Result<String> {
     }
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(|e| Error::io(path, plain(&e)))?;
-    // The file may have grown since its size was looked at.
+    // The file may have grown since its size was checked.
     file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, plain(&e)))?;
     if bytes.len() as u64 > limit {
         return Err(Error::io(path, too_large(bytes.len() as u64, limit)));
@@ -50,7 +52,8 @@ pub fn read_text(path: &Path, limit: u64, first: &str) -> Result<String> {
     Ok(text)
 }
 
-/// Line and column (characters), both from 1, of a byte offset; an offset past the end is the end.
+/// Returns line and column (characters), both from 1, of a byte offset. An offset past the end is
+/// the end.
 pub fn line_column(text: &str, offset: usize) -> (usize, usize) {
     let mut end = offset.min(text.len());
     while !text.is_char_boundary(end) {
@@ -61,7 +64,10 @@ pub fn line_column(text: &str, offset: usize) -> (usize, usize) {
     (before.bytes().filter(|b| *b == b'\n').count() + 1, before[line_start..].chars().count() + 1)
 }
 
-/// The text of a result that nimbus wrote; whether it is one is for its reader to say.
+/// Reads a result of nimbus as text.
+///
+/// # Errors
+/// When the file cannot be read or is larger than `limit`.
 pub fn read_result(path: &Path, limit: u64) -> Result<String> {
     let about = fs::metadata(path).map_err(|cause| Error::io(path, cause))?;
     if !about.is_file() {
@@ -75,8 +81,8 @@ pub fn read_result(path: &Path, limit: u64) -> Result<String> {
 
 fn decode(bytes: Vec<u8>, path: &Path) -> Result<String> {
     let at = |bytes: &[u8], offset: usize| {
-        // What stands before the offset may itself be no text; its line and column are then those
-        // of the replacement characters an editor would show.
+        // The bytes before the offset may be no text either. They count as the replacement
+        // characters that an editor would show.
         let (line, column) = line_column(&String::from_utf8_lossy(&bytes[..offset]), usize::MAX);
         Place::line(path, line, column)
     };
@@ -104,7 +110,7 @@ fn too_large(size: u64, limit: u64) -> String {
     )
 }
 
-/// The operating system's words without its error number, which tells a user nothing.
+/// Returns the message of an error without its number, which tells a user nothing.
 fn plain(e: &std::io::Error) -> String {
     match e.kind() {
         ErrorKind::NotFound => "no such file".to_owned(),

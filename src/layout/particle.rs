@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::layout::record;
-use crate::model::boxes::{CloudBox, Form, radius_factor};
+use crate::model::boxes::{BoxLaw, CloudBox, Form, radius_factor};
 use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
 use crate::model::count::DrawnCount;
 use crate::model::gust::Mode;
@@ -80,30 +80,17 @@ impl ParticleRecord {
     }
 }
 
-/// The law by which a cloud generates the particles of all its boxes.
-#[derive(Debug, Clone, Copy)]
-pub struct BoxLaw {
-    /// The form of P (1)–(7).
-    pub form: Form,
-    /// Mean optical depth through a particle's centre.
-    pub optical_depth: f64,
-    /// Factor on all radii.
-    pub radius_scale: f64,
-    /// Philox key.
-    pub seed: u32,
-}
-
 impl BoxRecord {
-    /// Returns the record of box `i_box` of its cloud, whose particles start at `i_first`.
-    pub fn new(b: &CloudBox, law: &BoxLaw, i_box: u32, i_first: u32) -> Self {
+    /// Returns the record of box `i_box` of a cloud with `seed`; its particles start at `i_first`.
+    pub fn new(b: &CloudBox, law: &BoxLaw, seed: u32, i_box: u32, i_first: u32) -> Self {
         BoxRecord {
             extent: b.extent.as_vec3().to_array(),
             radius_max: b.radius_max as f32,
             sigma_factor: (radius_factor(law.form, b.radius_max)
                 * law.radius_scale
                 * SIGMA_PER_RADIUS) as f32,
-            kappa: box_kappa(b, law.form, law.optical_depth, law.radius_scale) as f32,
-            seed: law.seed,
+            kappa: box_kappa(b, law) as f32,
+            seed,
             i_box,
             i_first,
             n_particles: b.n_particles,

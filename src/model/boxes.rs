@@ -37,6 +37,24 @@ impl Form {
         [("centred", Form::Centred), ("printed", Form::Printed)];
 }
 
+/// How a cloud's particles are made from its boxes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoxLaw {
+    /// Reading of P (1)–(11).
+    pub form: Form,
+    /// Optical depth through the centre of a blob of a box's mean radius.
+    pub optical_depth: f64,
+    /// Factor on the radii of the box file.
+    pub radius_scale: f64,
+}
+
+impl BoxLaw {
+    /// Returns the law of a scene that sets neither optical depth nor scale: both are 1.
+    pub const fn new(form: Form) -> BoxLaw {
+        BoxLaw { form, optical_depth: 1.0, radius_scale: 1.0 }
+    }
+}
+
 /// Returns P (10)–(11) without scale: R + π/2 sin R.
 pub fn radius_shape(r: f64) -> f64 {
     r + FRAC_PI_2 * r.sin()

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::animated::AnimatedParticles;
-use super::boxes::{CloudBox, Form, max_radius, mean_radius};
+use super::boxes::{BoxLaw, CloudBox, max_radius, mean_radius};
 use super::disc::Disc;
 pub use super::group::{Group, max_blob_mass, runs};
 use super::growth::Growth;
@@ -58,9 +58,13 @@ const FAR_BELOW: f64 = 1e9;
 /// Source of a cloud's particles.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CloudSource {
-    /// P (1)–(11). `optical_depth` is through the centre of a blob of the box's mean radius;
-    /// `radius_scale` multiplies the file's radii.
-    Boxes { boxes: Vec<CloudBox>, form: Form, optical_depth: f64, radius_scale: f64 },
+    /// Particles made from boxes, P (1)–(11).
+    Boxes {
+        /// Lines of the box file.
+        boxes: Vec<CloudBox>,
+        /// How particles are made from them.
+        law: BoxLaw,
+    },
     /// A list of blobs as given.
     Particles(Vec<Particle>),
     /// Particles that are born on a disc, live for some time and are replaced.
@@ -149,12 +153,12 @@ impl Cloud {
             gust_reach: self.gust.reach(),
         };
         match &self.source {
-            CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
+            CloudSource::Boxes { boxes, law } => boxes
                 .iter()
                 .map(|b| {
                     let sigma_max =
-                        max_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
-                    let kappa = box_kappa(b, *form, *optical_depth, *radius_scale);
+                        max_radius(law.form, b.radius_max) * law.radius_scale * SIGMA_PER_RADIUS;
+                    let kappa = box_kappa(b, law);
                     let group = Group {
                         i_first,
                         n_particles: b.n_particles,
@@ -162,8 +166,8 @@ impl Cloud {
                         half_extent: 0.5 * b.extent,
                         sigma_max,
                         sigma_y_max: sigma_max,
-                        sigma_mean: mean_radius(*form, b.radius_max)
-                            * radius_scale
+                        sigma_mean: mean_radius(law.form, b.radius_max)
+                            * law.radius_scale
                             * SIGMA_PER_RADIUS,
                         kappa_max: kappa,
                         mass_max: mass(kappa, sigma_max),
@@ -184,9 +188,9 @@ impl Cloud {
 
 /// Returns κ of a box's blobs: √(2π) κ σ̄ = optical_depth at the mean radius (model.md §1). 0 if
 /// blobs have no size.
-pub fn box_kappa(b: &CloudBox, form: Form, optical_depth: f64, radius_scale: f64) -> f64 {
-    let sigma = mean_radius(form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
-    if sigma > 0.0 { optical_depth / (SQRT_TAU * sigma) } else { 0.0 }
+pub fn box_kappa(b: &CloudBox, law: &BoxLaw) -> f64 {
+    let sigma = mean_radius(law.form, b.radius_max) * law.radius_scale * SIGMA_PER_RADIUS;
+    if sigma > 0.0 { law.optical_depth / (SQRT_TAU * sigma) } else { 0.0 }
 }
 
 fn list_group(list: &[Particle], at_rest: Group) -> Group {
@@ -251,15 +255,17 @@ fn animated_group(m: &AnimatedParticles, at_rest: Group) -> Group {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::boxes::Form;
 
     #[test]
     fn kappa_gives_the_optical_depth_at_the_mean_radius() {
         let b =
             CloudBox { n_particles: 5, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 2.2 };
-        let kappa = box_kappa(&b, Form::Centred, 1.5, 0.6);
+        let law = BoxLaw { form: Form::Centred, optical_depth: 1.5, radius_scale: 0.6 };
+        let kappa = box_kappa(&b, &law);
         let sigma = mean_radius(Form::Centred, 2.2) * 0.6 / 3.0;
         assert!((SQRT_TAU * kappa * sigma - 1.5).abs() < 1e-14);
-        assert_eq!(box_kappa(&CloudBox { radius_max: 0.0, ..b }, Form::Centred, 1.5, 0.6), 0.0);
+        assert_eq!(box_kappa(&CloudBox { radius_max: 0.0, ..b }, &law), 0.0);
     }
 
     #[test]
@@ -274,12 +280,8 @@ mod tests {
     fn groups_number_particles_through_and_keep_empty_boxes() {
         let b =
             |n| CloudBox { n_particles: n, extent: DVec3::ONE, center: DVec3::X, radius_max: 1.0 };
-        let source = CloudSource::Boxes {
-            boxes: vec![b(3), b(0), b(4)],
-            form: Form::Centred,
-            optical_depth: 1.0,
-            radius_scale: 1.0,
-        };
+        let source =
+            CloudSource::Boxes { boxes: vec![b(3), b(0), b(4)], law: BoxLaw::new(Form::Centred) };
         let (gust, growth) = (Gust::CALM, Growth::NONE);
         let cloud = Cloud {
             facing: crate::model::cloud::Facing::Outward,

@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
 
-use crate::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, radius_factor, radius_shape};
+use crate::model::boxes::{BoxLaw, CloudBox, Form, MAX_ATTEMPTS, radius_factor, radius_shape};
 use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
 use crate::model::philox::{philox4x32_10, uniform};
 
@@ -124,9 +124,7 @@ pub fn generate_particle(
     b: &CloudBox,
     i_box: u32,
     seed: u32,
-    form: Form,
-    optical_depth: f64,
-    radius_scale: f64,
+    law: &BoxLaw,
     i_particle: u32,
 ) -> Generated {
     let half = 0.5 * b.extent;
@@ -135,7 +133,7 @@ pub fn generate_particle(
     let mut accepted_at = None;
     for attempt in 0..MAX_ATTEMPTS {
         let [u1, u2, u3, u4] = uniforms(seed, i_box, i_particle, attempt);
-        let v = offset(b.extent, form, [u1, u2, u3]);
+        let v = offset(b.extent, law.form, [u1, u2, u3]);
         margin = margin.min(decision_margin(v, half));
         last = (v, u4);
         if is_inside(v, half) {
@@ -148,13 +146,13 @@ pub fn generate_particle(
         Some(_) => v,
         None => DVec3::new(fold(v.x, half.x), fold(v.y, half.y), fold(v.z, half.z)),
     };
-    let radius = radius(form, b.radius_max, u4);
+    let radius = radius(law.form, b.radius_max, u4);
     Generated {
         position,
         radius,
-        sigma: radius * radius_scale * SIGMA_PER_RADIUS,
+        sigma: radius * law.radius_scale * SIGMA_PER_RADIUS,
         aspect: 1.0,
-        kappa: box_kappa(b, form, optical_depth, radius_scale),
+        kappa: box_kappa(b, law),
         n_attempts: accepted_at.map_or(MAX_ATTEMPTS, |a| a + 1),
         folded: accepted_at.is_none(),
         margin,
@@ -162,17 +160,8 @@ pub fn generate_particle(
 }
 
 /// Generates all particles of a box.
-pub fn generate_box(
-    b: &CloudBox,
-    i_box: u32,
-    seed: u32,
-    form: Form,
-    optical_depth: f64,
-    radius_scale: f64,
-) -> Vec<Generated> {
-    (0..b.n_particles)
-        .map(|i| generate_particle(b, i_box, seed, form, optical_depth, radius_scale, i))
-        .collect()
+pub fn generate_box(b: &CloudBox, i_box: u32, seed: u32, law: &BoxLaw) -> Vec<Generated> {
+    (0..b.n_particles).map(|i| generate_particle(b, i_box, seed, law, i)).collect()
 }
 
 /// Returns a particle of a list relative to its group's origin.

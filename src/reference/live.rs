@@ -121,10 +121,8 @@ pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
             let particles = m.animation.at(time_s).unwrap_or_default();
             return particles.iter().map(|p| generate::given(p, groups.first())).collect();
         }
-        CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => {
-            let of = |(b, i): (_, u32)| {
-                generate::generate_box(b, i, cloud.seed, *form, *optical_depth, *radius_scale)
-            };
+        CloudSource::Boxes { boxes, law } => {
+            let of = |(b, i): (_, u32)| generate::generate_box(b, i, cloud.seed, law);
             return boxes.iter().zip(0..).flat_map(of).collect();
         }
         CloudSource::Particles(list) => {

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::case::{Case, Comparison};
 use super::context::StressContext;
-use super::scenes::{OPTICAL_DEPTH, SEED, UNLIT, box_scene, centred_box, change_camera};
+use super::scenes::{LAW, SEED, UNLIT, box_scene, centred_box, change_camera};
 use crate::error::{Error, Result};
 use crate::layout::particle::ParticleRecord;
 use crate::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, radius_factor, radius_shape};
@@ -140,7 +140,7 @@ fn each_particle(
 
 /// Returns particle `i` of a box as the reference generates it.
 fn reference(b: &CloudBox, i: u32) -> Generated {
-    generate_particle(b, 0, SEED, Form::Centred, OPTICAL_DEPTH, 1.0, i)
+    generate_particle(b, 0, SEED, &LAW, i)
 }
 
 /// Returns the rounding bound of [`reference`].

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::context::{DeviceFrame, StressContext};
 use crate::error::Result;
 use crate::io::scene_file::parse;
-use crate::model::boxes::{CloudBox, Form};
+use crate::model::boxes::{BoxLaw, CloudBox, Form};
 use crate::model::cloud::{Cloud, CloudSource, Facing, Particle, SQRT_TAU};
 use crate::model::growth::Growth;
 use crate::model::gust::Gust;
@@ -46,6 +46,8 @@ pub const PATHS: [&str; 2] = [SPRITES, TILES];
 pub const SEED: u32 = 9;
 /// Optical depth of the clouds of boxes.
 pub const OPTICAL_DEPTH: f64 = 1.3;
+/// Law of their boxes.
+pub const LAW: BoxLaw = BoxLaw { optical_depth: OPTICAL_DEPTH, ..BoxLaw::new(Form::Centred) };
 
 /// A sun in the zenith.
 pub const SUN_ABOVE: &str =
@@ -76,12 +78,7 @@ pub fn cloud_of(source: CloudSource) -> Cloud {
 /// Parses a scene text and adds a cloud of boxes.
 pub fn box_scene(text: &str, boxes: Vec<CloudBox>) -> Result<Scene> {
     let mut scene = parse_scene(text)?;
-    scene.clouds.push(cloud_of(CloudSource::Boxes {
-        boxes,
-        form: Form::Centred,
-        optical_depth: OPTICAL_DEPTH,
-        radius_scale: 1.0,
-    }));
+    scene.clouds.push(cloud_of(CloudSource::Boxes { boxes, law: LAW }));
     Ok(scene)
 }
 

@@ -256,3 +256,20 @@ impl Header {
         }
     }
 }
+
+/// Returns the message when a file is opened and every step of it read.
+pub fn message_of(bytes: &[u8]) -> String {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("bad.nc");
+    std::fs::write(&path, bytes).expect("written");
+    let error = match nimbus::io::weather::wrf::open(&path) {
+        Err(error) => error,
+        Ok(file) => (0..file.n_steps)
+            .find_map(|i| file.step(i).err().or_else(|| file.terrain(i).err()))
+            .expect("an error"),
+    };
+    assert_eq!(error.exit_code(), 2, "{error}");
+    let message = error.to_string();
+    let place = format!("{}: ", path.display());
+    message.strip_prefix(&place).unwrap_or_else(|| panic!("no place: {message}")).to_owned()
+}

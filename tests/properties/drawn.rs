@@ -7,7 +7,7 @@ use glam::DVec3;
 use nimbus::frame::serial;
 use nimbus::frame::stage::DeviceChoice;
 use nimbus::io::scene_file::parse;
-use nimbus::model::boxes::{CloudBox, Form};
+use nimbus::model::boxes::{BoxLaw, CloudBox, Form};
 use nimbus::model::cloud::{Cloud, CloudSource, Particle};
 use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
@@ -82,8 +82,8 @@ fn with_clouds((text, list, one_box, is_stirred): Made) -> Scene {
     let gust = if is_stirred { stirred } else { Gust::CALM };
     scene.clouds.push(cloud_of(CloudSource::Particles(list), gust));
     if let Some(one_box) = one_box {
-        let (form, boxes) = (Form::Centred, vec![one_box]);
-        let source = CloudSource::Boxes { boxes, form, optical_depth: 1.3, radius_scale: 1.0 };
+        let law = BoxLaw { optical_depth: 1.3, ..BoxLaw::new(Form::Centred) };
+        let source = CloudSource::Boxes { boxes: vec![one_box], law };
         scene.clouds.push(cloud_of(source, gust));
     }
     scene

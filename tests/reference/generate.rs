@@ -2,7 +2,7 @@
 
 use super::one_box;
 use glam::DVec3;
-use nimbus::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, mean_radius};
+use nimbus::model::boxes::{BoxLaw, CloudBox, Form, MAX_ATTEMPTS, mean_radius};
 use nimbus::reference::generate::{
     Acceptance, decision_margin, fold, generate_box, generate_particle, is_inside, uniforms,
 };
@@ -39,9 +39,7 @@ fn a_particle_worked_by_hand() {
         &one_box(1, DVec3::new(8.0, 6.0, 4.0), 2.0),
         0,
         0,
-        Form::Centred,
-        1.5,
-        0.5,
+        &BoxLaw { form: Form::Centred, optical_depth: 1.5, radius_scale: 0.5 },
         0,
     );
     // 16 digits, and some ten roundings of numbers below 8.
@@ -59,9 +57,7 @@ fn a_particle_worked_by_hand() {
         &one_box(1, DVec3::new(6.0, 10.0, 8.0), 2.0),
         0,
         0,
-        Form::Printed,
-        1.0,
-        1.0,
+        &BoxLaw::new(Form::Printed),
         0,
     );
     let expected = DVec3::new(1.9451384363068946, 3.0979168168704407, 3.0979168168704407);
@@ -74,12 +70,12 @@ fn p9_holds_centred_and_breaks_for_most_particles_as_printed() {
     let (mut n_broken, mut n) = (0, 0);
     for (b, i_box) in paper_boxes().iter().zip(0..) {
         let b = CloudBox { n_particles: 2000, ..*b };
-        let centred = generate_box(&b, i_box, 1, Form::Centred, 1.0, 1.0);
+        let centred = generate_box(&b, i_box, 1, &BoxLaw::new(Form::Centred));
         // One rounding of the factor, one of the product.
         assert!(
             centred.iter().all(|p| p.radius >= 0.0 && p.radius <= b.radius_max * (1.0 + 4e-16))
         );
-        let printed = generate_box(&b, i_box, 1, Form::Printed, 1.0, 1.0);
+        let printed = generate_box(&b, i_box, 1, &BoxLaw::new(Form::Printed));
         n_broken += printed.iter().filter(|p| p.radius > b.radius_max).count();
         n += printed.len();
     }
@@ -92,13 +88,13 @@ fn p9_holds_centred_and_breaks_for_most_particles_as_printed() {
 fn particles_lie_in_their_boxes_and_acceptance_is_a_share() {
     for form in FORMS {
         for (b, i_box) in paper_boxes().iter().zip(0..) {
-            let particles = generate_box(b, i_box, 1, form, 1.0, 1.0);
+            let particles = generate_box(b, i_box, 1, &BoxLaw::new(form));
             assert_eq!(particles.len(), b.n_particles as usize);
             assert!(particles.iter().all(|p| is_inside(p.position, 0.5 * b.extent)));
             let a = Acceptance::of(&particles);
             assert_eq!(a.n_accepted + a.n_folded, u64::from(b.n_particles));
             let many =
-                generate_box(&CloudBox { n_particles: 20_000, ..*b }, i_box, 1, form, 1.0, 1.0);
+                generate_box(&CloudBox { n_particles: 20_000, ..*b }, i_box, 1, &BoxLaw::new(form));
             let many = Acceptance::of(&many);
             let rate = many.rate().unwrap();
             println!(
@@ -114,7 +110,7 @@ fn particles_lie_in_their_boxes_and_acceptance_is_a_share() {
 fn a_needle_ends_at_its_bound_and_is_folded() {
     // Along x the phase P_y = π/2 sin X/2 moves every particle out of a box without height.
     let needle = one_box(50, DVec3::new(10.0, 0.0, 0.0), 1.0);
-    let particles = generate_box(&needle, 0, 1, Form::Centred, 1.0, 1.0);
+    let particles = generate_box(&needle, 0, 1, &BoxLaw::new(Form::Centred));
     for p in &particles {
         assert_eq!((p.n_attempts, p.folded), (MAX_ATTEMPTS, true));
         assert!(p.position.y == 0.0 && p.position.z == 0.0 && p.position.x.abs() <= 5.0);
@@ -124,7 +120,7 @@ fn a_needle_ends_at_its_bound_and_is_folded() {
         Acceptance { n_attempts: 50 * 64, n_accepted: 0, n_folded: 50 }
     );
     // A box without extent moves nothing: sin 0 everywhere, and the centre is inside.
-    let point = generate_box(&one_box(3, DVec3::ZERO, 0.0), 0, 1, Form::Centred, 1.0, 1.0);
+    let point = generate_box(&one_box(3, DVec3::ZERO, 0.0), 0, 1, &BoxLaw::new(Form::Centred));
     assert!(point.iter().all(|p| p.n_attempts == 1 && p.position == DVec3::ZERO && p.kappa == 0.0));
     assert_eq!(Acceptance::of(&[]).rate(), None);
 }
@@ -156,7 +152,7 @@ fn folding_mirrors_at_the_faces() {
 fn radii_have_their_mean_and_positions_their_symmetry() {
     for form in FORMS {
         let b = one_box(100_000, DVec3::new(7.4, 1.07, 2.9), 2.1);
-        let particles = generate_box(&b, 0, 3, form, 1.0, 1.0);
+        let particles = generate_box(&b, 0, 3, &BoxLaw::new(form));
         let mean_of = |f: &dyn Fn(usize) -> f64| {
             let n = particles.len() as f64;
             let mean = (0..particles.len()).map(f).sum::<f64>() / n;
@@ -244,7 +240,7 @@ fn f32_evaluations_stay_within_their_bound() {
         for (b, i_box) in boxes.iter().zip(0..) {
             for i in 0..100_000 / 18 + 1 {
                 n += 1;
-                let exact = generate_particle(b, i_box, 1, form, 1.0, 1.0, i);
+                let exact = generate_particle(b, i_box, 1, &BoxLaw::new(form), i);
                 let bound = particle_bound(b, i_box, 1, form, i, U_F32);
                 let (v, r, n_attempts) = InF32 { form, sine }.particle(b, i_box, i);
                 n_folded += u32::from(exact.folded);

@@ -3,7 +3,7 @@
 use super::one_box;
 use glam::{DVec2, DVec3};
 use half::f16;
-use nimbus::model::boxes::Form;
+use nimbus::model::boxes::{BoxLaw, Form};
 use nimbus::model::camera::Pose;
 use nimbus::model::cloud::{SQRT_TAU, box_kappa};
 use nimbus::model::film::FilmFormat;
@@ -199,7 +199,7 @@ fn a_sprites_edge_may_fall_either_way() {
         let step = alpha(blob.deepest() * (-0.5 * (2.4 / sigma).powi(2)).exp());
         assert!(bound(1e-8) < 1e-6 && (bound(1e-6) - step).abs() < 1e-6);
     }
-    let kappa = box_kappa(&one_box(1, DVec3::ONE, 2.0), Form::Centred, 1.0, 1.0);
+    let kappa = box_kappa(&one_box(1, DVec3::ONE, 2.0), &BoxLaw::new(Form::Centred));
     assert!(kappa > 0.0 && radius(Form::Printed, 2.0, 0.0) == 0.0);
     assert_eq!(offset(DVec3::ONE, Form::Centred, [0.5; 3]), DVec3::ZERO);
 }

@@ -1,7 +1,7 @@
 use glam::DVec3;
 
 use super::*;
-use crate::model::boxes::{CloudBox, Form};
+use crate::model::boxes::{BoxLaw, CloudBox, Form};
 use crate::model::cloud::{Facing, Particle};
 use crate::model::growth::Growth;
 use crate::model::gust::Gust;
@@ -29,7 +29,10 @@ fn of_boxes(counts: &[u32]) -> Cloud {
         radius_max: 1.0,
     };
     let boxes = counts.iter().map(b).collect();
-    cloud(CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: 1.0, radius_scale: 0.6 })
+    cloud(CloudSource::Boxes {
+        boxes,
+        law: BoxLaw { radius_scale: 0.6, ..BoxLaw::new(Form::Centred) },
+    })
 }
 
 fn of_list(n: usize) -> Cloud {

@@ -1,9 +1,14 @@
-//! Weather models' output to plain data: a [`container`] of variables, which [`netcdf`] reads in
-//! every kind of the format, and [`wrf`], which knows what WRF's variables mean. What is done with
-//! the numbers is `model::weather`.
+//! Output of weather models to plain data: a [`container`] of variables, which [`netcdf`] reads in
+//! every kind of the format; [`wrf`], which knows what WRF's variables mean; and its clouds as
+//! particles, of one step (`blobs`) or moving from step to step (`moving`). The numbers are worked
+//! on in `model::weather`.
 
+pub mod blobs;
 pub mod container;
+pub mod moving;
 pub mod netcdf;
+mod spans;
 pub mod wrf;
 mod wrf_clock;
 mod wrf_fields;
+mod wrf_variables;

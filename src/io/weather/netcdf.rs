@@ -11,20 +11,21 @@ use netcdf_reader::{
     NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcVariable,
 };
 
-use super::container::{Attribute, Container, Dimension, Value, Variable};
+use super::container::{Attribute, Checked, Container, Dimension, Value, Variable};
 use crate::error::{Error, Place, Result};
 
-/// Most numbers that one part of a variable may have: what a step of the largest grid holds.
+/// Most numbers that one part of a variable may have: those of a step of the largest grid.
 const MOST_NUMBERS: u64 = 1 << 25;
 /// Most characters of a variable of text: a year of steps has less than 1 MiB.
 const MOST_CHARACTERS: u64 = 8 << 20;
-/// Largest chunk and largest part, bytes: f32 or f64 of [`MOST_NUMBERS`]. What a damaged file asks
-/// for is more, and refused before it is made room for.
+/// Largest chunk and largest part, bytes: f64 of [`MOST_NUMBERS`]. A damaged file that asks for
+/// more is refused before memory is allocated.
 const MOST_BYTES: usize = (MOST_NUMBERS as usize) * 8;
 const MOST_HEADER_BYTES: usize = 16 << 20;
-/// Unpacked chunks that are kept, for variables whose chunks hold several steps.
+/// Size of the cache of unpacked chunks, for variables whose chunks hold several steps.
 const CHUNK_CACHE_BYTES: usize = 64 << 20;
 
+/// An open NetCDF file.
 pub struct NetCdf {
     file: NcFile,
     kind: &'static str,
@@ -33,10 +34,10 @@ pub struct NetCdf {
     attributes: Vec<Attribute>,
 }
 
-/// Opens a file; only what it says of itself is read.
+/// Opens a file and reads its header.
 ///
 /// # Errors
-/// What is no readable NetCDF file, and why.
+/// When the file cannot be read or is no NetCDF file.
 pub fn open(path: &Path) -> Result<NetCdf> {
     let about = fs::metadata(path).map_err(|e| match e.kind() {
         ErrorKind::NotFound => Error::io(path, "no such file"),
@@ -55,15 +56,15 @@ pub fn open(path: &Path) -> Result<NetCdf> {
     from_storage(Arc::new(storage)).map_err(|what| Error::scene(Place::file(path), what))
 }
 
-/// The same of bytes in memory.
+/// Opens a file that is in memory.
 ///
 /// # Errors
 /// As [`open`], without a place.
-pub fn from_bytes(bytes: Vec<u8>) -> std::result::Result<NetCdf, String> {
+pub fn from_bytes(bytes: Vec<u8>) -> Checked<NetCdf> {
     from_storage(Arc::new(BytesStorage::new(bytes)))
 }
 
-fn from_storage(storage: DynStorage) -> std::result::Result<NetCdf, String> {
+fn from_storage(storage: DynStorage) -> Checked<NetCdf> {
     check_begin(&storage)?;
     let damaged = |e: netcdf_reader::Error| format!("the file is damaged or cut off: {e}");
     let options = NcOpenOptions {
@@ -88,12 +89,11 @@ fn from_storage(storage: DynStorage) -> std::result::Result<NetCdf, String> {
 }
 
 const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
-/// A superblock of any version lies within.
+/// Length of the longest superblock of any version.
 const SUPERBLOCK_LENGTH: usize = 96;
 
-/// Says what a file is that is not NetCDF, and whether an HDF5 file has been cut off, which its end
-/// alone tells.
-fn check_begin(storage: &DynStorage) -> std::result::Result<(), String> {
+/// Refuses a file that is not NetCDF, and an HDF5 file that is shorter than its superblock says.
+fn check_begin(storage: &DynStorage) -> Checked<()> {
     let length = storage.len();
     if length == 0 {
         return Err("the file is empty: expected a NetCDF file".to_owned());
@@ -118,8 +118,8 @@ fn check_begin(storage: &DynStorage) -> std::result::Result<(), String> {
     }
 }
 
-/// Where an HDF5 file says that it ends ("HDF5 File Format Specification" 3.0, II.A): the third
-/// address of its superblock.
+/// Returns where an HDF5 file says that it ends ("HDF5 File Format Specification" 3.0, II.A): the
+/// third address of its superblock.
 fn superblock_end(begin: &[u8]) -> Option<u64> {
     let begin_of_addresses = |version: u8| match version {
         0 => Some((13, 24)),
@@ -133,7 +133,7 @@ fn superblock_end(begin: &[u8]) -> Option<u64> {
     let (at_size, at_addresses) = begin_of_addresses(*begin.get(8)?)?;
     let size = usize::from(*begin.get(at_size)?);
     let bytes = begin.get(at_addresses + 2 * size..at_addresses + 3 * size)?;
-    // Little-endian, of 2, 4 or 8 bytes.
+    // The address is little-endian and has 2, 4 or 8 bytes.
     (size <= 8).then(|| bytes.iter().rev().fold(0, |n, b| n << 8 | u64::from(*b)))
 }
 
@@ -180,12 +180,7 @@ impl Container for NetCdf {
         &self.attributes
     }
 
-    fn read(
-        &self,
-        name: &str,
-        start: &[u64],
-        count: &[u64],
-    ) -> std::result::Result<Vec<f64>, String> {
+    fn read(&self, name: &str, start: &[u64], count: &[u64]) -> Checked<Vec<f64>> {
         let lengths = self.lengths(name)?;
         let is_within = lengths.len() == start.len()
             && lengths.len() == count.len()
@@ -206,7 +201,7 @@ impl Container for NetCdf {
             .collect();
         let read = self.file.read_variable_slice_as_f64(name, &NcSliceInfo { selections });
         let read = read.map_err(|e| format!("cannot be read: {e}"))?;
-        // Not copied: a step of the largest grid is 128 MiB a variable.
+        // Moved where possible: a step of the largest grid takes 128 MiB a variable.
         let numbers = match read.is_standard_layout() {
             true => read.into_raw_vec_and_offset().0,
             false => read.iter().copied().collect(),
@@ -217,21 +212,22 @@ impl Container for NetCdf {
         Ok(numbers)
     }
 
-    fn read_rows(&self, name: &str) -> std::result::Result<Vec<String>, String> {
+    fn read_rows(&self, name: &str) -> Checked<Vec<String>> {
         product(self.lengths(name)?.into_iter(), MOST_CHARACTERS)?;
         self.file.read_variable_as_strings(name).map_err(|e| format!("cannot be read: {e}"))
     }
 }
 
 impl NetCdf {
-    fn lengths(&self, name: &str) -> std::result::Result<Vec<u64>, String> {
+    fn lengths(&self, name: &str) -> Checked<Vec<u64>> {
         let variable = self.variable(name).ok_or_else(|| "is not in the file".to_owned())?;
         Ok(variable.dimensions.iter().map(|d| d.length).collect())
     }
 }
 
-/// How many there are, if that is not more than `most`: looked at before anything is made for them.
-fn product(lengths: impl Iterator<Item = u64>, most: u64) -> std::result::Result<u64, String> {
+/// Returns the number of values, or an error when there are more than `most`. Callers check it
+/// before they allocate.
+fn product(lengths: impl Iterator<Item = u64>, most: u64) -> Checked<u64> {
     let n = lengths.into_iter().try_fold(1u64, u64::checked_mul).filter(|n| *n <= most);
     n.ok_or_else(|| format!("too large: more than {most} values at once"))
 }

@@ -1,129 +1,91 @@
-//! WRF's output: which variables mean what, and a step of them as a grid with extinction
+//! Output of WRF: the meaning of its variables, and a step of them as a grid with extinction
 //! (docs/model.md §15).
 
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::container::{Container, number, text};
+use super::container::{Checked, Container, number, text};
 use super::netcdf;
 use super::wrf_clock;
-use super::wrf_fields::{Extent, Field, place};
+use super::wrf_fields::{Field, place};
+use super::wrf_variables::Fields;
 use crate::error::{Error, Place, Result};
 use crate::model::weather::air::{self, PRESSURES_PA, TEMPERATURES_K};
 use crate::model::weather::diagnosed::{self, Air};
-use crate::model::weather::extinction::{
-    ICE, InvalidCounts, LIQUID, Phase, SNOW, add, single_moment_phase,
-};
+use crate::model::weather::extinction::{InvalidCounts, add, single_moment_phase};
 use crate::model::weather::grid::{Grid, Ground, Shape};
 
-/// Cells of a step at most: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more
+/// Most cells of a step: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more
 /// while it is read: less than 1 GiB.
 pub const MOST_CELLS: u64 = 1 << 24;
-/// m; sizes of WRF's cells, from a large eddy to a globe's degree.
+/// Range of the sizes of cells, m: from large-eddy simulation to a degree of the globe.
 const SPACINGS_M: (f64, f64) = (1.0, 500_000.0);
-/// m above sea level: no model's level lies beyond.
+/// Range of the heights of levels, m above sea level.
 const HEIGHTS_M: (f64, f64) = (-1000.0, 200_000.0);
-/// WSM3, whose cloud water is ice where it is cold.
-const SINGLE_MOMENT_SCHEME: f64 = 3.0;
-
-/// kg/kg: there is no more water than air.
+/// Greatest mixing ratio, kg/kg: there is no more water than air.
 const GREATEST_RATIO: f64 = 1.0;
 
-const PASCAL: &[(&str, f64)] = &[("Pa", 1.0)];
-const KELVIN: &[(&str, f64)] = &[("K", 1.0)];
-const GEOPOTENTIAL: &[(&str, f64)] = &[("m2 s-2", 1.0), ("m2/s2", 1.0), ("m**2 s**-2", 1.0)];
-const RATIO: &[(&str, f64)] = &[
-    ("kg kg-1", 1.0),
-    ("kg/kg", 1.0),
-    ("kg kg**-1", 1.0),
-    ("g kg-1", 1e-3),
-    ("g/kg", 1e-3),
-    ("g kg**-1", 1e-3),
-];
-const METRE: &[(&str, f64)] = &[("m", 1.0)];
-const DEGREE: &[(&str, f64)] = &[
-    ("degree_north", 1.0),
-    ("degree_east", 1.0),
-    ("degrees_north", 1.0),
-    ("degrees_east", 1.0),
-    ("degree", 1.0),
-];
-/// Map factors have none, and WRF writes none or a blank.
-const NO_UNIT: &[(&str, f64)] = &[("1", 1.0)];
-
-/// Condensate that clouds are made of, and what of it is known.
-const CLOUDS: [(&str, Phase); 3] = [("QCLOUD", LIQUID), ("QICE", ICE), ("QSNOW", SNOW)];
-/// Precipitation, which falls out of clouds: large drops that take little light a gram.
-pub const LEFT_OUT: [&str; 3] = ["QRAIN", "QGRAUP", "QHAIL"];
 const NEEDED: [&str; 5] = ["P", "PB", "T", "PH", "PHB"];
 
-/// Where the clouds come from.
+/// Source of the clouds of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Clouds {
-    /// The file's mixing ratios.
+    /// Mixing ratios of the file.
     Given,
-    /// Relative humidity: the file has no cloud water.
+    /// Relative humidity, in a file without cloud water.
     Diagnosed,
 }
 
+/// An open WRF file.
 pub struct WeatherFile {
     container: Box<dyn Container>,
     path: PathBuf,
+    /// Numbers of cells along each axis.
     pub shape: Shape,
+    /// Number of steps.
     pub n_steps: usize,
-    /// Seconds from 1970-01-01 UTC, rising; None of a single step without a time.
+    /// Times of the steps, s from 1970-01-01 UTC; `None` for a single step without a time.
     pub times_s: Option<Vec<f64>>,
+    /// Sizes of cells to the east and to the north, DX and DY.
     pub spacing_m: (f64, f64),
-    /// Without a map: MAP_PROJ is 0.
+    /// Whether the file is of an idealised case without a map: MAP_PROJ is 0.
     pub is_idealised: bool,
+    /// Source of the clouds.
     pub clouds: Clouds,
-    /// What was taken otherwise than the file says, and what is not in it.
+    /// Notes on conversions and on variables that are missing.
     pub notes: Vec<String>,
     fields: Fields,
 }
 
-struct Fields {
-    p: Field,
-    pb: Field,
-    t: Field,
-    ph: Field,
-    phb: Field,
-    vapour: Option<Field>,
-    condensates: Vec<(Field, Phase)>,
-    factors: [Option<Field>; 2],
-    /// What is wrong with it is told to those who ask for it.
-    terrain: std::result::Result<Option<Field>, String>,
-    latitude: Option<Field>,
-    longitude: Option<Field>,
-    /// WSM3 without QICE: cloud water is ice where it is cold.
-    is_single_moment: bool,
-}
-
-/// A moment of the file.
+/// Weather at one step, with a number for each cell.
 pub struct Step {
+    /// Places of the cells.
     pub grid: Grid,
-    /// m⁻¹, a cell each.
+    /// Extinction of the clouds, m⁻¹.
     pub extinction: Vec<f64>,
+    /// Pressure.
     pub pressure_pa: Vec<f64>,
+    /// Temperature.
     pub temperature_k: Vec<f64>,
-    /// kg/kg.
+    /// Mixing ratio of vapour, kg/kg.
     pub vapour: Vec<f64>,
-    /// Radians north and east in the domain's middle, which moves where a nest follows a storm;
-    /// None of an idealised file, whose are 0.
+    /// Latitude and longitude of the domain's middle, radians, which moves where a nest follows a
+    /// storm; `None` for an idealised case.
     pub middle: Option<(f64, f64)>,
+    /// Numbers of values that were no mixing ratio.
     pub oddities: InvalidCounts,
 }
 
-/// Opens a WRF file; no step is read.
+/// Opens a WRF file and reads no step.
 ///
 /// # Errors
-/// What is no WRF file, or one that clouds cannot be made of, and what was expected.
+/// When the file is no WRF file or has no variables that clouds can be made of.
 pub fn open(path: &Path) -> Result<WeatherFile> {
     from_container(Box::new(netcdf::open(path)?), path)
 }
 
-/// The same of a container that is open; `path` is its name in messages.
+/// Reads the declarations of an open container; `path` is its name in messages.
 ///
 /// # Errors
 /// As [`open`].
@@ -131,10 +93,7 @@ pub fn from_container(container: Box<dyn Container>, path: &Path) -> Result<Weat
     understand(container, path).map_err(|what| Error::scene(Place::file(path), what))
 }
 
-fn understand(
-    container: Box<dyn Container>,
-    path: &Path,
-) -> std::result::Result<WeatherFile, String> {
+fn understand(container: Box<dyn Container>, path: &Path) -> Checked<WeatherFile> {
     let file = container.as_ref();
     let missing: Vec<&str> =
         NEEDED.into_iter().filter(|name| file.variable(name).is_none()).collect();
@@ -182,7 +141,7 @@ fn understand(
     })
 }
 
-/// "QICE is", "QICE and QSNOW are".
+/// Returns "variable QICE is" or "variables QICE, QSNOW are".
 fn list(names: &[&str]) -> String {
     match names {
         [one] => format!("variable {one} is"),
@@ -190,8 +149,8 @@ fn list(names: &[&str]) -> String {
     }
 }
 
-/// Of P, which is on the cells' mass points.
-fn shape_of(file: &dyn Container) -> std::result::Result<(Shape, usize), String> {
+/// Returns the shape and the number of steps of P, which has a value for each cell.
+fn shape_of(file: &dyn Container) -> Checked<(Shape, usize)> {
     let lengths: Vec<u64> = file
         .variable("P")
         .map(|v| v.dimensions.iter().map(|d| d.length).collect())
@@ -222,7 +181,7 @@ fn shape_of(file: &dyn Container) -> std::result::Result<(Shape, usize), String>
     Ok((Shape { nx: nx as usize, ny: ny as usize, nz: nz as usize }, n_steps as usize))
 }
 
-fn spacing(file: &dyn Container, name: &str) -> std::result::Result<f64, String> {
+fn spacing(file: &dyn Container, name: &str) -> Checked<f64> {
     let expected = format!("expected metres from {} to {}", SPACINGS_M.0, SPACINGS_M.1);
     match number(file.attributes(), name) {
         Some(spacing) if (SPACINGS_M.0..=SPACINGS_M.1).contains(&spacing) => Ok(spacing),
@@ -231,103 +190,21 @@ fn spacing(file: &dyn Container, name: &str) -> std::result::Result<f64, String>
     }
 }
 
-fn condensates(
-    file: &dyn Container,
-    shape: Shape,
-    n_steps: usize,
-    notes: &mut Vec<String>,
-) -> std::result::Result<Vec<(Field, Phase)>, String> {
-    let mut found = Vec::new();
-    for (name, phase) in CLOUDS {
-        match Field::find(file, name, Extent::Cells, RATIO, shape, n_steps)? {
-            Some(field) => found.push((field, phase)),
-            None => notes.push(format!("{name} is missing")),
-        }
-    }
-    Ok(found)
-}
-
-impl Fields {
-    fn find(
-        file: &dyn Container,
-        shape: Shape,
-        n_steps: usize,
-        notes: &mut Vec<String>,
-    ) -> std::result::Result<Self, String> {
-        let optional = |name, extent, units| Field::find(file, name, extent, units, shape, n_steps);
-        let needed = |name: &'static str, extent, units| {
-            optional(name, extent, units)?.ok_or_else(|| format!("variable {name} is missing"))
-        };
-        let vapour = optional("QVAPOR", Extent::Cells, RATIO)?;
-        if vapour.is_none() {
-            notes.push("QVAPOR is missing: the air is taken to be dry".to_owned());
-        }
-        let condensates = condensates(file, shape, n_steps, notes)?;
-        let has = |name: &str| condensates.iter().any(|(field, _)| field.name == name);
-        let scheme = number(file.attributes(), "MP_PHYSICS");
-        let is_single_moment =
-            scheme == Some(SINGLE_MOMENT_SCHEME) && has("QCLOUD") && !has("QICE");
-        if is_single_moment {
-            notes.push("MP_PHYSICS is 3: QCLOUD is ice below 273.15 K".to_owned());
-        }
-        if condensates.is_empty() {
-            notes.push("clouds are diagnosed from relative humidity".to_owned());
-        }
-        for field in condensates
-            .iter()
-            .map(|(field, _)| field)
-            .chain(&vapour)
-            .filter(|field| field.scale != 1.0)
-        {
-            notes.push(format!("{} is in g/kg: converted", field.name));
-        }
-        for name in LEFT_OUT.into_iter().filter(|name| file.variable(name).is_some()) {
-            notes.push(format!("{name} is left out: precipitation, not cloud"));
-        }
-        let factor = |names: [&'static str; 2]| -> std::result::Result<Option<Field>, String> {
-            for name in names {
-                if let Some(field) = optional(name, Extent::Columns, NO_UNIT)? {
-                    return Ok(Some(field));
-                }
-            }
-            Ok(None)
-        };
-        let factors = [factor(["MAPFAC_MX", "MAPFAC_M"])?, factor(["MAPFAC_MY", "MAPFAC_M"])?];
-        if factors.iter().any(Option::is_none) {
-            notes.push("map factors are missing: cells are as large as DX and DY".to_owned());
-        }
-        Ok(Fields {
-            p: needed("P", Extent::Cells, PASCAL)?,
-            pb: needed("PB", Extent::Cells, PASCAL)?,
-            t: needed("T", Extent::Cells, KELVIN)?,
-            ph: needed("PH", Extent::Levels, GEOPOTENTIAL)?,
-            phb: needed("PHB", Extent::Levels, GEOPOTENTIAL)?,
-            vapour,
-            condensates,
-            factors,
-            terrain: optional("HGT", Extent::Columns, METRE),
-            latitude: optional("XLAT", Extent::Columns, DEGREE)?,
-            longitude: optional("XLONG", Extent::Columns, DEGREE)?,
-            is_single_moment,
-        })
-    }
-}
-
 impl WeatherFile {
-    /// The format, the variables and the attributes.
+    /// Returns the container, with the format, the variables and the attributes.
     pub fn container(&self) -> &dyn Container {
         self.container.as_ref()
     }
 
-    /// The text of a global attribute.
+    /// Returns the text of a global attribute.
     pub fn text(&self, name: &str) -> Option<&str> {
         text(self.container.attributes(), name)
     }
 
-    /// SHA-256 of the whole file.
+    /// Returns the SHA-256 of the whole file.
     ///
     /// # Errors
-    /// Where it cannot be read.
+    /// When it cannot be read.
     pub fn digest(&self) -> Result<[u8; 32]> {
         let lost = |e: std::io::Error| Error::Io { path: self.path.clone(), what: e.to_string() };
         let (mut from, mut hash) = (std::fs::File::open(&self.path).map_err(lost)?, Sha256::new());
@@ -335,16 +212,16 @@ impl WeatherFile {
         Ok(hash.finalize().into())
     }
 
-    /// Reads a step; the others are not touched.
+    /// Reads a step.
     ///
     /// # Errors
-    /// What of it is no weather: variable, step, and what was expected.
+    /// When a variable cannot be read or its numbers are not those of air.
     pub fn step(&self, i_step: usize) -> Result<Step> {
         self.of_step(i_step, &|| self.read_step(i_step))
     }
 
-    /// The columns at a step and the ground's height in each, HGT, m; None where the file has no
-    /// HGT. Nothing else is read.
+    /// Reads the columns at a step and the height of the ground in each (HGT, m). Returns `None` if
+    /// the file has no HGT.
     ///
     /// # Errors
     /// As [`WeatherFile::step`].
@@ -359,11 +236,7 @@ impl WeatherFile {
         })
     }
 
-    fn of_step<T>(
-        &self,
-        i_step: usize,
-        read: &dyn Fn() -> std::result::Result<T, String>,
-    ) -> Result<T> {
+    fn of_step<T>(&self, i_step: usize, read: &dyn Fn() -> Checked<T>) -> Result<T> {
         if i_step >= self.n_steps {
             return Err(Error::usage(format!(
                 "step {i_step}: {} has steps 0 to {}",
@@ -374,7 +247,7 @@ impl WeatherFile {
         read().map_err(|what| Error::scene(Place::file(&self.path), what))
     }
 
-    fn read_step(&self, i_step: usize) -> std::result::Result<Step, String> {
+    fn read_step(&self, i_step: usize) -> Checked<Step> {
         let (file, shape, fields) = (self.container.as_ref(), self.shape, &self.fields);
         let whole = |field: &Field| field.read_whole(file, shape, i_step);
         let grid = self.grid(i_step)?;
@@ -427,7 +300,7 @@ impl WeatherFile {
         Ok(Step { grid, extinction, pressure_pa, temperature_k, vapour, middle, oddities })
     }
 
-    fn middle(&self, i_step: usize) -> std::result::Result<Option<(f64, f64)>, String> {
+    fn middle(&self, i_step: usize) -> Checked<Option<(f64, f64)>> {
         let i_middle = self.shape.ny / 2 * self.shape.nx + self.shape.nx / 2;
         let at = |field: &Option<Field>, greatest: f64| match field {
             Some(field) => {
@@ -441,8 +314,8 @@ impl WeatherFile {
         Ok(latitude.zip(longitude).filter(|_| !self.is_idealised))
     }
 
-    /// Where a step's columns are.
-    fn ground(&self, i_step: usize) -> std::result::Result<Ground, String> {
+    /// Returns the places of a step's columns.
+    fn ground(&self, i_step: usize) -> Checked<Ground> {
         let (shape, fields) = (self.shape, &self.fields);
         let factors = |field: &Option<Field>| match field {
             Some(field) => field.read_whole(self.container.as_ref(), shape, i_step),
@@ -454,8 +327,8 @@ impl WeatherFile {
         })
     }
 
-    /// Where a step's cells are.
-    fn grid(&self, i_step: usize) -> std::result::Result<Grid, String> {
+    /// Returns the places of a step's cells.
+    fn grid(&self, i_step: usize) -> Checked<Grid> {
         let (file, shape, fields) = (self.container.as_ref(), self.shape, &self.fields);
         let ground = self.ground(i_step)?;
         let mut heights_m = fields.ph.read_whole(file, shape, i_step)?;
@@ -467,7 +340,7 @@ impl WeatherFile {
     }
 }
 
-/// Vapour: what is no ratio is 0 and counted.
+/// Replaces each value that is no mixing ratio by 0 and counts it.
 fn ratios(mut read: Vec<f64>, oddities: &mut InvalidCounts) -> Vec<f64> {
     for ratio in &mut read {
         if ratio.is_nan() || *ratio > GREATEST_RATIO {
@@ -488,7 +361,7 @@ fn within(
     unit: &str,
     shape: Shape,
     i_step: usize,
-) -> std::result::Result<(), String> {
+) -> Checked<()> {
     match numbers.iter().position(|n| !(least..=greatest).contains(n)) {
         None => Ok(()),
         Some(i) => Err(format!(

@@ -1,17 +1,17 @@
-//! When the steps of a WRF file are.
+//! Times of the steps of a WRF file.
 
-use super::container::{Container, Variable};
+use super::container::{Checked, Container, Variable};
 use crate::model::weather::steps::{first_out_of_order, format, parse};
 
-/// Steps that a file may have: two years of 10 minutes.
+/// Most steps of a file: two years of 10 minutes.
 pub const MOST_STEPS: u64 = 105_408;
 
-/// Seconds from 1970-01-01 UTC of every step, rising; from Times, else from XTIME. None where the
-/// file has neither and needs none, as it has one step.
+/// Reads the time of every step, in seconds from 1970-01-01 UTC, from Times or else from XTIME.
+/// Returns `None` for a file of one step that has neither.
 ///
 /// # Errors
-/// What is wrong, with the variable and the step.
-pub fn times(file: &dyn Container, n_steps: usize) -> Result<Option<Vec<f64>>, String> {
+/// When a time cannot be read or does not come after the one before it.
+pub fn times(file: &dyn Container, n_steps: usize) -> Checked<Option<Vec<f64>>> {
     let (name, times_s) = if file.variable("Times").is_some() {
         ("Times", from_text(file, n_steps)?)
     } else if let Some(variable) = file.variable("XTIME") {
@@ -34,7 +34,7 @@ pub fn times(file: &dyn Container, n_steps: usize) -> Result<Option<Vec<f64>>, S
     }
 }
 
-fn from_text(file: &dyn Container, n_steps: usize) -> Result<Vec<f64>, String> {
+fn from_text(file: &dyn Container, n_steps: usize) -> Checked<Vec<f64>> {
     let rows = file.read_rows("Times").map_err(|what| format!("variable Times: {what}"))?;
     if rows.len() != n_steps {
         return Err(format!("variable Times: {} times of {n_steps} steps", rows.len()));
@@ -50,11 +50,7 @@ fn from_text(file: &dyn Container, n_steps: usize) -> Result<Vec<f64>, String> {
     rows.iter().enumerate().map(time).collect()
 }
 
-fn from_minutes(
-    file: &dyn Container,
-    variable: &Variable,
-    n_steps: usize,
-) -> Result<Vec<f64>, String> {
+fn from_minutes(file: &dyn Container, variable: &Variable, n_steps: usize) -> Checked<Vec<f64>> {
     let since = variable
         .text("units")
         .and_then(|units| units.strip_prefix("minutes since "))

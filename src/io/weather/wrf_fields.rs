@@ -1,22 +1,25 @@
-//! One WRF variable at one step: of the shape, the unit and the range that it should be of.
+//! One WRF variable at one step, with its shape and unit checked.
 
-use super::container::{Container, Variable};
+use super::container::{Checked, Container, Variable};
 use crate::model::weather::grid::Shape;
 
-/// Beyond every number that weather has: NetCDF's own fill value is 9.969e36, WRF's and others' are
-/// 1e20 and more.
+/// Numbers beyond this are fill values: NetCDF's own is 9.969e36, WRF's and others' are 1e20 and
+/// more.
 const FILL: f64 = 1e19;
 
-/// Along which of the cells' dimensions a variable runs.
+/// Dimensions of the grid that a variable runs along.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
+    /// A number for each column.
     Columns,
+    /// A number for each cell.
     Cells,
-    /// Their bottoms and tops.
+    /// A number for each bottom and top of a cell.
     Levels,
 }
 
 impl Extent {
+    /// Returns the lengths of the dimensions, slowest first.
     pub fn lengths(self, shape: Shape) -> Vec<u64> {
         let plane = [shape.ny as u64, shape.nx as u64];
         let levels = match self {
@@ -28,24 +31,25 @@ impl Extent {
     }
 }
 
-/// A variable as it is to be read.
+/// A variable with a checked shape and unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     pub name: &'static str,
     pub extent: Extent,
-    /// Whether its first dimension is time; else every step has the same.
+    /// Whether its first dimension is time; otherwise all steps share its numbers.
     pub has_time: bool,
-    /// What turns its numbers into the unit that is expected.
+    /// Factor that converts its numbers to the expected unit.
     pub scale: f64,
     /// The file's own fill values.
     fills: Vec<f64>,
 }
 
 impl Field {
-    /// Looks for the variable and at its shape and unit; None where it is not in the file.
+    /// Finds the variable and checks its shape and unit. Returns `None` if the file does not have
+    /// it.
     ///
     /// # Errors
-    /// Which variable is of which shape or unit, and what was expected.
+    /// When the shape or the unit is another one than expected.
     pub fn find(
         file: &dyn Container,
         name: &'static str,
@@ -53,7 +57,7 @@ impl Field {
         units: &[(&str, f64)],
         shape: Shape,
         n_steps: usize,
-    ) -> Result<Option<Field>, String> {
+    ) -> Checked<Option<Field>> {
         let Some(variable) = file.variable(name) else { return Ok(None) };
         let expected = extent.lengths(shape);
         let lengths: Vec<u64> = variable.dimensions.iter().map(|d| d.length).collect();
@@ -78,16 +82,11 @@ impl Field {
         Ok(Some(Field { name, extent, has_time, scale, fills }))
     }
 
-    /// The numbers of a step, in the unit that is expected, fill values among them as NaN.
+    /// Reads the numbers of a step, in the expected unit, with NaN in place of fill values.
     ///
     /// # Errors
-    /// What cannot be read, with variable and step.
-    pub fn read(
-        &self,
-        file: &dyn Container,
-        shape: Shape,
-        i_step: usize,
-    ) -> Result<Vec<f64>, String> {
+    /// When they cannot be read.
+    pub fn read(&self, file: &dyn Container, shape: Shape, i_step: usize) -> Checked<Vec<f64>> {
         let mut count = self.extent.lengths(shape);
         let mut start = vec![0; count.len()];
         if self.has_time {
@@ -103,16 +102,16 @@ impl Field {
         Ok(numbers)
     }
 
-    /// The same of a variable that has no gaps: what has no value in it is no air.
+    /// Reads the numbers of a step of a variable without gaps.
     ///
     /// # Errors
-    /// As [`read`](Self::read), and how many values are missing and where the first one is.
+    /// As [`read`](Self::read), and when values are missing.
     pub fn read_whole(
         &self,
         file: &dyn Container,
         shape: Shape,
         i_step: usize,
-    ) -> Result<Vec<f64>, String> {
+    ) -> Checked<Vec<f64>> {
         let numbers = self.read(file, shape, i_step)?;
         let Some(first) = numbers.iter().position(|n| n.is_nan()) else { return Ok(numbers) };
         let n_missing = numbers.iter().filter(|n| n.is_nan()).count();
@@ -126,21 +125,23 @@ impl Field {
         ))
     }
 
-    /// What is wrong, with variable and step.
+    /// Adds the variable and the step to a complaint.
     pub fn at(&self, i_step: usize, what: impl std::fmt::Display) -> String {
         format!("variable {}, step {i_step}: {what}", self.name)
     }
 }
 
-/// "at level 3, row 2, column 1" of one of so many values; of one a column without the level.
+/// Returns the place of value `i` of `n_numbers` in words, such as "at level 3, row 2, column 1".
+/// The level is left out where there is one value for each column.
 pub fn place(shape: Shape, n_numbers: usize, i: usize) -> String {
     let n = shape.n_columns();
     let level = if n_numbers == n { String::new() } else { format!("level {}, ", i / n) };
     format!("at {level}row {}, column {}", i % n / shape.nx, i % shape.nx)
 }
 
-/// What turns a variable's unit into the first one of `units`; no unit is that one.
-fn scale(variable: &Variable, units: &[(&str, f64)]) -> Result<f64, String> {
+/// Returns the factor that converts a variable's unit to the first one of `units`. A variable
+/// without a unit has that one.
+fn scale(variable: &Variable, units: &[(&str, f64)]) -> Checked<f64> {
     let Some(unit) = variable.text("units").filter(|unit| !unit.is_empty()) else { return Ok(1.0) };
     match units.iter().find(|(name, _)| *name == unit) {
         Some((_, scale)) => Ok(*scale),

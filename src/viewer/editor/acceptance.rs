@@ -46,13 +46,13 @@ pub fn mean_rate(boxes: &[BoxAcceptance]) -> Option<f64> {
 mod tests {
     use super::super::fixtures::unit_box;
     use super::*;
-    use crate::model::boxes::Form;
+    use crate::model::boxes::{BoxLaw, Form};
     use crate::reference::generate::{Generated, generate_box, is_inside, offset};
 
     #[test]
     fn the_rate_is_the_share_of_places_inside_the_box() {
         let b = CloudBox { n_particles: 4096, ..unit_box() };
-        let acceptance = Acceptance::of(&generate_box(&b, 3, 7, Form::Centred, 1.0, 1.0));
+        let acceptance = Acceptance::of(&generate_box(&b, 3, 7, &BoxLaw::new(Form::Centred)));
         // The mean over a lattice of the attempts' random numbers.
         let n = 60;
         let at = |i: u32| (f64::from(i) + 0.5) / f64::from(n);
@@ -82,7 +82,7 @@ mod tests {
         assert_eq!((rate(0), rate(1), rate(3)), (Some(2.0 / 70.0), None, None));
         assert_eq!((mean_rate(&found), mean_rate(&found[1..2])), (Some(4.0 / 74.0), None));
         let b = CloudBox { n_particles: 50, ..unit_box() };
-        let particles = generate_box(&b, 2, 9, Form::Centred, 1.0, 1.0);
+        let particles = generate_box(&b, 2, 9, &BoxLaw::new(Form::Centred));
         let status = |p: &Generated| p.n_attempts | if p.folded { FOLDED } else { 0 };
         let statuses: Vec<u32> = particles.iter().map(status).collect();
         let whole = box_acceptances(&[b], &statuses)[0];

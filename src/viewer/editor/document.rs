@@ -102,7 +102,7 @@ mod tests {
 
     use super::super::fixtures::{document, unit_box};
     use super::*;
-    use crate::model::boxes::Form;
+    use crate::model::boxes::{BoxLaw, Form};
     use crate::reference::generate::generate_box;
 
     #[test]
@@ -114,7 +114,7 @@ mod tests {
         new.boxes.push(CloudBox { center: DVec3::X, ..unit_box() });
         assert_eq!(new.regenerated_since(&old), [2, 4]);
         let particles = |d: &Document, i: usize| {
-            generate_box(&d.boxes[i], i as u32, d.seed, Form::Centred, 1.0, 1.0)
+            generate_box(&d.boxes[i], i as u32, d.seed, &BoxLaw::new(Form::Centred))
         };
         for i in [0, 3] {
             assert_eq!(particles(&old, i), particles(&new, i));

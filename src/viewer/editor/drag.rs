@@ -14,7 +14,7 @@ use super::handles::Handle;
 use super::history::Snapshot;
 use super::ray::Ray;
 use super::settings::{ScalingAnchor, Settings};
-use crate::io::magnitude::LEAST_EXTENT;
+use crate::io::bounds::LEAST_EXTENT;
 
 /// A drag in progress.
 #[derive(Debug, Clone)]

@@ -29,7 +29,7 @@ impl SceneSource {
     /// # Errors
     /// A file cannot be read, or its content is not valid.
     pub fn read(&mut self, state: &ViewState) -> Result<Arc<Scene>> {
-        let (loaded, files) = scene_file::load_and_name(&self.path, &self.overrides, self.seed);
+        let (loaded, files) = scene_file::load_and_list(&self.path, &self.overrides, self.seed);
         self.files = files;
         let changed = state.changed_knobs(&self.first);
         let first = Arc::new(loaded?.scene);

@@ -1,66 +1,73 @@
-//! A weather file's particles at any time: from step to step by straight lines where steps are near
-//! enough (docs/model.md §15 "Time").
+//! Particles of a weather file at any time, interpolated between steps that are near enough
+//! (docs/model.md §15 "Time").
 
 use std::fmt;
 use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::scene_weather::{WeatherKeys, particle};
-use super::weather::wrf::{Step, WeatherFile};
-use super::weather_spans::{MOST_TOGETHER, Spans};
+use super::blobs::{Settings, particle};
+use super::spans::{MOST_TOGETHER, Spans};
+use super::wrf::{Step, WeatherFile};
 use crate::error::Result;
 use crate::model::animated::{AnimatedParticles, Animation};
 use crate::model::cloud::{MIN_ASPECT, Particle, mass};
 use crate::model::weather::particles::Layout;
 use crate::model::weather::steps::{Between, between};
 
-/// How much farther than those that were looked at heights of other steps may reach.
+/// Factor by which heights of steps that were not read may exceed those of the steps that were.
 const MORE_HEIGHT: f64 = 1.05;
 
+/// A weather file as the source of a cloud's particles.
 pub struct Steps {
     spans: Spans,
-    keys: WeatherKeys,
+    settings: Settings,
     times_s: Vec<f64>,
     bounds: Bounds,
 }
 
 impl fmt::Debug for Steps {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Steps").field("keys", &self.keys).finish_non_exhaustive()
+        f.debug_struct("Steps").field("settings", &self.settings).finish_non_exhaustive()
     }
 }
 
-/// The particles of `file` from step `keys.i_step` at time 0 on, and their bounds.
-pub fn moving(file: WeatherFile, keys: WeatherKeys, seed: u32) -> Result<AnimatedParticles> {
-    moving_by(file, keys, seed, MOST_TOGETHER)
+/// Returns the particles of `file`, which is at step `settings.i_step` at time 0, and their bounds.
+///
+/// # Errors
+/// When a step cannot be read.
+pub fn moving(file: WeatherFile, settings: Settings, seed: u32) -> Result<AnimatedParticles> {
+    moving_by(file, settings, seed, MOST_TOGETHER)
 }
 
 fn moving_by(
     file: WeatherFile,
-    keys: WeatherKeys,
+    settings: Settings,
     seed: u32,
     most_together: usize,
 ) -> Result<AnimatedParticles> {
     let times_s = file.times_s.clone().unwrap_or_else(|| vec![0.0]);
     let is_small = file.n_steps <= most_together;
-    let wanted =
-        if is_small { (0..file.n_steps).collect() } else { vec![keys.i_step, file.n_steps - 1] };
+    let wanted = if is_small {
+        (0..file.n_steps).collect()
+    } else {
+        vec![settings.i_step, file.n_steps - 1]
+    };
     let read: Vec<Step> = wanted.iter().map(|i| file.step(*i)).collect::<Result<_>>()?;
     let all: Vec<&[f64]> = read.iter().map(|s| s.extinction.as_slice()).collect();
     let layout =
-        is_small.then(|| Layout::new(&read[0].grid, &all, keys.n_particles as usize, seed));
-    let bounds = Bounds::of(&read, keys.exaggeration);
-    let slots = (keys.n_particles as usize, seed);
-    let spans = Spans::new(file, times_s.clone(), slots, layout, keys.speed < 0.0);
-    let steps = Steps { spans, keys, times_s, bounds };
+        is_small.then(|| Layout::new(&read[0].grid, &all, settings.n_particles as usize, seed));
+    let bounds = Bounds::of(&read, settings.exaggeration);
+    let slots = (settings.n_particles as usize, seed);
+    let spans = Spans::new(file, times_s.clone(), slots, layout, settings.speed < 0.0);
+    let steps = Steps { spans, settings, times_s, bounds };
     let first = steps.at(0.0)?;
     let mean = |of: &dyn Fn(&Particle) -> f64| {
         first.iter().map(of).sum::<f64>() / first.len().max(1) as f64
     };
     let greatest = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).fold(0.0, f64::max);
     Ok(AnimatedParticles {
-        n_particles: keys.n_particles,
+        n_particles: settings.n_particles,
         low: bounds.low,
         high: bounds.high,
         sigma_max: bounds.sigma,
@@ -73,7 +80,7 @@ fn moving_by(
     })
 }
 
-/// What all particles keep to at all times.
+/// Bounds of all particles at all times.
 #[derive(Debug, Clone, Copy)]
 struct Bounds {
     low: DVec3,
@@ -83,8 +90,8 @@ struct Bounds {
 }
 
 impl Bounds {
-    /// Of what was looked at, and some more height for what was not; heights `stretch` times as
-    /// great.
+    /// Returns the bounds of some steps, with a margin of height for the others. Heights are
+    /// multiplied by `stretch`.
     fn of(steps: &[Step], stretch: f64) -> Bounds {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (mut widest, mut thickest) = (0f64, 0f64);
@@ -102,7 +109,7 @@ impl Bounds {
         }
         let more = DVec3::Y * (MORE_HEIGHT - 1.0) * (high.y - low.y);
         let shape = DVec3::new(1.0, stretch, 1.0);
-        // A blob is no wider than what is spread evenly over its cell: 1/sqrt 12 of it.
+        // A blob is no wider than a uniform density over its cell, whose σ is 1/√12 of the width.
         let even = |size: f64| size / 12f64.sqrt();
         Bounds {
             low: shape * (low - more),
@@ -115,23 +122,23 @@ impl Bounds {
 
 impl Animation for Steps {
     fn at(&self, time_s: f64) -> Result<Arc<Vec<Particle>>> {
-        let file_s =
-            self.times_s.get(self.keys.i_step).copied().unwrap_or(0.0) + self.keys.speed * time_s;
+        let file_s = self.times_s.get(self.settings.i_step).copied().unwrap_or(0.0)
+            + self.settings.speed * time_s;
         let at = between(&self.times_s, file_s).unwrap_or(Between { i: 0, j: 0, weight: 0.0 });
-        // A span's first moment is the span's, too; what is before the first step is that step.
+        // A span holds its first step; before the first step of the file that step stands still.
         let is_before = file_s < self.times_s.first().copied().unwrap_or(file_s);
         let ends = if is_before { (at.i, at.i) } else { self.spans.ends_from(at.i) };
         let span = self.spans.get(ends)?;
         let of = |i: usize| match span.blob(i, at.weight) {
-            Some(blob) => self.kept_to(particle(&blob, self.keys.exaggeration)),
+            Some(blob) => self.kept_to(particle(&blob, self.settings.exaggeration)),
             None => self.nothing(),
         };
-        Ok(Arc::new((0..self.keys.n_particles as usize).map(of).collect()))
+        Ok(Arc::new((0..self.settings.n_particles as usize).map(of).collect()))
     }
 }
 
 impl Steps {
-    /// Within the bounds that the scene was told, with its mass.
+    /// Clamps a particle to the bounds and keeps its mass.
     fn kept_to(&self, p: Particle) -> Particle {
         let sigma = p.sigma.min(self.bounds.sigma);
         let aspect = p.aspect.min(self.bounds.sigma_y / sigma).max(MIN_ASPECT);
@@ -145,7 +152,7 @@ impl Steps {
         }
     }
 
-    /// In place of a particle that a layout does not need.
+    /// Returns a particle without extinction, for a slot that the layout does not use.
     fn nothing(&self) -> Particle {
         Particle {
             position: 0.5 * (self.bounds.low + self.bounds.high),
@@ -164,14 +171,15 @@ mod tests {
     use super::*;
     use crate::io::weather::wrf;
 
-    /// Of two layouts that fade into each other as of one: as much mass, within the bounds, and
-    /// nobody jumps.
+    /// Two layouts that fade into each other have the mass of one layout, stay in the bounds, and
+    /// no visible particle jumps.
     #[test]
     fn layouts_of_a_file_of_many_steps_fade_into_each_other() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/weather/supercell.nc");
-        let keys = WeatherKeys { i_step: 0, n_particles: 2001, exaggeration: 2.0, speed: 60.0 };
-        let of =
-            |most_together| moving_by(wrf::open(&path).unwrap(), keys, 3, most_together).unwrap();
+        let settings = Settings { i_step: 0, n_particles: 2001, exaggeration: 2.0, speed: 60.0 };
+        let of = |most_together| {
+            moving_by(wrf::open(&path).unwrap(), settings, 3, most_together).unwrap()
+        };
         let (many, few) = (of(0), of(MOST_TOGETHER));
         let mass_of =
             |all: &[Particle]| all.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).sum::<f64>();
@@ -187,7 +195,7 @@ mod tests {
                 && p.sigma <= many.sigma_max
                 && p.sigma * p.aspect <= many.sigma_y_max * 1.000001));
         }
-        // Who is somewhere else a moment later has no mass there, before or after.
+        // A particle that jumps has no mass at that moment.
         for (t, is_all) in [(0.5, false), (2.0, false), (4.0, true)] {
             let [a, b] = [t - 1e-6, t + 1e-6].map(|t| many.animation.at(t).unwrap());
             let whole = mass_of(&a);
@@ -200,12 +208,12 @@ mod tests {
                 };
                 assert!(changed < 1e-4 * whole / 2001.0, "{t}: {p:?} {q:?}");
             }
-            // Both halves are seen between steps, one at a step.
+            // Both halves are visible between steps, one half at a step.
             let n_seen = a.iter().filter(|p| p.kappa > 0.0).count();
             assert!(n_seen > 500, "{t}: {n_seen}");
             assert!(is_all || n_seen > 1000, "{t}: {n_seen}");
         }
-        // The same forwards, backwards and at once.
+        // Particles do not depend on the order in which times are asked for.
         let (c, d) = (of(0), of(0));
         let [late, early] = [3.0, 1.0].map(|t| c.animation.at(t).unwrap());
         assert!(d.animation.at(1.0).unwrap() == early && d.animation.at(3.0).unwrap() == late);

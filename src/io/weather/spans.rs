@@ -1,48 +1,49 @@
-//! What of a weather file is drawn between two steps: laid out once, read before it is wanted
+//! Blobs of a weather file between two steps. A span is made once, ahead of its use by a thread
 //! (docs/model.md §15 "Time").
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-use super::weather::wrf::WeatherFile;
+use super::wrf::WeatherFile;
 use crate::error::{Error, Result};
 use crate::model::weather::grid::Grid;
 use crate::model::weather::interval::{Interval, StepClouds};
 use crate::model::weather::particles::{Layout, WeatherBlob};
 use crate::model::weather::steps::LONGEST_INTERPOLATED_S;
 
-/// Files of so few steps have one layout for all of them. Of more, a layout stands for a step and
-/// its neighbours, and blobs of the two at hand fade into each other: each has half of the blobs.
+/// Most steps of a file with one layout for all of them. In a longer file a layout stands for a
+/// step and its neighbours, has half of the blobs, and fades into the next layout.
 pub const MOST_TOGETHER: usize = 8;
-/// Spans that are kept: the one before, the one at hand and the next.
+/// Spans that are kept: the last, the current and the next one.
 const MOST_KEPT: usize = 3;
-/// Steps whose clouds are kept: what two neighbouring spans of faded layouts are made of.
+/// Steps whose clouds are kept: two neighbouring spans of layouts that fade are made of five.
 const MOST_STEPS: usize = 5;
 
-/// A span's two steps: the second is the first where that stands alone.
+/// Numbers of a span's two steps, which are equal where a step stands alone.
 pub type Ends = (usize, usize);
 
-/// How much of a layout's blobs is seen.
+/// How the extinction of a layout's blobs changes over a span.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fade {
     Always,
-    /// All at the first step, none at the second.
+    /// Whole at the first step, zero at the second.
     Out,
+    /// Zero at the first step, whole at the second.
     In,
 }
 
-/// What is drawn from one step to the next.
+/// Blobs from one step to the next.
 pub struct Span {
-    /// Blobs of the layouts of even and of odd steps; those of all in the first, where there is one
+    /// Blobs of the layouts of even and of odd steps. The first holds all blobs where there is one
     /// layout.
     halves: [Option<(Interval, Fade)>; 2],
-    /// Slots of the first half.
+    /// Number of slots of the first half.
     n_first: usize,
 }
 
 impl Span {
-    /// In slot `i`, `weight` of the way to the second step; None in a slot that a layout does not
-    /// need.
+    /// Returns the blob in slot `i` at `weight` of the way to the second step, or `None` in a slot
+    /// that the layout does not use.
     pub fn blob(&self, i: usize, weight: f64) -> Option<WeatherBlob> {
         let (half, i) = if i < self.n_first {
             (&self.halves[0], i)
@@ -60,7 +61,7 @@ impl Span {
     }
 }
 
-/// A step's clouds.
+/// Clouds of a step.
 struct Held {
     grid: Grid,
     extinction: Vec<f64>,
@@ -72,13 +73,13 @@ impl Held {
     }
 }
 
-/// What is being made before it is asked for.
+/// A span that a thread is making.
 type UnderWay = (Ends, JoinHandle<Result<Arc<Span>>>);
 
-/// The spans of a file.
+/// Spans of a file, each made once.
 pub struct Spans {
     source: Arc<Source>,
-    /// Time runs backwards.
+    /// Whether time runs backwards.
     is_backward: bool,
     state: Mutex<State>,
 }
@@ -93,9 +94,9 @@ struct Source {
     file: WeatherFile,
     times_s: Vec<f64>,
     seed: u32,
-    /// Of all steps; None of a file of many.
+    /// Layout of all steps, in a file of few.
     layout: Option<Layout>,
-    /// Slots of both halves.
+    /// Numbers of slots of both halves.
     n_slots: [usize; 2],
     held: Mutex<Vec<(usize, Arc<Held>)>>,
 }
@@ -105,7 +106,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Spans {
-    /// Of `n` slots; `layout`: one that stands for all steps.
+    /// Prepares the spans of a file, of `n` slots. `layout` stands for all steps, if given.
     pub fn new(
         file: WeatherFile,
         times_s: Vec<f64>,
@@ -118,12 +119,15 @@ impl Spans {
         Spans { source: Arc::new(source), is_backward, state: Mutex::new(State::default()) }
     }
 
-    /// What is drawn from step `i` on.
+    /// Returns the steps of the span that begins with step `i`.
     pub fn ends_from(&self, i: usize) -> Ends {
         (i, if self.source.is_linked(i) { i + 1 } else { i })
     }
 
-    /// That span, made now if nobody has yet; the next one is begun.
+    /// Returns a span, made now unless it is ready, and starts a thread that makes the next one.
+    ///
+    /// # Errors
+    /// When a step cannot be read.
     pub fn get(&self, ends: Ends) -> Result<Arc<Span>> {
         let mut state = lock(&self.state);
         let is_ready = state
@@ -136,7 +140,7 @@ impl Spans {
             });
             match made {
                 Ok(span) => state.keep(of, span),
-                // What nobody has asked for may be wrong.
+                // A failure matters only when its span is asked for.
                 Err(error) if of == ends => return Err(error),
                 Err(_) => {}
             }
@@ -155,14 +159,14 @@ impl Spans {
         {
             let source = self.source.clone();
             let make = move || source.make(next).map(Arc::new);
-            // Where there is no thread to be had it is made when it is asked for.
+            // Without a thread the span is made when it is asked for.
             let started = std::thread::Builder::new().name("weather".into()).spawn(make);
             state.under_way = started.ok().map(|thread| (next, thread));
         }
         Ok(span)
     }
 
-    /// The span that comes next.
+    /// Returns the span that comes next.
     fn after(&self, (i, _): Ends) -> Option<Ends> {
         let next = if self.is_backward { i.checked_sub(1)? } else { i + 1 };
         (next < self.source.file.n_steps).then(|| self.ends_from(next))
@@ -177,7 +181,7 @@ impl State {
 }
 
 impl Source {
-    /// Whether what lies between step `i` and the next is interpolated.
+    /// Returns whether clouds between step `i` and the next are interpolated.
     fn is_linked(&self, i: usize) -> bool {
         self.times_s.get(i + 1).is_some_and(|next| next - self.times_s[i] <= LONGEST_INTERPOLATED_S)
     }
@@ -200,7 +204,7 @@ impl Source {
         Ok(Span { halves, n_first: self.n_slots[0] })
     }
 
-    /// That of step `k` and of those from which and into which it fades.
+    /// Returns the layout for step `k` and for the neighbours that it fades from and into.
     fn layout_of(&self, k: usize) -> Result<Layout> {
         let from = if k > 0 && self.is_linked(k - 1) { k - 1 } else { k };
         let to = if self.is_linked(k) { k + 1 } else { k };
@@ -213,7 +217,7 @@ impl Source {
         if let Some((_, held)) = lock(&self.held).iter().find(|(of, _)| *of == i) {
             return Ok(held.clone());
         }
-        // Read without the lock: who asks for another step need not wait.
+        // The lock is free while the step is read, so that another thread can read another step.
         let step = self.file.step(i)?;
         let read = Arc::new(Held { grid: step.grid, extinction: step.extinction });
         let mut held = lock(&self.held);

@@ -1,38 +1,40 @@
-//! `--set key.path=VALUE`: one value laid over a scene's tree. A path's segments are keys, or
-//! numbers where the tree has an array, or `*` for all of its items; a value is TOML, or a bare
-//! word, which shells make awkward to quote.
+//! `--set key.path=VALUE`: one value laid over a scene's tree. A segment of the path is a key, a
+//! number where the tree has an array, or `*` for all items of an array. A value is TOML or a bare
+//! word, because shells make quotes awkward.
 
 use toml::de::DeValue;
 
+use super::depth::{MAX_DOTS, too_deep};
 use super::suggest::shown;
-use super::toml_depth::{MAX_DOTS, too_deep};
-use super::toml_tree::{
-    Document, Entry, Node, Origin, OutOfRange, TOO_DEEP, Table, Value, convert,
-};
+use super::tree::{Document, Entry, Node, Origin, TOO_DEEP, TOO_LARGE, Table, Value, convert};
 use crate::error::{Error, Result};
 
 impl Document {
     /// Lays `--set` arguments over the tree in their order; later ones win.
+    ///
+    /// # Errors
+    /// When an argument has no `=`, no value, or a path that the tree does not have.
     pub fn apply(&mut self, overrides: &[String]) -> Result<()> {
         for text in overrides {
             let origin = Origin::Override(self.source.overrides.len());
             self.source.overrides.push(text.clone());
-            let fault = |what: String| Error::scene(self.source.place(origin), what);
-            let (path, value) = text.split_once('=').ok_or_else(|| {
-                fault("expected key.path=VALUE, for example lighting.grid=32".to_owned())
-            })?;
-            let segments: Vec<&str> = path.split('.').map(str::trim).collect();
-            if segments.len() > MAX_DOTS + 1 || too_deep(value).is_some() {
-                return Err(fault(TOO_DEEP.to_owned()));
-            }
-            if segments.iter().any(|s| s.is_empty()) {
-                return Err(fault("expected key.path=VALUE, found an empty key".to_owned()));
-            }
-            let value = parse_value(value.trim(), origin).map_err(fault)?;
-            put(&mut self.root, &segments, 0, value)
+            self.apply_one(text, origin)
                 .map_err(|what| Error::scene(self.source.place(origin), what))?;
         }
         Ok(())
+    }
+
+    fn apply_one(&mut self, text: &str, origin: Origin) -> std::result::Result<(), String> {
+        let (path, value) =
+            text.split_once('=').ok_or("expected key.path=VALUE, for example lighting.grid=32")?;
+        let segments: Vec<&str> = path.split('.').map(str::trim).collect();
+        if segments.len() > MAX_DOTS + 1 || too_deep(value).is_some() {
+            return Err(TOO_DEEP.to_owned());
+        }
+        if segments.iter().any(|s| s.is_empty()) {
+            return Err("expected key.path=VALUE, found an empty key".to_owned());
+        }
+        put(&mut self.root, &segments, 0, parse_value(value.trim(), origin)?)
     }
 }
 
@@ -41,21 +43,22 @@ fn parse_value(text: &str, origin: Origin) -> std::result::Result<Node, String> 
         return Err("expected a value after `=`".to_owned());
     }
     match DeValue::parse(text) {
-        Ok(value) => convert(&value, &|_| origin).map_err(|_| OutOfRange::WHAT.to_owned()),
+        Ok(value) => convert(&value, &|_| origin).map_err(|_| TOO_LARGE.to_owned()),
         Err(_) if is_word(text) => Ok(Node { origin, value: Value::String(text.to_owned()) }),
         Err(e) => Err(format!("the value is no TOML: {}", e.message())),
     }
 }
 
-/// Names and file names. Anything with TOML's own punctuation was meant as TOML and is reported as
-/// such.
-pub(super) fn is_word(text: &str) -> bool {
+/// Returns whether a text is a name or a file name. Text with TOML's own punctuation was meant as
+/// TOML and is reported as such.
+pub fn is_word(text: &str) -> bool {
     text.chars()
         .all(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ':' | '/' | '\\' | ' '))
 }
 
-/// Puts `value` at `segments[i..]` below `node`.
-pub(super) fn put(
+/// Puts `value` at `segments[i..]` below `node`. An error says which segment the tree does not
+/// have.
+pub fn put(
     node: &mut Node,
     segments: &[&str],
     i: usize,

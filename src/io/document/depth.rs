@@ -1,13 +1,14 @@
-//! Dotted keys without end. The TOML parser bounds the nesting of arrays and inline tables, but a
-//! key of 100 000 dots makes as many tables within tables, and merely dropping those overflows the
+//! Bound on the dots of a key. The TOML parser bounds the nesting of arrays and inline tables, but
+//! a key of 100 000 dots makes as many tables within tables, and dropping those overflows the
 //! stack.
 
-/// Far more than the deepest key of a scene, `camera.path`, has. With the parser's own bound on
-/// inline tables (80, each with such a key) a tree stays below 1500 levels, some 100 KiB of stack.
+/// Most dots of a key; the deepest key of a scene, `camera.path`, has one. With the parser's own
+/// bound on inline tables (80, each with such a key) a tree stays below 1500 levels, some 100 KiB
+/// of stack.
 pub const MAX_DOTS: usize = 16;
 
-/// Byte offset where a key has more than [`MAX_DOTS`] dots. Strings and comments are passed over;
-/// text that is no TOML gives some answer, and the parser the message.
+/// Returns the byte offset where a key has more than [`MAX_DOTS`] dots. Strings and comments are
+/// skipped. For text that is no TOML the answer may be wrong; the parser refuses such text anyway.
 pub fn too_deep(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     let (mut i, mut n_dots) = (0, 0);
@@ -29,8 +30,8 @@ pub fn too_deep(text: &str) -> Option<usize> {
     None
 }
 
-/// Last byte of `mark` where it is next found after `start`; the end of a line ends a string that
-/// is not closed, so that what follows is looked at too.
+/// Returns the last byte of the next `mark` after `start`. The end of a line ends a string that is
+/// not closed, so that the text behind it is searched too.
 fn end_of(bytes: &[u8], start: usize, mark: &[u8], has_escapes: bool) -> usize {
     let mut i = start + 1;
     while i < bytes.len() {

@@ -1,0 +1,140 @@
+//! One table of a scene: its values by key, complaints about them with their place, and a record of
+//! what each key came to, defaults included (the *resolved scene*).
+
+use std::fmt;
+
+use serde_json::{Map, Value as Json};
+
+use super::suggest::{list, shown, suggestion};
+use super::tree::{Document, Node, Origin, Source, Table, Value};
+use crate::error::{Error, Place, Result};
+
+/// A table of a scene, or the absence of one, in which every key has its default.
+pub struct Section<'a> {
+    source: &'a Source,
+    /// As `--set` would name it; empty for the root.
+    path: String,
+    origin: Option<Origin>,
+    table: Option<&'a Table>,
+    known: Vec<&'static str>,
+    resolved: Map<String, Json>,
+}
+
+impl<'a> Section<'a> {
+    /// Returns the document's outermost table.
+    pub fn root(document: &'a Document) -> Result<Section<'a>> {
+        Section::new(&document.source, String::new(), Some(&document.root))
+    }
+
+    fn new(source: &'a Source, path: String, node: Option<&'a Node>) -> Result<Section<'a>> {
+        let table = match node.map(|node| &node.value) {
+            None => None,
+            Some(Value::Table(table)) => Some(table),
+            Some(other) => {
+                let at = source.place(node.map_or(Origin::Default, |n| n.origin));
+                let what = format!("`{path}`: expected a table, found {}", other.describe());
+                return Err(Error::scene(at, what));
+            }
+        };
+        let origin = node.map(|node| node.origin);
+        Ok(Section { source, path, origin, table, known: Vec::new(), resolved: Map::new() })
+    }
+
+    /// Refuses every key that is not in `known`. The message is about the first one in the file.
+    pub fn expect_keys(&mut self, known: Vec<&'static str>) -> Result<()> {
+        let entries = self.table.into_iter().flatten();
+        let unknown = entries.filter(|(key, _)| !known.contains(&key.as_str()));
+        let first = unknown.min_by_key(|(_, entry)| match entry.key_origin {
+            Origin::File(offset) => (0, offset),
+            Origin::Override(i) => (1, i),
+            Origin::Default => (2, 0),
+        });
+        if let Some((key, entry)) = first {
+            let what = format!(
+                "unknown key `{}`{} known here: {}",
+                self.name(&shown(key)),
+                suggestion(key, &known),
+                list(&known)
+            );
+            return Err(Error::scene(self.source.place(entry.key_origin), what));
+        }
+        self.known = known;
+        Ok(())
+    }
+
+    /// Returns the resolved table.
+    ///
+    /// # Panics
+    /// When a key was read that `expect_keys` does not know: no scene could ever set it.
+    pub fn finish(self) -> Json {
+        let is_known = |key: &String| self.known.contains(&key.as_str());
+        assert!(self.resolved.keys().all(is_known), "every key that is read is declared");
+        Json::Object(self.resolved)
+    }
+
+    /// Writes down what a key came to.
+    pub fn record(&mut self, key: &str, value: Json) {
+        self.resolved.insert(key.to_owned(), value);
+    }
+
+    /// Returns whether the scene sets the key.
+    pub fn has(&self, key: &str) -> bool {
+        self.value(key).is_some()
+    }
+
+    /// Returns the value that the scene sets for the key.
+    pub fn value(&self, key: &str) -> Option<&'a Node> {
+        self.table?.get(key).map(|entry| &entry.node)
+    }
+
+    /// Returns the place of the key's value, or else of the table, or else the file.
+    pub fn place(&self, key: &str) -> Place {
+        let origin = self.value(key).map(|node| node.origin).or(self.origin);
+        self.source.place(origin.unwrap_or(Origin::Default))
+    }
+
+    /// Returns a complaint about a key's value, at its place.
+    pub fn fault(&self, key: &str, what: impl fmt::Display) -> Error {
+        Error::scene(self.place(key), format!("`{}`: {what}", self.name(key)))
+    }
+
+    /// Returns a complaint about item `i` of a key's array, at the item's place.
+    pub fn fault_of_item(&self, key: &str, i: usize, what: impl fmt::Display) -> Error {
+        let item = match self.value(key).map(|node| &node.value) {
+            Some(Value::Array(items)) => items.get(i),
+            _ => None,
+        };
+        let at = item.map_or_else(|| self.place(key), |node| self.source.place(node.origin));
+        Error::scene(at, format!("`{}.{i}`: {what}", self.name(key)))
+    }
+
+    /// Returns the complaint that a key is missing.
+    pub fn missing(&self, key: &str, expected: impl fmt::Display) -> Error {
+        let what = format!("missing key `{}`: expected {expected}", self.name(key));
+        Error::scene(self.place(key), what)
+    }
+
+    fn name(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
+    }
+
+    /// Returns the table that the key holds.
+    pub fn section(&self, key: &str) -> Result<Section<'a>> {
+        Section::new(self.source, self.name(key), self.value(key))
+    }
+
+    /// Returns the tables of the array that the key holds; none when the key is absent.
+    pub fn sections(&self, key: &str) -> Result<Vec<Section<'a>>> {
+        let found = match self.value(key).map(|node| &node.value) {
+            None => return Ok(Vec::new()),
+            Some(Value::Array(items)) => {
+                let name = |i: usize| format!("{}.{i}", self.name(key));
+                let section = |(i, item)| Section::new(self.source, name(i), Some(item));
+                return items.iter().enumerate().map(section).collect();
+            }
+            Some(Value::Table(_)) => format!(": write [[{key}]], not [{key}]"),
+            Some(other) => format!(", found {}", other.describe()),
+        };
+        Err(self.fault(key, format!("expected an array of tables{found}")))
+    }
+}

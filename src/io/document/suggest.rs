@@ -1,0 +1,79 @@
+//! Words of an input in messages: shortened, listed, and with the nearest known name to a mistyped
+//! one.
+
+/// Returns the known name nearest to `typed` (Levenshtein distance, with a swap of neighbours as
+/// one edit), if it is within a third of its length. One edit is always near enough, so that `x1`
+/// still finds `x`.
+fn nearest<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
+    // A long word is near no known name; its start shows that as well.
+    let typed: String = typed.to_lowercase().chars().take(64).collect();
+    let scored =
+        known.iter().map(|name| (strsim::osa_distance(&typed, &name.to_lowercase()), *name));
+    let allowed = |name: &str| (name.chars().count() / 3).max(1);
+    scored.filter(|(n, name)| *n <= allowed(name)).min_by_key(|(n, _)| *n).map(|(_, name)| name)
+}
+
+/// Returns `; did you mean …?` with the nearest known name, or nothing.
+pub fn did_you_mean(typed: &str, known: &[&str]) -> String {
+    nearest(typed, known).map_or(String::new(), |name| format!("; did you mean `{}`?", shown(name)))
+}
+
+/// Returns [`did_you_mean`], or `;` where no name is near. A list of the known names follows.
+pub fn suggestion(typed: &str, known: &[&str]) -> String {
+    let text = did_you_mean(typed, known);
+    if text.is_empty() { ";".to_owned() } else { text }
+}
+
+/// Returns a word of an input for a message: cut where it is long, and without characters that a
+/// terminal would obey.
+pub fn shown(word: &str) -> String {
+    const LONGEST: usize = 80;
+    let mut shown = String::new();
+    for (i, c) in word.chars().enumerate() {
+        if i == LONGEST {
+            shown.push('…');
+            break;
+        }
+        if c.is_control() { shown.extend(c.escape_debug()) } else { shown.push(c) }
+    }
+    shown
+}
+
+/// Lists the first of the names that an input gave.
+pub fn list_given(names: &[&str]) -> String {
+    const MOST: usize = 16;
+    let first: Vec<String> = names.iter().take(MOST).map(|name| shown(name)).collect();
+    let first = list(&first.iter().map(String::as_str).collect::<Vec<_>>());
+    match names.len().saturating_sub(MOST) {
+        0 => first,
+        more => format!("{first} and {more} more"),
+    }
+}
+
+/// Lists names of ours: `a`, `b`, `c`.
+pub fn list(names: &[&str]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_cut_and_control_characters_escaped() {
+        assert_eq!(shown("a\u{1b}[31m\nä\u{7f}"), "a\\u{1b}[31m\\nä\\u{7f}");
+        assert_eq!(shown(&"é".repeat(80)), "é".repeat(80));
+        assert_eq!(shown(&"é".repeat(70_000)), format!("{}…", "é".repeat(80)));
+        assert_eq!(list_given(&["a", "b\n"]), "`a`, `b\\n`");
+        assert!(list_given(&["x"; 99]).ends_with("`x` and 83 more"));
+    }
+
+    #[test]
+    fn near_names_are_found_and_far_ones_are_not() {
+        assert_eq!(nearest("heigth", &["width", "height"]), Some("height"));
+        assert_eq!(nearest("Width", &["width", "height"]), Some("width"));
+        assert_eq!(nearest("banana", &["width", "height"]), None);
+        assert_eq!(nearest("", &[]), None);
+        assert_eq!(nearest(&"x".repeat(1 << 20), &["x"]), None);
+    }
+}

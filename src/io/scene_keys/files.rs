@@ -1,0 +1,78 @@
+//! Files that a scene names: where they are read from.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use crate::error::{Error, Result};
+use crate::io::text_file::{DATA_LIMIT, read_text};
+use crate::io::weather::wrf::{self, WeatherFile};
+
+/// Source of the files that a scene names.
+pub trait Files {
+    /// Reads a text file. `first` says in words what such a file begins with.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is no text.
+    fn text(&self, path: &Path, first: &str) -> Result<String>;
+
+    /// Opens a weather file.
+    ///
+    /// # Errors
+    /// When the file is no readable WRF file, or the source has none.
+    fn weather(&self, path: &Path) -> Result<WeatherFile> {
+        Err(Error::io(path, "weather files are read from the disk alone"))
+    }
+}
+
+impl<F: Fn(&Path, &str) -> Result<String>> Files for F {
+    fn text(&self, path: &Path, first: &str) -> Result<String> {
+        self(path, first)
+    }
+}
+
+/// Files of the file system.
+pub struct OnDisk;
+
+impl Files for OnDisk {
+    fn text(&self, path: &Path, first: &str) -> Result<String> {
+        read_text(path, DATA_LIMIT, first)
+    }
+
+    fn weather(&self, path: &Path) -> Result<WeatherFile> {
+        wrf::open(path)
+    }
+}
+
+/// Files of the file system, with a list of those that were asked for, each once.
+pub struct Listed(Mutex<Vec<PathBuf>>);
+
+impl Listed {
+    /// Starts the list with one file.
+    pub fn new(first: &Path) -> Listed {
+        Listed(Mutex::new(vec![first.to_owned()]))
+    }
+
+    /// Returns the list.
+    pub fn into_paths(self) -> Vec<PathBuf> {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn add(&self, path: &Path) {
+        let mut paths = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if !paths.iter().any(|listed| listed == path) {
+            paths.push(path.to_owned());
+        }
+    }
+}
+
+impl Files for Listed {
+    fn text(&self, path: &Path, first: &str) -> Result<String> {
+        self.add(path);
+        OnDisk.text(path, first)
+    }
+
+    fn weather(&self, path: &Path) -> Result<WeatherFile> {
+        self.add(path);
+        OnDisk.weather(path)
+    }
+}

@@ -1,0 +1,97 @@
+//! Table `[lighting]`.
+
+use super::key::{Keys, keys, read_table};
+use super::spec::{Spec, choice, integer, number, pair};
+use crate::error::Result;
+use crate::io::bounds::{Bounds, GREATEST_EXPONENT, SHARE};
+use crate::io::document::section::Section;
+use crate::model::basis::{MAX_BASES, Sampling};
+use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, min_step};
+use crate::model::scene::{Gather, Lighting, LightingMode, MAX_PAIR_LEVELS, Pairs};
+use crate::model::sums::{Precision, Summation, Sums};
+
+/// Cutoff cells of the density grid: with fewer the margins leave next to no grid.
+const MIN_CELLS: u32 = 8;
+
+keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
+    /// Reflections that are computed: none (particles have their colours as given), the first,
+    /// C (15), or the first and the second, C (15) and (16).
+    mode: choice("two-reflection", &LightingMode::NAMES), "";
+    /// Cells along the longest axis of the density grid.
+    grid: integer(64, MIN_CELLS, MAX_CELLS), "";
+    /// Step of the march through the density grid toward a light.
+    step: number(1.0, Bounds::Within(0.05, 16.0)), "cell";
+    /// Share g of the optical depth that does not weaken light on its way through a cloud.
+    forward: number(0.85, SHARE), "";
+    /// Functions of the BRDF basis N_b: the diffuse one and N_b − 1 lobes.
+    bases: integer(8, 1, MAX_BASES), "";
+    /// Spacing of the exponents that the basis is made from.
+    sampling: choice("log", &Sampling::NAMES), "";
+    /// Range of exponents n_s that the basis is made for. Without it, the range is widened to the
+    /// exponents of the materials.
+    exponents: pair([1.0, 256.0], Bounds::Within(0.0, GREATEST_EXPONENT)), ""
+        => |range| exponents(s, range, of_materials);
+    /// How the second reflection is gathered: from every facet, from a tree of clusters, or by
+    /// whichever is faster at the number of facets.
+    gather: choice("auto", &Gather::NAMES), "";
+    /// Share of its distance above which the radius of a cluster opens it.
+    theta: number(0.4, Bounds::Within(0.0, 2.0)), "";
+    /// Facets of each cloud; 0: one for each particle.
+    facets_per_cloud: integer(0, 0, u32::MAX).map(|n| Some(n).filter(|n| *n > 0)), "";
+    pairs => pairs(s)?;
+    sums => sums(s)?;
+}}
+
+keys! { PAIRS: fn pairs(s) -> Pairs { Pairs;
+    /// Share of its distance above which the width of an emitter quarters it.
+    size ["pair_size"]: number(0.5, Bounds::Within(0.01, 100.0)), "";
+    /// Most times that an emitter is quartered.
+    levels ["pair_levels"]: integer(6, 0, MAX_PAIR_LEVELS), "";
+    /// Most steps of the march through the density grid between two facets.
+    steps ["pair_steps"]: integer(16, 1, MAX_MARCH_STEPS), "";
+}}
+
+keys! { SUMS: fn sums(s) -> Sums { Sums;
+    /// How the sums of the second reflection are added up.
+    summation: choice("plain", &Summation::NAMES), "";
+    /// Precision of these sums.
+    precision: choice("f32", &Precision::NAMES), "";
+}}
+
+/// Keys of `[lighting]`.
+pub const KEYS: [Keys; 3] = [LIGHTING, PAIRS, SUMS];
+
+/// Reads `[lighting]`. `of_materials` are the exponents n_s of the scene's materials.
+pub fn read_lighting(root: &mut Section, of_materials: &[f64]) -> Result<Lighting> {
+    read_table(root, "lighting", &KEYS, |s| {
+        let lighting = lighting(s, of_materials)?;
+        let (least, step, grid) = (min_step(lighting.grid), lighting.step, lighting.grid);
+        if step >= least {
+            return Ok(lighting);
+        }
+        let what = format!(
+            "expected at least {least:.4} cells where grid = {grid} (a march takes \
+             {MAX_MARCH_STEPS} steps at most), found {step}"
+        );
+        Err(s.fault("step", what))
+    })
+}
+
+/// Reads the range of n_s. A range that is given must hold every material's exponent; the default
+/// is widened to them.
+fn exponents(s: &mut Section, range: Spec<[f64; 2]>, of_materials: &[f64]) -> Result<[f64; 2]> {
+    let [low, high] = range.take(s, "exponents")?;
+    if !s.has("exponents") {
+        let low = of_materials.iter().copied().fold(low, f64::min);
+        let high = of_materials.iter().copied().fold(high, f64::max);
+        s.record("exponents", [low, high].into_iter().collect());
+        return Ok([low, high]);
+    }
+    let outside = of_materials.iter().find(|ns| !(low..=high).contains(*ns));
+    let what = match outside {
+        _ if low > high => format!("expected [least, greatest], found [{low}, {high}]"),
+        Some(ns) => format!("a material's ns = {ns} lies outside [{low}, {high}]"),
+        None => return Ok([low, high]),
+    };
+    Err(s.fault("exponents", what))
+}

@@ -1,0 +1,185 @@
+//! Tables `[[light]]`.
+
+use glam::DVec3;
+
+use super::key::{Keys, keys, names, read_tables};
+use super::spec::{Spec, choice, number, required_text, vector};
+use crate::error::Result;
+use crate::io::bounds::{AMOUNT, Bounds, COORDINATE, GREATEST, GREATEST_SHARE, LEAST_LIGHT_RADIUS};
+use crate::io::document::section::Section;
+use crate::io::document::suggest::shown;
+use crate::model::light::Light;
+use crate::model::weather::{steps, sun};
+
+/// Lights of a scene without any `[[light]]`: a sun from the upper right, and the sky.
+pub const DEFAULT_LIGHTS: &str = r#"
+[[light]]
+kind = "directional"
+direction = [-0.5, -0.8, -0.3]
+irradiance = [3.0, 2.9, 2.7]
+[[light]]
+kind = "sky"
+irradiance = [0.8, 0.87, 1.0]
+constant = 0.55
+"#;
+
+type Reader = fn(&mut Section) -> Result<Light>;
+
+/// A kind of light: its keys beside `kind`, and their reader.
+type LightKind = (&'static [Keys], Reader);
+
+const KINDS: &[(&str, LightKind)] = &[
+    ("directional", (&[DIRECTIONAL], directional)),
+    ("point", (&[POINT], point)),
+    ("spot", (&[CONE, SPOT], read_spot)),
+    ("sky", (&[SKY], sky)),
+    ("sun", (&[SUN], read_sun)),
+];
+
+fn radius() -> Spec<f64> {
+    number(1e-3, Bounds::Within(LEAST_LIGHT_RADIUS, GREATEST))
+}
+
+/// Range of a half angle, degrees.
+const HALF_ANGLE: Bounds = Bounds::Within(0.0, 180.0);
+
+keys! {
+    /// Kind of the light, which its other keys follow from.
+    KIND: pub fn kind(s) -> LightKind = "kind": choice("", KINDS).required(), "";
+}
+
+keys! { DIRECTIONAL: fn directional(s) -> Light { Light::Directional;
+    /// Direction in which the light travels.
+    direction: vector([0.0; 3], Bounds::Any).required(), "" => |d| unit_vector(s, &d);
+    /// Linear RGB irradiance on a plane across the direction.
+    irradiance: vector([0.0; 3], AMOUNT).required(), "";
+}}
+
+keys! { POINT: fn point(s) -> Light { Light::Point;
+    /// Place of the light.
+    position: vector([0.0; 3], COORDINATE).required(), "unit";
+    /// Linear RGB power for each solid angle.
+    intensity: vector([0.0; 3], AMOUNT).required(), "";
+    /// Distance below which the irradiance stops growing.
+    radius: radius(), "unit";
+}}
+
+struct Cone {
+    outer: f64,
+    inner: f64,
+}
+
+keys! { CONE: fn cone(s) -> Cone { Cone;
+    /// Half angle beyond which there is no light.
+    outer ["outer_deg"]: number(45.0, HALF_ANGLE), "degree";
+    /// Half angle below which the light is full.
+    inner ["inner_deg"]: number(0.0, HALF_ANGLE), "degree";
+}}
+
+keys! { SPOT: fn spot(s, cone: Cone) -> Light { Light::Spot;
+    cos_outer => cone.outer.to_radians().cos();
+    cos_inner => cone.inner.to_radians().cos();
+    /// Place of the light.
+    position: vector([0.0; 3], COORDINATE).required(), "unit";
+    /// Direction of the axis of its cone.
+    direction: vector([0.0; 3], Bounds::Any).required(), "" => |d| unit_vector(s, &d);
+    /// Linear RGB power for each solid angle.
+    intensity: vector([0.0; 3], AMOUNT).required(), "";
+    /// Distance below which the irradiance stops growing.
+    radius: radius(), "unit";
+}}
+
+keys! { SKY: fn sky(s) -> Light { Light::Sky;
+    /// Linear RGB irradiance from above.
+    irradiance: vector([0.0; 3], AMOUNT).required(), "";
+    /// Share of the irradiance that reaches every facet, whatever is in the way.
+    constant: number(0.15, Bounds::Within(0.0, GREATEST_SHARE)), "";
+}}
+
+/// A directional light from where the sun stands.
+struct Sun {
+    time_s: f64,
+    latitude: f64,
+    longitude: f64,
+    irradiance: DVec3,
+}
+
+keys! { SUN: fn sun(s) -> Sun { Sun;
+    /// Date and time, such as "2005-08-28 18:00:00".
+    time_s ["date"]: required_text(), "UTC" => |date| time_of(s, &date);
+    /// Latitude, positive to the north.
+    latitude ["latitude_deg"]: number(0.0, Bounds::Within(-90.0, 90.0)), "degree";
+    /// Longitude, positive to the east.
+    longitude ["longitude_deg"]: number(0.0, Bounds::Within(-180.0, 360.0)), "degree";
+    /// Linear RGB irradiance on a plane across the light.
+    irradiance: vector([0.0; 3], AMOUNT).required(), "";
+}}
+
+/// Lists the kinds of lights and the keys of each.
+pub fn kinds() -> impl Iterator<Item = (&'static str, &'static [Keys])> {
+    KINDS.iter().map(|(name, (lists, _))| (*name, *lists))
+}
+
+/// Reads every `[[light]]`.
+pub fn read_lights(root: &mut Section) -> Result<Vec<Light>> {
+    read_tables(root, "light", |s, _| {
+        let (lists, read) = kind(s)?;
+        s.expect_keys(names(&[&[KIND], lists].concat()))?;
+        read(s)
+    })
+}
+
+fn read_spot(s: &mut Section) -> Result<Light> {
+    let cone = cone(s)?;
+    let Cone { outer, inner } = cone;
+    if inner <= outer {
+        return spot(s, cone);
+    }
+    let what =
+        format!("expected at most outer_deg = {outer} (both are half angles), found {inner}");
+    Err(s.fault("inner_deg", what))
+}
+
+/// Reads a direction and normalises it.
+fn unit_vector(s: &mut Section, direction: &Spec<DVec3>) -> Result<DVec3> {
+    let direction = direction.take(s, "direction")?;
+    // Scaled first: the square of a long or short vector's length has no number.
+    let direction = (direction / direction.abs().max_element()).try_normalize();
+    direction.ok_or_else(|| s.fault("direction", "expected a direction, found [0, 0, 0]"))
+}
+
+fn time_of(s: &mut Section, date: &Spec<String>) -> Result<f64> {
+    let date = date.take(s, "date")?;
+    steps::parse(&date).ok_or_else(|| {
+        let found = shown(&date);
+        let what = format!("expected a time such as \"2005-08-28 18:00:00\" (UTC), found {found}");
+        s.fault("date", what)
+    })
+}
+
+/// Reads a sun; x is east and z south.
+fn read_sun(s: &mut Section) -> Result<Light> {
+    let Sun { time_s, latitude, longitude, irradiance } = sun(s)?;
+    let toward = sun::toward(time_s, latitude.to_radians(), longitude.to_radians());
+    if toward.y <= 0.0 {
+        let below = -toward.y.asin().to_degrees();
+        let what = format!("expected a time of day: the sun is {below:.1}° below the horizon then");
+        return Err(s.fault("date", what));
+    }
+    Ok(Light::Directional { direction: -toward, irradiance })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::io::document::tree::Document;
+
+    #[test]
+    fn default_lights_are_toml() {
+        let mut document = Document::parse("title = ''".to_owned(), Path::new("x.toml")).unwrap();
+        document.default_to("light", DEFAULT_LIGHTS);
+        assert_eq!(read_lights(&mut Section::root(&document).unwrap()).unwrap().len(), 2);
+    }
+}

@@ -1,0 +1,136 @@
+//! Tables `[[material]]`, and the keys of other tables that name a material.
+
+use glam::DVec3;
+
+use super::key::{Keys, keys, names, read_path, read_tables};
+use super::spec::{described, number, required_text, text, vector};
+use crate::error::Result;
+use crate::io::bounds::{AMOUNT, Bounds, COORDINATE, GREATEST_EXPONENT, SHARE};
+use crate::io::document::section::Section;
+use crate::io::document::suggest::{list_given, shown, suggestion};
+use crate::model::material::{Brdf, Material, MaterialKey};
+
+/// Material of a scene without any `[[material]]`.
+pub const DEFAULT_MATERIAL: &str = r#"
+[[material]]
+name = "cloud"
+"#;
+
+/// BRDF of a material whose table does not set it.
+const PLAIN: Brdf = Brdf { kd: DVec3::splat(0.9), ks: DVec3::ZERO, ns: 8.0 };
+
+keys! { MATERIAL: fn material(s) -> Material { Material;
+    /// Name by which clouds and surfaces refer to the material.
+    name: required_text(), "";
+    /// Settings of a material that changes over time, in place of `kd`, `ks` and `ns`. A setting
+    /// left out is that of the entry before.
+    keys ["path"]: described("array of { time_s, kd, ks, ns }"), "" => |_| read_keys(s);
+}}
+
+keys! { BRDF: fn brdf(s, before: Brdf) -> Brdf { Brdf;
+    /// Diffuse reflectance K_d, linear RGB.
+    kd: vector([0.9; 3], SHARE), "" => |kd| kd.or(before.kd.to_array()).take(s, "kd");
+    /// Specular reflectance K_s, linear RGB. K_d + 4 K_s above 1 reflects more light than arrives.
+    ks: vector([0.0; 3], AMOUNT), "" => |ks| ks.or(before.ks.to_array()).take(s, "ks");
+    /// Exponent n_s of the lobe.
+    ns: number(8.0, Bounds::Within(0.0, GREATEST_EXPONENT)), ""
+        => |ns| ns.or(before.ns).take(s, "ns");
+}}
+
+keys! { MATERIAL_KEY: fn material_key(s, before: Brdf) -> MaterialKey { MaterialKey;
+    /// Time at which the material has these settings. Times must grow.
+    time_s: number(0.0, COORDINATE).required(), "s";
+    brdf => brdf(s, before)?;
+}}
+
+keys! {
+    /// Name of the material. Without it, the only material, or else the one named "cloud".
+    MATERIAL_NAME: pub fn material_named(s, materials: &[Material]) -> usize =
+        "material": text("cloud"), "" => |name| {
+            let name = match materials {
+                [only] => name.or(only.name.as_str()),
+                _ => name,
+            };
+            let name = name.take(s, "material")?;
+            number_of(s, "material", &name, materials)
+        };
+}
+
+keys! {
+    /// Name of the material of the ground (HGT) under the cloud, or "none" for no ground.
+    GROUND: pub fn ground_named(s, materials: &[Material]) -> Option<usize> =
+        "ground": text("none"), "" => |name| match name.take(s, "ground")?.as_str() {
+            "none" => Ok(None),
+            name => number_of(s, "ground", name, materials).map(Some),
+        };
+}
+
+/// Keys of `[[material]]`.
+pub const KEYS: [Keys; 2] = [MATERIAL, BRDF];
+/// Keys of the entries of a material's path.
+pub const PATH_KEYS: [Keys; 2] = [MATERIAL_KEY, BRDF];
+
+/// Reads every `[[material]]`. Settings that are allowed but hardly meant go to `warnings`.
+pub fn read_materials(root: &mut Section, warnings: &mut Vec<String>) -> Result<Vec<Material>> {
+    read_tables(root, "material", |s, before: &[Material]| {
+        s.expect_keys(names(&KEYS))?;
+        let material = material(s)?;
+        let name = shown(&material.name);
+        if let Some(i) = before.iter().position(|m| m.name == material.name) {
+            return Err(s.fault("name", format!("`{name}` is already the name of material {i}")));
+        }
+        let albedo = material.max_albedo();
+        if albedo > 1.0 {
+            warnings.push(format!(
+                "{}: material `{name}` has K_d + 4 K_s = {albedo:.3}: above 1 it can reflect more \
+                 light than it receives",
+                s.place("ks")
+            ));
+        }
+        Ok(material)
+    })
+}
+
+fn read_keys(s: &mut Section) -> Result<Vec<MaterialKey>> {
+    if !s.has("path") {
+        return Ok(vec![MaterialKey { time_s: 0.0, brdf: brdf(s, PLAIN)? }]);
+    }
+    let not_both = "a material has either `kd`, `ks`, `ns` or a `path` of them, not both";
+    let before = |key: Option<&MaterialKey>| key.map_or(PLAIN, |key| key.brdf);
+    read_path(
+        s,
+        &PATH_KEYS,
+        (BRDF, not_both),
+        |key| key.time_s,
+        |item, key| material_key(item, before(key)),
+    )
+}
+
+/// Returns the number of the material that `key` names.
+fn number_of(s: &Section, key: &str, name: &str, materials: &[Material]) -> Result<usize> {
+    let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
+    names.iter().position(|known| *known == name).ok_or_else(|| {
+        let known = match names.is_empty() {
+            true => "; the scene has none".to_owned(),
+            false => format!("{} the scene has {}", suggestion(name, &names), list_given(&names)),
+        };
+        s.fault(key, format!("unknown material `{}`{known}", shown(name)))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::io::document::tree::Document;
+
+    #[test]
+    fn the_default_material_is_toml() {
+        let mut document = Document::parse("title = ''".to_owned(), Path::new("x.toml")).unwrap();
+        document.default_to("material", DEFAULT_MATERIAL);
+        let mut root = Section::root(&document).unwrap();
+        let material = &read_materials(&mut root, &mut Vec::new()).unwrap()[0];
+        assert_eq!((material.name.as_str(), material.at(0.0)), ("cloud", PLAIN));
+    }
+}

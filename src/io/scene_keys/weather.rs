@@ -1,0 +1,78 @@
+//! Keys of a `[[cloud]]` whose particles come from a weather file (docs/model.md §15).
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::key::keys;
+use super::spec::{integer, number};
+use crate::error::Result;
+use crate::io::bounds::{Bounds, GREATEST};
+use crate::io::document::section::Section;
+use crate::io::weather::blobs::Settings;
+use crate::io::weather::wrf::WeatherFile;
+use crate::model::scene::Simulate;
+use crate::model::terrain::Terrain;
+
+/// Most blobs of a file; a blob takes some 48 bytes.
+const MOST_PARTICLES: u32 = 20_000_000;
+/// Greatest speed of weather: a day in a second.
+const GREATEST_SPEED: f64 = 86_400.0;
+
+keys! { WEATHER: pub fn settings(s, last: u32) -> Settings { Settings;
+    /// Step of the file, from 0, that time 0 shows.
+    i_step ["step"]: integer(0, 0, u32::MAX), ""
+        => |_| integer(0, 0, last).map(|i| i as usize).take(s, "step");
+    /// Blobs that stand for the file's clouds.
+    n_particles ["particles"]: integer(20_000, 1, MOST_PARTICLES), "";
+    /// Factor on heights.
+    exaggeration: number(1.0, Bounds::Within(0.01, 100.0)), "";
+    /// Seconds of the file in a second of the scene; 0: the step stands still.
+    speed: number(0.0, Bounds::Within(-GREATEST_SPEED, GREATEST_SPEED)), "";
+}}
+
+/// Reads the keys that say how `file` is shown.
+pub fn read_settings(s: &mut Section, file: &WeatherFile, simulate: Simulate) -> Result<Settings> {
+    let last = u32::try_from(file.n_steps.saturating_sub(1)).unwrap_or(u32::MAX);
+    let settings = settings(s, last)?;
+    if settings.speed != 0.0 && simulate == Simulate::Gpu {
+        let what = "expected 0 where threads.simulate is \"gpu\", the default: it is the game \
+                    thread that goes from step to step";
+        return Err(s.fault("speed", what));
+    }
+    if settings.speed != 0.0 && settings.n_particles < 2 {
+        let what = "expected 2 or more where `speed` is not 0: blobs of two steps fade into each \
+                    other";
+        return Err(s.fault("particles", what));
+    }
+    Ok(settings)
+}
+
+/// Returns the ground of a step (HGT) under a cloud at `origin`, with heights exaggerated like the
+/// cloud's.
+pub fn ground_of(
+    s: &Section,
+    file: &WeatherFile,
+    settings: &Settings,
+    origin: DVec3,
+    i_material: usize,
+) -> Result<Terrain> {
+    let (columns, rows) = (file.shape.nx, file.shape.ny);
+    if columns < 2 || rows < 2 {
+        let what = format!(
+            "expected \"none\": the file has {columns} x {rows} columns, and ground lies between 2 \
+             x 2 at least"
+        );
+        return Err(s.fault("ground", what));
+    }
+    let Some((ground, heights)) = file.terrain(settings.i_step)? else {
+        return Err(s.fault("ground", "expected \"none\": the file has no variable HGT"));
+    };
+    let place = |(k, height): (usize, &f64)| {
+        let y = height * settings.exaggeration;
+        let place = DVec3::new(ground.east_m[k], y, ground.south_m[k]);
+        place.clamp(DVec3::splat(-GREATEST), DVec3::splat(GREATEST))
+    };
+    let points = Arc::new(heights.iter().enumerate().map(place).collect());
+    Ok(Terrain { origin, points, n: [columns as u32, rows as u32], i_material })
+}

@@ -20,11 +20,13 @@ pub struct Spec<T> {
     each: String,
     /// Value of a key that is not given; `None` for a required key.
     default: Option<Value>,
-    parse: Box<dyn Fn(&Value) -> Parsed<T>>,
+    parse: Parser<T>,
 }
 
 /// A value as the model has it and as the resolved scene writes it.
 type Parsed<T> = std::result::Result<(T, Json), Wrong>;
+
+type Parser<T> = Box<dyn Fn(&Value) -> Parsed<T>>;
 
 /// A complaint about a value.
 enum Wrong {

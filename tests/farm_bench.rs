@@ -168,7 +168,8 @@ fn assert_readers_accept(farm: &Farm, merged: &Path, alone: &Path) {
     assert!(code == Some(0) && out.contains("draw.cutoff=4, size=48x36"), "{out}{errors}");
     let value = json(&merged.join("run.json"));
     let schema: Value =
-        serde_json::from_str(include_str!("../docs/reference/schemas/run.schema.json")).expect("the schema");
+        serde_json::from_str(include_str!("../docs/reference/schemas/run.schema.json"))
+            .expect("the schema");
     let validator = jsonschema::draft202012::new(&schema).expect("a schema");
     assert_eq!(validator.iter_errors(&value).map(|e| e.to_string()).collect::<Vec<_>>(), [""; 0]);
 }

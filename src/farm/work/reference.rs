@@ -110,7 +110,8 @@ impl ReferenceWork {
             let bytes = fs::read(&path).map_err(io_error(&path))?;
             let (tile, samples) = self.piece(k);
             let pixels = self.pixels(tile);
-            let Some(sums) = SampleSums::from_bytes(&bytes, pixels.at.len(), samples.len() as u32) else {
+            let Some(sums) = SampleSums::from_bytes(&bytes, pixels.at.len(), samples.len() as u32)
+            else {
                 return Err(Error::io(&path, "its length does not fit the piece's pixels"));
             };
             pairs.push(sums);

@@ -1,18 +1,18 @@
-//! A sweep in shards: what is merged is the bench that one process makes but for its times, and
-//! times that cannot be compared are not merged.
+//! `nimbus farm` with the cases of a bench: except for times, the merged bench is that of one
+//! process, and times that cannot be compared are not merged.
 
-use std::collections::BTreeSet;
+#[path = "harness/farm.rs"]
+mod farm;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::path::Path;
 
+use farm::{Farm, fail, json, names, path_text, ran, signal, succeed, wait_for};
 use nimbus::timing::frame_rows::{FRAMES_FILE, FrameRow, FrameTable, parse_frames};
 use nimbus::timing::parts::base_spread;
 use nimbus::timing::records::Run;
 use nimbus::timing::results::read_results;
 use serde_json::Value;
-use tempfile::TempDir;
 
 const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
 const SIZE: [&str; 2] = ["--size", "40x30"];
@@ -30,25 +30,10 @@ const SWEEP: [&str; 10] = [
     "2",
 ];
 
-fn ran(args: &[&str]) -> (Option<i32>, String, String) {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
-    let output =
-        command.args(args).env_remove("NIMBUS_EXCLUSIVE").output().expect("the program runs");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (output.status.code(), text(&output.stdout), text(&output.stderr))
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("UTF-8")
-}
-
-fn planned(dir: &TempDir, each: &str) -> PathBuf {
-    let folder = dir.path().join("farm");
-    let plan = ["farm", "plan", SCENE, "-o", text(&folder), "--bench", "--shard-cases", each];
-    let (code, out, said) = ran(&[&plan, &SIZE[..], &["--"], &SWEEP].concat());
-    assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
-    assert!(out.starts_with("6 cases in "), "{out}");
-    folder
+/// Plans the bench, so many cases a shard.
+fn planned(each: &str) -> Farm {
+    let plan = ["--bench", "--shard-cases", each];
+    Farm::of(SCENE, &[&SIZE, &plan[..], &["--"], &SWEEP].concat())
 }
 
 fn rows(folder: &Path) -> FrameTable {
@@ -56,12 +41,7 @@ fn rows(folder: &Path) -> FrameTable {
     parse_frames(&fs::read_to_string(&path).expect("rows"), &path).expect("rows")
 }
 
-fn names(folder: &Path) -> BTreeSet<String> {
-    let entries = fs::read_dir(folder).expect("a folder").flatten();
-    entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect()
-}
-
-/// What of a run's cases does not depend on the machine's mood.
+/// Everything of a run's cases that does not depend on how fast the machine is.
 fn exact(run: &Run) -> Vec<String> {
     let of = |c: &nimbus::timing::records::Case| {
         let modes = c.modes.iter().map(|m| {
@@ -82,33 +62,25 @@ fn exact(run: &Run) -> Vec<String> {
     run.cases.iter().map(of).collect()
 }
 
-/// A row without its times and its block.
+/// A row of frames.csv without its times and its block.
 fn place(row: &FrameRow) -> String {
     let FrameRow { phase, sweep, threading, skip, frame, time_s, warm_up, n_drawn, ran, .. } = row;
     format!("{phase} {sweep} {threading} {skip} {frame} {time_s} {warm_up} {n_drawn} {ran}")
 }
 
 #[test]
-fn parts_together_are_the_bench_of_one_process() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let farm = planned(&dir, "2");
-    let (code, out, said) = ran(&["farm", "local", "--plan", text(&farm)]);
-    assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
+fn the_merged_bench_is_that_of_one_process() {
+    let farm = planned("2");
+    let out = farm.local();
     assert!(out.starts_with("3 shards are done"), "{out}");
-    let (code, out, _) = ran(&["farm", "status", "--plan", text(&farm)]);
-    assert!(code == Some(0) && out.starts_with("3 of 3 shards are done"), "{out}");
-    let merged = dir.path().join("merged");
-    let (code, out, said) = ran(&["farm", "merge", "--plan", text(&farm), "-o", text(&merged)]);
-    assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
-    let expected = format!(
-        "6 cases in {}\nthe first case, timed in each of 3 shards on 1 node: ",
-        text(&merged)
-    );
-    assert!(out.starts_with(&expected), "{out}");
-    let alone = dir.path().join("alone");
-    let (code, _, said) =
-        ran(&[&["bench", SCENE, "--out", text(&alone), "-q"], &SIZE[..], &SWEEP].concat());
-    assert_eq!(code, Some(0), "{said}");
+    let out = succeed(&["farm", "status", "--plan", farm.path()]);
+    assert!(out.starts_with("3 of 3 shards are done"), "{out}");
+    let (merged, alone) = (farm.merged(), farm.beside("alone"));
+    let (code, out, errors) = farm.merge();
+    assert_eq!((code, errors.as_str()), (Some(0), ""), "{out}");
+    let expected = "the first case, timed in each of 3 shards on 1 node: ";
+    assert!(out.starts_with("6 cases in ") && out.contains(expected), "{out}");
+    succeed(&[&["bench", SCENE, "--out", path_text(&alone), "-q"], &SIZE[..], &SWEEP].concat());
 
     // Readers check that rows and records fit.
     let [ours, theirs] = [&merged, &alone].map(|folder| read_results(folder).expect("results"));
@@ -156,21 +128,18 @@ fn parts_together_are_the_bench_of_one_process() {
             [&merged, &alone].map(|folder| fs::read(folder.join(&picture)).expect("a picture"));
         assert!(a == b, "{picture}");
     }
-    who_timed_what(&farm, &ours);
-    readers(&dir, &merged, &alone);
+    assert_parts_match_shards(&farm, &ours);
+    assert_readers_accept(&farm, &merged, &alone);
 }
 
-/// What `run.json` says of the parts is what the shards' own say.
-fn who_timed_what(farm: &Path, merged: &Run) {
-    let plan: Value =
-        serde_json::from_slice(&fs::read(farm.join("plan.json")).expect("a plan")).expect("JSON");
+/// Compares the parts in `run.json` with the results of the shards.
+fn assert_parts_match_shards(farm: &Farm, merged: &Run) {
     assert_eq!(
         merged.parts.iter().map(|p| (p.first, p.end)).collect::<Vec<_>>(),
         [(0, 2), (2, 4), (4, 6)]
     );
     for (i, part) in merged.parts.iter().enumerate() {
-        let place = farm.join("shards").join(plan["shards"][i]["key"].as_str().expect("a key"));
-        let run = read_results(&place).expect("results").run;
+        let run = read_results(&farm.place(i)).expect("results").run;
         let first = &run.cases[0];
         assert_eq!(
             (run.cases.len(), first.name()),
@@ -181,7 +150,7 @@ fn who_timed_what(farm: &Path, merged: &Run) {
             assert_eq!((&base.threading, base.skip), (&mode.threading, mode.skip));
             assert!(base.p50_ms.is_some() && base.p50_ms == mode.frame_ms.map(|m| m.of.p50));
         }
-        // The first part's is the one that stays.
+        // The merged run has the first case of the first part.
         assert_eq!(merged.cases[0] == *first, i == 0);
         assert!(!part.node.is_empty());
     }
@@ -189,16 +158,15 @@ fn who_timed_what(farm: &Path, merged: &Run) {
     assert!(spread.len() == 3 && spread.iter().all(|(_, by)| *by >= 1.0), "{spread:?}");
 }
 
-fn readers(dir: &TempDir, merged: &Path, alone: &Path) {
-    let page = dir.path().join("page.html");
-    let (code, _, said) = ran(&["report", text(merged), "-o", text(&page)]);
-    assert_eq!(code, Some(0), "{said}");
+/// Checks that `report`, `compare` and the schema take a merged bench.
+fn assert_readers_accept(farm: &Farm, merged: &Path, alone: &Path) {
+    let page = farm.beside("page.html");
+    succeed(&["report", path_text(merged), "-o", path_text(&page)]);
     let page = fs::read_to_string(page).expect("a page");
     assert!(page.contains("The nodes that timed the cases") && page.contains("2..4"));
-    let (code, out, said) = ran(&["compare", text(alone), text(merged)]);
-    assert!(code == Some(0) && out.contains("draw.cutoff=4, size=48x36"), "{out}{said}");
-    let value: Value =
-        serde_json::from_slice(&fs::read(merged.join("run.json")).expect("a run")).expect("JSON");
+    let (code, out, errors) = ran(&["compare", path_text(alone), path_text(merged)]);
+    assert!(code == Some(0) && out.contains("draw.cutoff=4, size=48x36"), "{out}{errors}");
+    let value = json(&merged.join("run.json"));
     let schema: Value =
         serde_json::from_str(include_str!("../docs/reference/schemas/run.schema.json"))
             .expect("the schema");
@@ -206,75 +174,45 @@ fn readers(dir: &TempDir, merged: &Path, alone: &Path) {
     assert_eq!(validator.iter_errors(&value).map(|e| e.to_string()).collect::<Vec<_>>(), [""; 0]);
 }
 
-/// Changes `file` of the shard in `place`, and its record with it, as if its node had written it
-/// so; and says that the node was its own.
-fn change(place: &Path, file: &str, from: &str, to: &str) {
-    let before = fs::read_to_string(place.join(file)).expect("a file");
-    assert!(before.contains(from), "{from}");
-    let after = before.replace(from, to);
-    fs::write(place.join(file), &after).expect("room");
-    let path = place.join("shard.json");
-    let mut manifest: Value = serde_json::from_slice(&fs::read(&path).expect("it")).expect("JSON");
-    manifest["exclusive"] = true.into();
-    for record in manifest["files"].as_array_mut().expect("files") {
-        if record["name"] == file {
-            let hash = format!("{:x}", <sha2::Sha256 as sha2::Digest>::digest(after.as_bytes()));
-            (record["sha256"], record["bytes"]) = (hash.into(), after.len().into());
-        }
-    }
-    fs::write(&path, manifest.to_string()).expect("room");
-}
-
 #[test]
 fn times_that_cannot_be_compared_are_refused_with_a_list() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let farm = planned(&dir, "3");
-    // Started by hand nobody says that the node was theirs alone.
-    let (code, _, said) = ran(&["farm", "run", "--plan", text(&farm), "--shard", "1"]);
-    assert_eq!(code, Some(0), "{said}");
-    let merged = dir.path().join("merged");
-    let merge = ["farm", "merge", "--plan", text(&farm), "-o", text(&merged)];
-    let (code, _, said) = ran(&merge);
-    assert!(
-        code == Some(1) && said.contains("1 of 2 shards are done") && said.contains("to do: 0"),
-        "{said}"
-    );
-    assert_eq!(ran(&["farm", "local", "--plan", text(&farm)]).0, Some(0));
-    let (code, _, said) = ran(&merge);
-    assert!(code == Some(1) && said.contains("NIMBUS_EXCLUSIVE=1 says so): shards 1"), "{said}");
-    assert!(!merged.exists());
+    let farm = planned("3");
+    // A run that is started by hand may share its node.
+    assert_eq!(farm.run(1).0, Some(0));
+    let (code, _, errors) = farm.merge();
+    assert!(code == Some(1) && errors.contains("1 of 2 shards are done"), "{errors}");
+    assert!(errors.contains("to do: 0"), "{errors}");
+    farm.local();
+    let (code, _, errors) = farm.merge();
+    let expected = "NIMBUS_EXCLUSIVE=1 says so): shards 1";
+    assert!(code == Some(1) && errors.contains(expected), "{errors}");
+    assert!(!farm.merged().exists());
 
-    let plan: Value =
-        serde_json::from_slice(&fs::read(farm.join("plan.json")).expect("a plan")).expect("JSON");
-    let place = farm.join("shards").join(plan["shards"][1]["key"].as_str().expect("a key"));
-    let device = read_results(&place).expect("results").run.device;
+    let device = read_results(&farm.place(1)).expect("results").run.device;
     for (what, from, to) in [
         ("device", &device.name, "another device"),
         ("device", &device.driver, "another driver 1.0"),
         ("processor", &"\"logical_cores\": ".to_owned(), "\"logical_cores\": 9"),
     ] {
-        change(&place, "run.json", from, to);
-        let (code, _, said) = ran(&merge);
-        assert!(code == Some(1) && said.contains(&format!("\n  {what}: ")), "{said}");
-        assert!(
-            said.contains(to.rsplit(' ').next().expect("a word")) && !said.contains("EXCLUSIVE"),
-            "{said}"
-        );
-        assert!(!merged.exists());
-        change(&place, "run.json", to, from);
+        farm.change_file(1, "run.json", from, to);
+        let (code, _, errors) = farm.merge();
+        assert!(code == Some(1) && errors.contains(&format!("\n  {what}: ")), "{errors}");
+        assert!(errors.contains(to.rsplit(' ').next().expect("a word")), "{errors}");
+        assert!(!errors.contains("EXCLUSIVE") && !farm.merged().exists(), "{errors}");
+        farm.change_file(1, "run.json", to, from);
     }
-    assert_eq!(ran(&merge).0, Some(0));
+    assert_eq!(farm.merge().0, Some(0));
 }
 
 #[test]
-fn a_part_is_the_first_case_and_its_own() {
+fn a_part_has_the_first_case_and_its_own() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("out");
     let bench = |more: &[&str]| {
         ran(&[&["bench", SCENE, "-q", "--force"], &SIZE[..], &SWEEP, more].concat())
     };
-    let (code, _, said) = bench(&["--out", text(&out), "--part", "3..4"]);
-    assert_eq!(code, Some(0), "{said}");
+    let (code, _, errors) = bench(&["--out", path_text(&out), "--part", "3..4"]);
+    assert_eq!(code, Some(0), "{errors}");
     let run = read_results(&out).expect("results").run;
     let names: Vec<String> = run.cases.iter().map(|case| case.name()).collect();
     assert_eq!(names, ["draw.cutoff=2, size=40x30", "draw.cutoff=3, size=48x36"]);
@@ -285,22 +223,21 @@ fn a_part_is_the_first_case_and_its_own() {
         (&["--part", "3..3"], "there is nothing in it"),
         (&["--part", "0..1", SCENE], "--part takes one scene"),
     ] {
-        let (code, _, said) = bench(&[&["--out", text(&out)], more].concat());
-        assert!(code == Some(2) && said.contains(expected), "{more:?} {said}");
+        let (code, _, errors) = bench(&[&["--out", path_text(&out)], more].concat());
+        assert!(code == Some(2) && errors.contains(expected), "{more:?} {errors}");
     }
-    let (code, _, said) = bench(&["--part", "0..1"]);
-    assert!(code == Some(2) && said.contains("--out"), "{said}");
+    let (code, _, errors) = bench(&["--part", "0..1"]);
+    assert!(code == Some(2) && errors.contains("--out"), "{errors}");
 }
 
 #[test]
-fn what_a_farm_decides_itself_is_refused_among_a_sweep_s_arguments() {
+fn arguments_that_the_plan_determines_are_refused() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("farm");
-    let plan = |sweep: &[&str]| {
-        let begin = ["farm", "plan", SCENE, "-o", text(&folder), "--bench", "--"];
-        ran(&[&begin[..], sweep].concat())
+    let plan = |more: &[&str]| {
+        fail(2, &[&["farm", "plan", SCENE, "-o", path_text(&folder)], more].concat())
     };
-    for (sweep, expected) in [
+    for (arguments, expected) in [
         (&["--out", "a"][..], "expected no other scene, --out"),
         (&["--out=a"], "expected no other scene, --out"),
         (&[SCENE], "expected no other scene"),
@@ -319,73 +256,55 @@ fn what_a_farm_decides_itself_is_refused_among_a_sweep_s_arguments() {
         (&["--sweep", "draw.cutoff"], "no `=`"),
         (&["--nonsense"], "--nonsense"),
     ] {
-        let (code, _, said) = plan(sweep);
-        assert!(code == Some(2) && said.contains(expected), "{sweep:?} {said}");
-        assert!(!folder.exists());
+        let errors = plan(&[&["--bench", "--"], arguments].concat());
+        assert!(errors.contains(expected), "{arguments:?} {errors}");
     }
-    // One of the two, or neither.
-    let begin = ["farm", "plan", SCENE, "-o", text(&folder)];
-    assert_eq!(ran(&[&begin[..], &["--bench", "--error"]].concat()).0, Some(2));
-    assert_eq!(ran(&[&begin[..], &["--", "--frames", "2"]].concat()).0, Some(2));
-    assert_eq!(ran(&[&begin[..], &["--bench", "--frames", "2"]].concat()).0, Some(2));
+    // Either kind of work, and not without its arguments.
+    plan(&["--bench", "--error"]);
+    plan(&["--", "--frames", "2"]);
+    plan(&["--bench", "--frames", "2"]);
     assert!(!folder.exists());
 }
 
 #[test]
-fn a_part_that_fails_for_good_is_said_to_and_a_job_has_its_node_alone() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let farm = planned(&dir, "6");
-    let run = ["farm", "run", "--plan", text(&farm), "--shard", "0", "--device", "no such device"];
-    let (code, _, said) = ran(&run);
-    assert!(
-        code == Some(2) && said.contains("nimbus bench ended with exit code 2"),
-        "{code:?} {said}"
-    );
-    assert!(said.contains("no such device"), "{said}");
-    let (_, out, _) = ran(&["farm", "status", "--plan", text(&farm)]);
-    assert!(
-        out.contains("failed") && out.contains("cases 0..6") && out.contains("to do: 0"),
-        "{out}"
-    );
-    let (code, out, said) = ran(&["farm", "gc", "--plan", text(&farm), "--idle", "0.000001"]);
-    assert!(code == Some(0) && out.contains("1 folders") && out.contains("removed"), "{out}{said}");
-    let (code, out, said) = ran(&["farm", "emit", "slurm", "--plan", text(&farm)]);
-    assert_eq!(code, Some(0), "{out}{said}");
-    let script = fs::read_to_string(farm.join("slurm/shard.sh")).expect("a script");
+fn a_part_that_fails_for_good_is_reported() {
+    let farm = planned("6");
+    let run = ["farm", "run", "--plan", farm.path(), "--shard", "0", "--device", "no such device"];
+    let errors = fail(2, &run);
+    assert!(errors.contains("nimbus bench ended with exit code 2"), "{errors}");
+    assert!(errors.contains("no such device"), "{errors}");
+    let out = succeed(&["farm", "status", "--plan", farm.path()]);
+    for expected in ["failed", "cases 0..6", "to do: 0"] {
+        assert!(out.contains(expected), "{out}");
+    }
+    let out = succeed(&["farm", "gc", "--plan", farm.path(), "--idle", "0.000001"]);
+    assert!(out.contains("1 folders") && out.contains("removed"), "{out}");
+}
+
+#[test]
+fn jobs_of_a_bench_have_their_node_to_themselves() {
+    let farm = planned("6");
+    succeed(&["farm", "emit", "slurm", "--plan", farm.path()]);
+    let script = fs::read_to_string(farm.folder.join("slurm/shard.sh")).expect("a script");
     assert!(script.contains("--exclusive") && script.contains("NIMBUS_EXCLUSIVE=1"), "{script}");
 }
 
 #[test]
-fn a_part_that_is_ended_is_worth_another_try_and_leaves_no_result() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let farm = dir.path().join("farm");
-    // Minutes, unless it is ended.
-    let plan = ["farm", "plan", SCENE, "-o", text(&farm), "--bench", "--", "--repeat", "10000"];
-    assert_eq!(ran(&plan).0, Some(0));
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
-    command.args(["farm", "run", "--quiet", "--plan", text(&farm), "--shard", "0"]);
-    let mut child = command.stderr(Stdio::piped()).spawn().expect("the program runs");
-    let shards = farm.join("shards");
-    // Its folder is made once the device is open.
-    let is_timing = || {
-        let entries = fs::read_dir(&shards).into_iter().flatten().flatten();
-        entries.map(|entry| entry.path().join("part")).any(|part| part.exists())
-    };
-    let begin = Instant::now();
-    while !is_timing() && begin.elapsed() < Duration::from_secs(60) {
-        std::thread::sleep(Duration::from_millis(20));
+fn a_part_that_is_ended_leaves_no_result_and_may_be_tried_again() {
+    // Hours, unless it is ended.
+    let farm = Farm::of(SCENE, &["--bench", "--", "--repeat", "100000"]);
+    let mut run = farm.command(0).arg("--quiet").spawn().expect("the program runs");
+    // The folder of its results is made once the device is open.
+    wait_for("the part's folder", || {
+        farm.leftovers(0, "tmp").iter().any(|folder| folder.join("part").exists())
+    });
+    assert!(run.try_wait().expect("a child").is_none(), "it is at work");
+    signal("-TERM", &run);
+    assert_eq!(run.wait().expect("it ends").code(), Some(75));
+    let out = succeed(&["farm", "status", "--plan", farm.path()]);
+    for expected in ["transient", "1 unfinished", "0 of 1 shards"] {
+        assert!(out.contains(expected), "{out}");
     }
-    assert!(child.try_wait().expect("a child").is_none(), "it is at work");
-    let ended =
-        Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
-    assert!(ended.success());
-    assert_eq!(child.wait().expect("it ends").code(), Some(75));
-    let (_, out, _) = ran(&["farm", "status", "--plan", text(&farm)]);
-    assert!(
-        out.contains("transient") && out.contains("1 unfinished") && out.contains("0 of 1 shards"),
-        "{out}"
-    );
-    let (code, _, said) =
-        ran(&["farm", "merge", "--plan", text(&farm), "-o", text(&dir.path().join("merged"))]);
-    assert!(code == Some(1) && said.contains("to do: 0"), "{said}");
+    let (code, _, errors) = farm.merge();
+    assert!(code == Some(1) && errors.contains("to do: 0"), "{errors}");
 }

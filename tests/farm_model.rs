@@ -1,5 +1,5 @@
-//! What `nimbus farm` says that work takes: a model is fitted, a plan is priced by it, and status
-//! says how far that was off; and what a plan tells of each shard.
+//! Cost models of `nimbus farm`: fitting one, predicting and pricing a plan with it, and comparing
+//! the prediction with what the plan took.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -36,7 +36,7 @@ fn status(folder: &str) -> Value {
     serde_json::from_str(&good(&["farm", "status", "--plan", folder, "--json"])).expect("JSON")
 }
 
-/// A calibration by a few frames of two scenes without pairs of facets.
+/// Fits a model to a few frames of two scenes, none of which has pairs of facets.
 fn calibrated(dir: &TempDir) -> String {
     let model = path(dir, "model.json");
     let args = [
@@ -65,13 +65,13 @@ fn planned(dir: &TempDir, name: &str, model: &str, more: &[&str]) -> (String, Va
     (said, read(Path::new(&folder).join("plan.json")))
 }
 
-/// What a model says of a frame of so many particles, 48 by 36 pixels.
+/// Predicts a shard with so many particle steps, at 48 by 36 pixels.
 fn by_hand(fitted: &Value, counted: &Value, n_particles: f64) -> f64 {
     let term = |name: &str| fitted[name].as_f64().unwrap_or(0.0);
     let amount = |name: &str| counted[name].as_f64().expect("a number");
     assert_eq!(amount("particle_steps"), n_particles);
     assert!(amount("cells") > 64.0 * 64.0, "{counted}");
-    // One a pixel for what lies behind, and some layers over it.
+    // One sample a pixel for the background, and one for each layer over it.
     assert!(amount("pixel_samples") > 48.0 * 36.0, "{counted}");
     let of_each = [
         ("step_s", "steps"),
@@ -88,13 +88,13 @@ fn sizes(plan: &Value) -> Vec<u64> {
     plan["shards"].as_array().expect("shards").iter().filter_map(|s| s["n"].as_u64()).collect()
 }
 
-/// What is predicted of shard `i`, s.
+/// The predicted duration of shard `i`, s.
 fn seconds(plan: &Value, i: usize) -> f64 {
     plan["shards"][i]["predicted_s"].as_f64().expect("seconds")
 }
 
 #[test]
-fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
+fn a_plan_is_predicted_and_priced_and_the_status_tells_the_error() {
     let dir = tempfile::tempdir().expect("a folder");
     let model = calibrated(&dir);
     let found = read(&model);
@@ -104,7 +104,7 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     );
     assert!(ran(&["farm", "calibrate", HELLO, "-o", &model]).2.contains("--force"));
 
-    // Shards of so little that all are one, and as many as frames where no more than a frame fits.
+    // Eight short frames are one shard. They are eight where a shard may not hold two.
     let price = ["--nodes", "2", "--rate", "3", "--quantum", "1e-3", "--retries", "0"];
     let (said, whole) = planned(&dir, "whole", &model, &price);
     let (_, each) = planned(&dir, "each", &model, &["--shard-seconds", "0,1e-9"]);
@@ -116,7 +116,7 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
         let predicted = seconds(plan, i);
         assert!((predicted - expected).abs() <= 1e-12 * expected, "{predicted} {expected}");
     }
-    // One shard: one of two nodes works, and is paid for by the millisecond.
+    // One of two nodes works, and is paid for by the millisecond.
     let cost = 3.0 * (seconds(&whole, 0) / 1e-3).ceil();
     assert!(
         said.contains("50 % of their time idle")
@@ -136,7 +136,7 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     assert_eq!((predicted["n"].as_u64(), predicted["largest"].as_f64()), (Some(8), Some(largest)));
     assert_eq!(status_now["n_other_class"], json!(0));
 
-    // Shards that another kind of device did say nothing of the model.
+    // Shards of another class of devices do not enter the error.
     let text = fs::read_to_string(Path::new(&folder).join("plan.json")).expect("a plan");
     let name = each["predicted_for"]["device"].as_str().expect("a name");
     fs::write(Path::new(&folder).join("plan.json"), text.replace(name, "another device"))
@@ -151,13 +151,13 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
 }
 
 #[test]
-fn what_no_calibration_is_and_what_it_does_not_know() {
+fn broken_models_and_unmeasured_amounts_are_refused() {
     let dir = tempfile::tempdir().expect("a folder");
     let (model, other, out) = (calibrated(&dir), path(&dir, "other.json"), path(&dir, "out"));
     for (from, to, expected) in [
         ("\"schema\": 1", "\"schema\": 9", "schema 9"),
         ("\"fit\"", "\"fat\"", "fat"),
-        ("{", "", "calibration"),
+        ("{", "", "not JSON"),
     ] {
         let text = fs::read_to_string(&model).expect("a model").replacen(from, to, 1);
         fs::write(&other, text).expect("room");
@@ -171,7 +171,7 @@ fn what_no_calibration_is_and_what_it_does_not_know() {
 }
 
 #[test]
-fn a_plan_tells_what_each_shard_is_called_with_and_makes_and_on_which_device() {
+fn a_plan_as_json_has_arguments_and_outputs_of_each_shard() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = path(&dir, "farm");
     let plan = [
@@ -199,7 +199,7 @@ fn a_plan_tells_what_each_shard_is_called_with_and_makes_and_on_which_device() {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let (code, _, said) = ran(&arguments);
     assert!(code == Some(2) && said.contains("no such device"), "{said}");
-    // The run's own word counts.
+    // The run's own --device comes before the plan's.
     good(&[&arguments[..], &["--device", "0"]].concat());
     let key = told["shards"][1]["key"].as_str().expect("a key");
     for name in of(1, "outputs") {
@@ -207,7 +207,7 @@ fn a_plan_tells_what_each_shard_is_called_with_and_makes_and_on_which_device() {
     }
 }
 
-/// Of the fly-by, as `bench` counts them.
+/// The number of particles of the fly-by, as `render -v` prints it.
 fn particles_of(dir: &TempDir) -> f64 {
     let out = path(dir, "counted.png");
     let args = ["render", SCENE, "--size", SIZE, "-o", &out, "-v"];

@@ -1,17 +1,19 @@
-//! An error study in shards: what is merged is the study that one machine makes, and times that
-//! cannot be compared are not merged.
+//! `nimbus farm` with an error study: except for times, the merged study is that of one process,
+//! and times that cannot be compared are not merged.
+
+#[path = "harness/farm.rs"]
+mod farm;
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
+use farm::{Farm, fail, json, names, path_text, succeed};
 use serde_json::Value;
-use tempfile::TempDir;
 
 const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
 const SIZE: [&str; 2] = ["--size", "48x36"];
-/// 3 × 2 × 2 configurations; none is the scene as it stands, whose sort_bits are "auto".
+/// 3 × 2 × 2 configurations. None is the base configuration, whose sort_bits are "auto".
 const STUDY: [&str; 15] = [
     "--grid",
     "--knob",
@@ -30,37 +32,21 @@ const STUDY: [&str; 15] = [
     "1",
 ];
 
-fn ran(args: &[&str]) -> (Option<i32>, String, String) {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
-    let output =
-        command.args(args).env_remove("NIMBUS_EXCLUSIVE").output().expect("the program runs");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    (output.status.code(), text(&output.stdout), text(&output.stderr))
+/// Plans the study, so many configurations a shard.
+fn planned(each: &str) -> Farm {
+    let plan = ["--error", "--shard-configurations", each];
+    Farm::of(SCENE, &[&SIZE, &plan[..], &["--"], &STUDY].concat())
 }
 
-fn planned(dir: &TempDir, name: &str, each: &str) -> PathBuf {
-    let folder = dir.path().join(name);
-    let plan =
-        ["farm", "plan", SCENE, "-o", text(&folder), "--error", "--shard-configurations", each];
-    let (code, out, said) = ran(&[&plan, &SIZE[..], &["--"], &STUDY].concat());
-    assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
-    assert!(out.starts_with("12 configurations in "), "{out}");
-    folder
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().expect("UTF-8")
-}
-
-fn read(folder: &Path) -> Value {
-    serde_json::from_slice(&fs::read(folder.join("study.json")).expect("a study")).expect("JSON")
+fn study_in(folder: &Path) -> Value {
+    json(&folder.join("study.json"))
 }
 
 /// Values, picture, error map.
 type Exact = (Vec<Value>, Vec<u8>, Vec<u8>);
 
-/// What of every configuration follows from it alone, by its name; and its picture. The scene as it
-/// stands has turns in every part.
+/// Everything of each configuration that does not depend on times, by its name. The base
+/// configuration has turns in every part, so that their number is left out.
 fn exact(folder: &Path) -> BTreeMap<String, Exact> {
     let of = |c: &Value| {
         let keys = ["settings", "hash", "error", "failure", "n_turns"];
@@ -74,23 +60,18 @@ fn exact(folder: &Path) -> BTreeMap<String, Exact> {
             (values, file("picture"), file("error_map")),
         )
     };
-    read(folder)["configurations"].as_array().expect("configurations").iter().map(of).collect()
+    study_in(folder)["configurations"].as_array().expect("configurations").iter().map(of).collect()
 }
 
 #[test]
-fn parts_together_are_the_study_of_one_machine() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let farm = planned(&dir, "farm", "5");
-    let (code, out, said) = ran(&["farm", "local", "--plan", text(&farm)]);
-    assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
+fn the_merged_study_is_that_of_one_process() {
+    let farm = planned("5");
+    let out = farm.local();
     assert!(out.starts_with("3 shards are done"), "{out}");
-    let merged = dir.path().join("merged");
-    let (code, out, said) = ran(&["farm", "merge", "--plan", text(&farm), "-o", text(&merged)]);
-    assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
-    let alone = dir.path().join("alone");
-    let (code, _, said) =
-        ran(&[&["error", SCENE, "--out", text(&alone), "-q"], &SIZE[..], &STUDY].concat());
-    assert_eq!(code, Some(0), "{said}");
+    let (merged, alone) = (farm.merged(), farm.beside("alone"));
+    let (code, out, errors) = farm.merge();
+    assert_eq!((code, errors.as_str()), (Some(0), ""), "{out}");
+    succeed(&[&["error", SCENE, "--out", path_text(&alone), "-q"], &SIZE[..], &STUDY].concat());
 
     let (ours, theirs) = (exact(&merged), exact(&alone));
     assert_eq!(ours.keys().collect::<Vec<_>>(), theirs.keys().collect::<Vec<_>>());
@@ -99,7 +80,7 @@ fn parts_together_are_the_study_of_one_machine() {
     }
     assert_eq!(ours.len(), 13);
     // The same form, and statistics of the same kind from as many turns.
-    let (merged_study, study) = (read(&merged), read(&alone));
+    let (merged_study, study) = (study_in(&merged), study_in(&alone));
     let keys =
         |value: &Value| value.as_object().expect("an object").keys().cloned().collect::<Vec<_>>();
     assert_eq!(keys(&merged_study), keys(&study));
@@ -121,78 +102,38 @@ fn parts_together_are_the_study_of_one_machine() {
         assert_eq!(keys(c), keys(other));
         assert!(c["by_base"]["value"].as_f64() > Some(0.0) && c["front"] != "unknown", "{c}");
     }
-    // What reads studies reads it.
-    let page = dir.path().join("page.html");
-    let (code, _, said) = ran(&["report", text(&merged), "-o", text(&page)]);
-    assert_eq!(code, Some(0), "{said}");
-    let names = |folder: &Path| {
-        let entries = fs::read_dir(folder).expect("a folder").flatten();
-        let mut names: Vec<String> =
-            entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    };
+    let page = farm.beside("page.html");
+    succeed(&["report", path_text(&merged), "-o", path_text(&page)]);
     assert_eq!(names(&merged), names(&alone));
 }
 
 #[test]
 fn times_that_cannot_be_compared_are_refused_with_a_list() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let farm = planned(&dir, "farm", "6");
-    // Started by hand nobody says that the node was theirs alone.
-    let (code, _, said) = ran(&["farm", "run", "--plan", text(&farm), "--shard", "0"]);
-    assert_eq!(code, Some(0), "{said}");
-    assert_eq!(ran(&["farm", "local", "--plan", text(&farm)]).0, Some(0));
-    let merged = dir.path().join("merged");
-    let merge = ["farm", "merge", "--plan", text(&farm), "-o", text(&merged)];
-    let (code, _, said) = ran(&merge);
-    assert!(code == Some(1) && said.contains("NIMBUS_EXCLUSIVE=1 says so): shards 0"), "{said}");
-    assert!(!merged.exists());
+    let farm = planned("6");
+    // A run that is started by hand may share its node.
+    assert_eq!(farm.run(0).0, Some(0));
+    farm.local();
+    let (code, _, errors) = farm.merge();
+    let expected = "NIMBUS_EXCLUSIVE=1 says so): shards 0";
+    assert!(code == Some(1) && errors.contains(expected), "{errors}");
+    assert!(!farm.merged().exists());
 
-    // Another driver: as the node would have written it.
-    let plan: Value =
-        serde_json::from_slice(&fs::read(farm.join("plan.json")).expect("a plan")).expect("JSON");
-    let place =
-        |i: usize| farm.join("shards").join(plan["shards"][i]["key"].as_str().expect("a key"));
-    let hash = |bytes: &[u8]| format!("{:x}", <sha2::Sha256 as sha2::Digest>::digest(bytes));
-    let change = |i: usize, file: &str, from: &str, to: &str| {
-        let before = fs::read_to_string(place(i).join(file)).expect("a file");
-        assert!(before.contains(from), "{from}");
-        let after = before.replace(from, to);
-        fs::write(place(i).join(file), &after).expect("room");
-        let path = place(i).join("shard.json");
-        let mut manifest: Value =
-            serde_json::from_slice(&fs::read(&path).expect("it")).expect("JSON");
-        manifest["exclusive"] = true.into();
-        for record in manifest["files"].as_array_mut().expect("files") {
-            if record["name"] == file {
-                (record["sha256"], record["bytes"]) =
-                    (hash(after.as_bytes()).into(), after.len().into());
-            }
-        }
-        fs::write(&path, manifest.to_string()).expect("room");
-    };
-    let driver = read(&place(0))["device"]["driver"].as_str().expect("a driver").to_owned();
-    change(0, "study.json", &driver, "another driver 1.0");
-    let (code, _, said) = ran(&merge);
-    assert!(
-        code == Some(1) && said.contains("\n  device: ") && said.contains("another driver 1.0"),
-        "{said}"
-    );
-    assert!(!said.contains("EXCLUSIVE") && !merged.exists(), "{said}");
-    change(0, "study.json", "another driver 1.0", &driver);
-    assert_eq!(ran(&merge).0, Some(0));
+    let study = study_in(&farm.place(0));
+    let driver = study["device"]["driver"].as_str().expect("a driver");
+    farm.change_file(0, "study.json", driver, "another driver 1.0");
+    let (code, _, errors) = farm.merge();
+    assert!(code == Some(1) && errors.contains("\n  device: "), "{errors}");
+    assert!(errors.contains("another driver 1.0") && !errors.contains("EXCLUSIVE"), "{errors}");
+    assert!(!farm.merged().exists());
+    farm.change_file(0, "study.json", "another driver 1.0", driver);
+    assert_eq!(farm.merge().0, Some(0));
 }
 
 #[test]
-fn what_a_farm_decides_itself_is_refused_among_a_study_s_arguments() {
+fn arguments_that_the_plan_determines_are_refused() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("farm");
-    let plan = |study: &[&str]| {
-        let begin = ["farm", "plan", SCENE, "-o", text(&folder), "--error", "--"];
-        ran(&[&begin[..], study].concat())
-    };
-    for (study, expected) in [
+    for (arguments, expected) in [
         (&["--out", "a"][..], "expected no --out"),
         (&["--set", "draw.cutoff=2"], "stand before it"),
         (&["--device", "0"], "--device"),
@@ -200,8 +141,9 @@ fn what_a_farm_decides_itself_is_refused_among_a_study_s_arguments() {
         (&["--knob", "light.0.direction=1"], "what is asked for"),
         (&["--nonsense"], "--nonsense"),
     ] {
-        let (code, _, said) = plan(study);
-        assert!(code == Some(2) && said.contains(expected), "{study:?} {said}");
+        let begin = ["farm", "plan", SCENE, "-o", path_text(&folder), "--error", "--"];
+        let errors = fail(2, &[&begin[..], arguments].concat());
+        assert!(errors.contains(expected), "{arguments:?} {errors}");
         assert!(!folder.exists());
     }
 }

@@ -1,6 +1,7 @@
 //! The command line, as typed.
 
 mod farm;
+mod farm_plan;
 mod results;
 mod stress;
 mod study;
@@ -15,9 +16,10 @@ use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 use crate::io::scene_file::MAX_SIDE;
 use crate::reference::picture::{MAX_SAMPLES, ReferenceKind};
 pub use farm::{
-    CalibrateArgs, EmitArgs, EngineArg, FarmArgs, FarmCommand, FormatArg, GcArgs, JobArgs,
-    LocalArgs, MergeArgs, PlanArgs, RunArgs, Span, StatusArgs, SubmitArg, SubmitArgs,
+    EmitArgs, EngineArg, FarmArgs, FarmCommand, GcArgs, JobArgs, LocalArgs, MergeArgs, RunArgs,
+    StatusArgs, SubmitArg, SubmitArgs,
 };
+pub use farm_plan::{CalibrateArgs, FormatArg, PlanArgs, Span};
 pub use results::{CompareArgs, ReportArgs};
 pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs, MetricArg, TimeArg};
@@ -290,7 +292,7 @@ pub struct BenchArgs {
     pub repeat: u32,
     /// Only these of the cases, counted from 0, after the first of all. What the nodes of a farm
     /// run (one scene)
-    #[arg(long, value_name = "FIRST..END", value_parser = farm::parse_span, requires = "out", hide_short_help = true)]
+    #[arg(long, value_name = "FIRST..END", value_parser = farm_plan::parse_span, requires = "out", hide_short_help = true)]
     pub part: Option<Span>,
     /// Folder for run.json, frames.csv and the last frame of every case as a PNG (with several
     /// scenes: a folder each in it)

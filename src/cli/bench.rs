@@ -7,11 +7,9 @@ use std::sync::atomic::AtomicBool;
 use clap::ColorChoice;
 
 use super::args::{BenchArgs, Span, ThreadingArg};
-use super::farm_cut::Amounts;
 use super::{bench_plot, bench_table, device_choice, load, output, say_sizes, warnings_of};
 use crate::error::{Error, Result};
-use crate::farm::amounts::{Played, textures_of};
-use crate::farm::cost::Work as Counted;
+use crate::farm::{Workload, bench_workload};
 use crate::frame::limits;
 use crate::frame::stage::Stage;
 use crate::gpu::ClockFit;
@@ -20,7 +18,7 @@ use crate::measure::zones::Zones;
 use crate::model::scene::Threading;
 use crate::timing::attachments::Attachments;
 use crate::timing::blocks::{self, BenchPlan, Finished, Outcome};
-use crate::timing::cases::{Case, Loop, LoopChoice, cases};
+use crate::timing::cases::{Case, LoopChoice, cases};
 use crate::timing::frame_rows::{FrameRow, FrameTable};
 use crate::timing::json::ResultFile;
 use crate::timing::machine;
@@ -158,30 +156,16 @@ fn of_part(args: &BenchArgs, cases: Vec<Case>) -> Result<Vec<Case>> {
     Ok(numbers(&range).into_iter().map(|i| cases[i].clone()).collect())
 }
 
-/// Names of the cases that a bench is asked for, in the order that `--part` counts by; and what
-/// each makes work of, the first being timed in every part.
-pub(super) fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Amounts)> {
+/// Returns the names of the cases that a bench times, in the order that `--part` counts by, and the
+/// amount of work in them.
+pub(super) fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Workload)> {
     let [scene] = &args.scenes[..] else {
         return Err(Error::usage(format!("expected one scene, found {}", args.scenes.len())));
     };
     let quiet = super::SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
     let cases = prepare(args, scene, &quiet)?.cases;
-    let n_frames = |case: &Case| f64::from(case.n_frames + args.warmup);
-    let counted = |case: &Case| {
-        let Played { next, first } = Played::of(&case.scene, case.i_first)?;
-        // Of several cases each block begins anew.
-        let block = |of: &Loop| {
-            let others = if of.skip { next } else { first };
-            first + others * (n_frames(case) - 1.0) + textures_of(&case.scene)
-        };
-        Ok(case.loops.iter().map(block).fold(Counted::default(), |sum, of| sum + of)
-            * f64::from(args.repeat))
-    };
-    let counted = cases.iter().map(counted).collect::<Result<Vec<Counted>>>()?;
-    let of_shard = counted.first().copied().unwrap_or_default();
-    // It is an item of the first part as well, and only once in it.
-    let items = std::iter::once(Counted::default()).chain(counted.into_iter().skip(1)).collect();
-    Ok((cases.iter().map(Case::name).collect(), Amounts { items, of_shard }))
+    let workload = bench_workload(&cases, args.warmup, args.repeat)?;
+    Ok((cases.iter().map(Case::name).collect(), workload))
 }
 
 /// The sweep's keys, each once.

@@ -1,133 +1,122 @@
-//! `nimbus farm emit` and `submit`.
+//! `nimbus farm emit` and `nimbus farm submit`.
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use super::args::{EmitArgs, EngineArg, JobArgs, SubmitArg, SubmitArgs};
 use super::output;
 use crate::error::{Error, Result};
-use crate::farm::emit::{Job, JobFile};
-use crate::farm::plan::Plan;
-use crate::farm::slurm;
-use crate::farm::status::{ranges, status};
-use crate::farm::synced;
+use crate::farm::slurm::{self, Job, Script};
+use crate::farm::{Plan, Status, process, ranges};
+use crate::io::atomic;
 
+/// Runs `nimbus farm emit`.
+///
+/// # Errors
+/// When the plan cannot be read or a script cannot be written.
 pub fn emit(args: &EmitArgs) -> Result<()> {
-    let (name, hint) = match args.engine {
-        EngineArg::Slurm => (
-            "slurm",
-            "J=$(sbatch --parsable --array=INDICES shard.sh); \
-             sbatch --dependency=afterany:$J merge.sh",
-        ),
-        EngineArg::Hyperqueue => ("hyperqueue", "bash submit.sh"),
-        EngineArg::Openjd => ("openjd", "openjd run template.json, or any engine that takes such"),
-        EngineArg::Local => ("local", "bash local.sh"),
+    let name = match args.engine {
+        EngineArg::Slurm => "slurm",
+        EngineArg::Local => "local",
     };
     let files = args.files.clone().unwrap_or_else(|| args.job.plan.join(name));
-    let (written, indices) = write(&args.job, &files, args.engine)?;
-    if indices.is_empty() {
+    let Some((scripts, status)) = write(&args.job, &files, args.engine)? else {
         return output::text("all shards are done, nothing was written: nimbus farm merge\n");
-    }
-    let hint = hint.replace("INDICES", &ranges(&indices));
-    output::text(&format!("{} in {}: {hint}\n", written.join(", "), files.display()))
+    };
+    let hint = match args.engine {
+        EngineArg::Slurm => format!(
+            "J=$(sbatch --parsable --array={} shard.sh); sbatch --dependency=afterany:$J merge.sh",
+            status.missing()
+        ),
+        EngineArg::Local => "bash local.sh".to_owned(),
+    };
+    let names: Vec<&str> = scripts.iter().map(|script| script.name).collect();
+    output::text(&format!("{} in {}: {hint}\n", names.join(", "), files.display()))
 }
 
+/// Runs `nimbus farm submit`.
+///
+/// # Errors
+/// When the plan is stale, shards of it are queued already, or Slurm refuses them.
 pub fn submit(args: &SubmitArgs) -> Result<()> {
     let SubmitArg::Slurm = args.engine;
-    let plan = absolute(&args.job.plan)?;
-    let files = plan.join("slurm");
-    // What every shard would say is said once.
-    let planned = Plan::read(&plan)?;
-    planned.scene_as_planned()?;
-    if let Some(option) =
-        args.job.sbatch.iter().chain(&args.job.sbatch_merge).find(|option| names_job(option))
-    {
+    let folder = absolute(&args.job.plan)?;
+    let files = folder.join("slurm");
+    // A stale plan is refused here, and not once by every shard.
+    Plan::read(&folder)?.scene_as_planned()?;
+    let mut options = args.job.sbatch.iter().chain(&args.job.sbatch_merge);
+    if let Some(option) = options.find(|option| names_job(option)) {
         return Err(Error::usage(format!(
-            "--sbatch={option}: by names and comments `submit` tells its jobs apart"
+            "--sbatch={option}: `submit` sets names and comments, by which it finds its jobs"
         )));
     }
-    let engine = slurm::states(&slurm::submitted(&plan)).map_err(|why| Error::Transient {
-        what: format!("what is queued already is not known, nothing was submitted: {}", why.what),
+    let queued = slurm::states(&folder).map_err(|failure| {
+        let what = failure.what;
+        Error::Transient {
+            what: format!("Slurm does not tell what is queued, nothing was submitted: {what}"),
+        }
     })?;
-    let (queued, what): (Vec<usize>, Vec<String>) = engine.into_iter().unzip();
-    if let Some(what) = what.first() {
-        let shards = ranges(&queued);
+    if let Some(state) = queued.values().next() {
+        let shards = ranges(&queued.keys().copied().collect::<Vec<usize>>());
         return Err(Error::usage(format!(
-            "shards {shards} are with Slurm already ({what}, …): wait for them, or scancel them"
+            "shards {shards} are with Slurm already ({state}, …): wait for them, or scancel them"
         )));
     }
-    let (_, indices) = write(&args.job, &files, EngineArg::Slurm)?;
-    if indices.is_empty() {
+    let Some((_, status)) = write(&args.job, &files, EngineArg::Slurm)? else {
         return output::text("all shards are done, nothing was submitted\n");
-    }
-    let submitted = slurm::submit(&plan, &files, &indices)?;
+    };
+    let submission = slurm::submit(&folder, &files, &status.open())?;
     if args.json {
-        return output::object(&submitted);
+        return output::object(&submission);
     }
-    let mut text = String::new();
-    for array in &submitted.arrays {
-        text +=
-            &format!("job {}: shards {}\n", array.job.as_deref().unwrap_or_default(), array.shards);
-    }
-    let folder = args.job.plan.display();
-    let merge = submitted.merge.as_deref().unwrap_or_default();
-    text += &format!(
-        "job {merge}: the merge, after them\nfollow them: nimbus farm status --plan {folder}\n"
-    );
-    output::text(&text)
+    let line = |array: &slurm::Array| {
+        format!("job {}: shards {}\n", array.job.as_deref().unwrap_or_default(), array.shards)
+    };
+    output::text(&format!(
+        "{}job {}: the merge, after them\nfollow them: nimbus farm status --plan {}\n",
+        submission.arrays.iter().map(line).collect::<String>(),
+        submission.merge.as_deref().unwrap_or_default(),
+        args.job.plan.display()
+    ))
 }
 
 fn names_job(option: &str) -> bool {
     ["--comment", "--job-name", "-J"].iter().any(|name| option.trim_start().starts_with(name))
 }
 
-/// Writes the engine's files for what is not done: their names, and what that is.
-fn write(
-    args: &JobArgs,
-    files: &Path,
-    engine: EngineArg,
-) -> Result<(Vec<&'static str>, Vec<usize>)> {
+/// Writes the scripts for the shards that are not done. Returns none where all are done.
+fn write(args: &JobArgs, files: &Path, engine: EngineArg) -> Result<Option<(Vec<Script>, Status)>> {
     let folder = absolute(&args.plan)?;
     let plan = Plan::read(&folder)?;
-    let indices = status(&folder, &plan)?.open();
-    let program = std::env::current_exe().map_err(|cause| Error::io(Path::new("nimbus"), cause))?;
+    let status = Status::new(&folder, &plan)?;
+    if status.open().is_empty() {
+        return Ok(None);
+    }
     let merged = args.output.as_deref().map_or_else(|| Ok(folder.join("merged")), absolute)?;
     let job = Job {
-        program: &program,
+        program: &process::program()?,
         plan: &folder,
         merged: &merged,
-        indices: &indices,
         n_tries: args.tries,
-        options: &args.sbatch,
-        merge_options: &args.sbatch_merge,
-        exclusive: !plan.is_exact(),
+        sbatch: &args.sbatch,
+        sbatch_merge: &args.sbatch_merge,
+        is_exclusive: !plan.work.is_exact(),
     };
-    if indices.is_empty() {
-        return Ok((Vec::new(), indices));
-    }
-    let made: Vec<JobFile> = match engine {
+    let scripts = match engine {
         EngineArg::Slurm => job.slurm(),
-        EngineArg::Hyperqueue => job.hyperqueue(),
-        EngineArg::Openjd => job.openjd(),
         EngineArg::Local => job.local(),
     };
-    synced::make_folder(files)?;
-    // Slurm makes none for its logs, and a job without one fails without a word.
-    synced::make_folder(&folder.join("logs"))?;
-    for (name, text, is_run) in &made {
+    atomic::make_folder(files)?;
+    // Slurm does not make the folder of its logs: without it jobs fail silently.
+    atomic::make_folder(&folder.join("logs"))?;
+    for Script { name, text } in &scripts {
         let path = files.join(name);
-        synced::write(&path, text.as_bytes())?;
-        if *is_run {
-            make_runnable(&path)?;
-        }
+        atomic::write_synced(&path, text.as_bytes())?;
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755))
+            .map_err(|cause| Error::io(&path, cause))?;
     }
-    Ok((made.iter().map(|(name, ..)| *name).collect(), indices))
-}
-
-fn make_runnable(path: &Path) -> Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    fs::set_permissions(path, fs::Permissions::from_mode(0o755))
-        .map_err(|cause| Error::io(path, cause))
+    Ok(Some((scripts, status)))
 }
 
 fn absolute(path: &Path) -> Result<PathBuf> {

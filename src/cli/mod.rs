@@ -11,11 +11,9 @@ mod devices;
 #[cfg(feature = "window")]
 mod edit;
 mod farm;
-mod farm_bench;
-mod farm_cut;
 mod farm_jobs;
 mod farm_plan;
-mod farm_reference;
+mod farm_told;
 mod inspect;
 mod ledger;
 mod output;

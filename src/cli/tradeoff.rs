@@ -9,11 +9,10 @@ use clap::ColorChoice;
 use indicatif::ProgressBar;
 
 use super::args::{ErrorArgs, MetricArg, TimeArg};
-use super::farm_cut::Amounts;
 use super::render_reference::Shown;
 use super::{device_choice, load, output, say_sizes, tradeoff_table};
 use crate::error::{Error, Result};
-use crate::farm::amounts::{Played, textures_of, work_of};
+use crate::farm::{StudyTurns, Workload, study_workload};
 use crate::frame::limits;
 use crate::frame::stage::Bed;
 use crate::io::image;
@@ -26,10 +25,10 @@ use crate::studies::error::design::{Design, name_of, settings};
 use crate::studies::error::files;
 use crate::studies::error::front::{Metric, best_within_error, best_within_ms};
 use crate::studies::error::knobs::default_axes;
-use crate::studies::error::players::{Frames, Players, frames_of_turns};
+use crate::studies::error::players::{Frames, Players};
 use crate::studies::error::records::{Configuration, Study};
 use crate::studies::error::run::{Event, Found, Loaded, Setup, StudyPlan};
-use crate::studies::error::turns::{BETWEEN, Time};
+use crate::studies::error::turns::Time;
 use crate::studies::provenance::{Provenance, ReferenceRecord};
 use crate::studies::reference_cache::{self, Kept};
 use crate::timing::json::ResultFile;
@@ -159,10 +158,9 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
     ))
 }
 
-/// Names of the configurations that a study is asked for, without the scene as it stands, in the
-/// order that `--part` counts by; and what each makes work of, the scene as it stands being timed
-/// beside them.
-pub(super) fn configurations(args: &ErrorArgs) -> Result<(Vec<String>, Amounts)> {
+/// Returns the names of the configurations that a study measures, without the base configuration, in
+/// the order that `--part` counts by, and the amount of work in them.
+pub(super) fn configurations(args: &ErrorArgs) -> Result<(Vec<String>, Workload)> {
     let options = plain(args)?;
     let scene = load(&args.scene, &options)?.at_frame(args.frame);
     super::check_time(&scene, scene.time.at(args.frame))?;
@@ -171,26 +169,15 @@ pub(super) fn configurations(args: &ErrorArgs) -> Result<(Vec<String>, Amounts)>
     args.against.check(&scene, scene.time.at(args.frame))?;
     let design = if args.grid { Design::Grid } else { Design::Alone };
     let all = settings(&axes, design);
-    let frames = f64::from(frames_of_turns(args.rounds, args.frames));
-    let time_s = scene.time.at(args.frame);
-    // A turn begins anew, textures and all, as the picture did.
-    let n_begun = f64::from(args.rounds + 1);
-    let of_scene = |scene: &Scene| {
-        let drawn = if args.as_played {
-            let Played { next, first } = Played::of(scene, args.frame)?;
-            next * (frames - 1.0) + first
-        } else {
-            work_of(scene, time_s)? * frames
-        };
-        Ok(drawn + textures_of(scene) * n_begun)
+    let scenes = all.iter().map(|settings| Ok(load_with(args, &options, settings)?.scene));
+    let turns = StudyTurns {
+        i_frame: args.frame,
+        n_rounds: args.rounds,
+        n_frames: args.frames,
+        as_played: args.as_played,
     };
-    let base = of_scene(&scene)?;
-    let of_one = |settings: &Vec<Setting>| {
-        let of = load_with(args, &options, settings)?;
-        Ok(of_scene(&of.scene)? + base * (1.0 / BETWEEN as f64))
-    };
-    let amounts = Amounts { items: all.iter().map(of_one).collect::<Result<_>>()?, of_shard: base };
-    Ok((all.iter().map(|settings| name_of(settings)).collect(), amounts))
+    let workload = study_workload(&scene, scenes, turns)?;
+    Ok((all.iter().map(|settings| name_of(settings)).collect(), workload))
 }
 
 /// The options, with every cloud plain where that is asked for.

@@ -1,70 +1,75 @@
-//! Clears away what attempts left.
+//! Removal of what attempts have left behind.
 
 use std::fs;
 use std::io::ErrorKind::{DirectoryNotEmpty, NotFound};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use super::failing::of_io;
 use super::plan::Plan;
-use super::store::{Other, Standing, Store};
+use super::store::{Leftover, ResultState, Store};
+use super::transient::io_error;
 use crate::error::Result;
 
-/// What was, or would be, removed.
+/// A choice of what is removed.
+#[derive(Debug, Clone, Copy)]
+pub struct GcOptions {
+    /// Unfinished folders of open shards are removed after this time without a change.
+    pub idle: Duration,
+    /// Whether results that were put aside are removed, too.
+    pub all: bool,
+    /// Whether everything stays and is only listed.
+    pub dry_run: bool,
+}
+
+/// A folder that was removed, or would be in a dry run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Removed {
+    /// Its path.
     pub path: PathBuf,
+    /// The length of its files together.
     pub bytes: u64,
 }
 
-/// Removes unfinished folders: of shards that are done, and those in which nothing has happened for
-/// `idle`. With `all` also what was put aside. With `dry` it only says so.
-pub fn gc(
-    folder: &Path,
-    plan: &Plan,
-    idle: Duration,
-    all: bool,
-    dry: bool,
-) -> Result<Vec<Removed>> {
-    let store = Store::open(folder);
-    let (others, mut removed) = (store.others(), Vec::new());
+/// Removes the unfinished folders of shards that are done, those that are idle, and on request
+/// results that were put aside.
+///
+/// # Errors
+/// When a folder cannot be removed.
+pub fn gc(folder: &Path, plan: &Plan, options: &GcOptions) -> Result<Vec<Removed>> {
+    let store = Store::new(folder, plan);
+    let (leftovers, mut removed) = (store.leftovers(), Vec::new());
     for shard in &plan.shards {
-        let unfinished = others.of(&shard.key, Other::Unfinished);
+        let unfinished = leftovers.of(shard, Leftover::Unfinished);
         let is_done =
-            !unfinished.is_empty() && matches!(store.standing(plan, shard), Standing::Verified(_));
-        let mut paths: Vec<PathBuf> =
-            unfinished.iter().filter(|path| is_done || is_idle(path, idle)).cloned().collect();
-        if all {
-            paths.extend(
-                [Other::Bad, Other::Differing]
-                    .iter()
-                    .flat_map(|kind| others.of(&shard.key, *kind).iter().cloned()),
-            );
-        }
-        for path in paths {
-            let bytes = bytes_of(&path);
-            if !dry {
-                // What was put aside need not have been a folder.
-                let is_folder = fs::symlink_metadata(&path).is_ok_and(|about| about.is_dir());
-                let gone =
-                    if is_folder { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
-                match gone {
-                    Ok(()) => {}
-                    // A run has cleared it away, or still works in it: the next time.
-                    Err(cause) if [NotFound, DirectoryNotEmpty].contains(&cause.kind()) => continue,
-                    Err(cause) => return Err(of_io(&path, &cause)),
-                }
+            !unfinished.is_empty() && matches!(store.state(shard), ResultState::Verified(_));
+        let gone = unfinished.iter().filter(|path| is_done || is_idle(path, options.idle));
+        let kinds = [Leftover::Bad, Leftover::Differing];
+        let aside = kinds.iter().flat_map(|kind| leftovers.of(shard, *kind));
+        for path in gone.chain(aside.filter(|_| options.all)) {
+            let bytes = bytes_of(path);
+            if options.dry_run || remove(path)? {
+                removed.push(Removed { path: path.clone(), bytes });
             }
-            removed.push(Removed { path, bytes });
         }
     }
     Ok(removed)
 }
 
-/// A folder's time is that of the last file that was made in it.
+/// Removes a folder, or the file that someone put in its place. Returns false where a run has
+/// removed it already or still works in it.
+fn remove(path: &Path) -> Result<bool> {
+    let is_folder = fs::symlink_metadata(path).is_ok_and(|about| about.is_dir());
+    match if is_folder { fs::remove_dir_all(path) } else { fs::remove_file(path) } {
+        Ok(()) => Ok(true),
+        Err(cause) if [NotFound, DirectoryNotEmpty].contains(&cause.kind()) => Ok(false),
+        Err(cause) => Err(io_error(path)(cause)),
+    }
+}
+
+/// A folder's time is that of the last file that was made in it. A time in the future, by another
+/// machine's clock, counts as now.
 fn is_idle(path: &Path, idle: Duration) -> bool {
     let changed = fs::symlink_metadata(path).and_then(|about| about.modified());
-    // A clock that is ahead of ours makes it young.
     changed.is_ok_and(|at| SystemTime::now().duration_since(at).is_ok_and(|since| since >= idle))
 }
 

@@ -1,110 +1,89 @@
-//! All shards' results in one folder, as one machine would have made them. Everything is verified
-//! before, and every copy after.
+//! The results of all shards in one folder, as one machine would have made them.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::bench;
-use super::failing::of_io;
-use super::plan::{Plan, Work, is_output};
-use super::status::ranges;
-use super::store::{FileRecord, Manifest, Standing, Store};
-use super::synced;
-use super::{reference, study};
+use super::plan::Plan;
+use super::ranges::ranges;
+use super::store::{ResultState, Store};
+use super::work::{Merge, ShardResult};
 use crate::error::{Error, Result};
-use crate::io::folder::replace_files;
 
-/// Puts the results of the plan in `folder` into `out`, frames all at once; how many. Refuses where
-/// a shard is not done. With `force` frames of an earlier merge are replaced, and go.
-pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool, mixed: bool) -> Result<usize> {
+/// The place of a merged result, and what is allowed there.
+#[derive(Debug, Clone, Copy)]
+pub struct MergeOptions<'a> {
+    /// The folder that gets the merged result.
+    pub out: &'a Path,
+    /// Whether results in that folder are replaced.
+    pub force: bool,
+    /// Whether pictures of several classes of devices are merged.
+    pub mixed: bool,
+}
+
+/// Verifies all results of the plan in `folder`, merges them, and returns the number of items.
+///
+/// # Errors
+/// When a shard is not done, results do not fit together, or the folder exists and is not to be
+/// replaced. Nothing is written then.
+pub fn merge(folder: &Path, plan: &Plan, options: &MergeOptions<'_>) -> Result<usize> {
+    let MergeOptions { out, force, mixed } = *options;
     if !force && out.symlink_metadata().is_ok() {
         return Err(Error::io(out, "exists; --force replaces it"));
     }
-    let store = Store::open(folder);
-    let parts = verified(plan, &store)?;
-    if let Work::Error { .. } = plan.work {
-        return study::merge(&parts, out, force);
+    let results = verified(folder, plan)?;
+    if plan.work.is_exact() && !mixed {
+        check_devices(&results)?;
     }
-    if let Work::Bench { cases, .. } = &plan.work {
-        return bench::merge(plan, cases, &parts, out, force);
-    }
-    check_devices(&parts, mixed)?;
-    if let Work::Reference(cut) = &plan.work {
-        return reference::merge(plan, cut, &parts, out);
-    }
-    let parts: Vec<_> =
-        parts.into_iter().map(|(place, manifest)| (place, manifest.files)).collect();
-    let names: Vec<&str> =
-        parts.iter().flat_map(|(_, files)| files).map(|file| file.name.as_str()).collect();
-    let earlier = earlier(out);
-    let gone = earlier.iter().map(String::as_str).filter(|name| !names.contains(name));
-    let files: Vec<&str> = gone.chain(names.iter().copied()).collect();
-    replace_files(out, &files, |staged| copy_all(&parts, staged))?;
-    Ok(names.len())
+    plan.work.merge(&Merge {
+        results: &results,
+        out,
+        force,
+        scene: &plan.scene,
+        build: [&plan.nimbus, &plan.revision, &plan.code],
+        load: &|| plan.scene_as_planned(),
+    })
 }
 
-/// Refuses frames of several devices or drivers, unless they are meant to be `mixed`: they differ
-/// in their last bits.
-fn check_devices(parts: &[(PathBuf, Manifest)], mixed: bool) -> Result<()> {
+/// Refuses results of several classes of devices: their pictures differ in the last bits.
+fn check_devices(results: &[ShardResult]) -> Result<()> {
     let mut by_device: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-    for (_, Manifest { device, index, .. }) in parts {
-        by_device.entry(device.class()).or_default().push(*index);
+    for ShardResult { manifest, .. } in results {
+        by_device.entry(manifest.device.class()).or_default().push(manifest.index);
     }
-    if mixed || by_device.len() < 2 {
+    if by_device.len() < 2 {
         return Ok(());
     }
-    let list: String = by_device
-        .iter()
-        .map(|(name, indices)| format!("\n  {name}: shards {}", ranges(indices)))
-        .collect();
-    let what = "pictures of several devices are no single machine's";
+    let line =
+        |(name, indices): (&String, &Vec<usize>)| format!("\n  {name}: shards {}", ranges(indices));
+    let list: String = by_device.iter().map(line).collect();
+    let what = "results of several devices differ in their last bits";
     Err(Error::Check { what: format!("{what}, --mixed merges them all the same:{list}") })
 }
 
-/// Frames that lie in `out`.
-fn earlier(out: &Path) -> Vec<String> {
-    let entries = fs::read_dir(out).into_iter().flatten().flatten();
-    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-    names.filter(|name| is_output(name)).collect()
-}
-
-/// Every shard's folder and what is in it, in the plan's order.
-fn verified(plan: &Plan, store: &Store) -> Result<Vec<(PathBuf, Manifest)>> {
-    let (mut parts, mut missing, mut broken) = (Vec::new(), Vec::new(), String::new());
+/// Returns the results of all shards in the plan's order.
+fn verified(folder: &Path, plan: &Plan) -> Result<Vec<ShardResult>> {
+    let store = Store::new(folder, plan);
+    let (mut results, mut missing, mut broken) = (Vec::new(), Vec::new(), String::new());
     for shard in &plan.shards {
-        match store.standing(plan, shard) {
-            Standing::Verified(manifest) => {
-                parts.push((store.place(&shard.key), *manifest));
+        match store.state(shard) {
+            ResultState::Verified(manifest) => {
+                let (folder, items) = (store.place(shard), shard.items());
+                results.push(ShardResult { folder, items, manifest: *manifest });
                 continue;
             }
-            Standing::Unreadable(error) => return Err(error),
-            Standing::Broken(what) if broken.is_empty() => {
+            ResultState::Unreadable(error) => return Err(error),
+            ResultState::Broken(what) if broken.is_empty() => {
                 broken = format!(" (shard {}: {what})", shard.index)
             }
-            Standing::Missing | Standing::Broken(_) => {}
+            ResultState::Missing | ResultState::Broken(_) => {}
         }
         missing.push(shard.index);
     }
     if missing.is_empty() {
-        return Ok(parts);
+        return Ok(results);
     }
-    let (n_done, n, to_do) = (parts.len(), plan.shards.len(), ranges(&missing));
-    Err(Error::Check {
-        what: format!(
-            "{n_done} of {n} shards are done, nothing was merged; to do: {to_do}{broken}"
-        ),
-    })
-}
-
-fn copy_all(parts: &[(PathBuf, Vec<FileRecord>)], to: &Path) -> Result<()> {
-    for (from, files) in parts {
-        for file in files {
-            let (source, copy) = (from.join(&file.name), to.join(&file.name));
-            fs::copy(&source, &copy).map_err(|cause| of_io(&copy, &cause))?;
-            file.check(to).map_err(|wrong| wrong.error(to))?;
-            synced::folder(&copy)?;
-        }
-    }
-    synced::folder(to)
+    let (n_done, n, to_do) = (results.len(), plan.shards.len(), ranges(&missing));
+    let what =
+        format!("{n_done} of {n} shards are done, nothing was merged; to do: {to_do}{broken}");
+    Err(Error::Check { what })
 }

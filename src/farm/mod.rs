@@ -1,39 +1,50 @@
-//! Spreads work over machines that share a folder. An engine (Slurm, another one, or the pool of
-//! one machine) starts runs; what makes it safe to start them twice, to kill them or to cut them
-//! off is here.
+//! Work that is spread over machines with a shared folder.
 //!
-//! A [`plan`] says what there is to do, in shards; a [`store`] holds what is done, each result
-//! [`verified`](store::Store::standing) by its content; [`run`] does one shard, [`merge`] puts all
-//! together, [`status`] and [`gc`] say and clear away. [`frames`], [`study`], [`bench`] and
-//! [`reference`] are the work itself; [`emit`] and [`slurm`] hand it to engines, which need not
-//! answer ([`ask`]).
+//! A [`Plan`] cuts work into shards, and [`run()`] does one of them. A run may be killed, started
+//! twice or cut off from the others at any time. A result appears in the shared folder as a whole,
+//! and is verified by its hashes. [`merge()`] puts all results together. [`Status`] tells what is
+//! done. [`gc()`] removes what killed runs have left behind.
 //!
-//! What that takes is predicted by [`cost`], fitted with [`nnls`]; [`split`] cuts items into shards
-//! of such a length, and [`pack`] says who does which of them, when all is done, and at what price.
+//! Runs are started by a [`Pool`] of processes on one machine or by [`slurm`]. The kinds of work
+//! implement [`Work`]; a new kind is a file under `work/`. [`cost`] predicts how long
+//! work takes, by a model that [`calibrate()`] fits to timed runs.
 
-pub mod amounts;
-pub mod ask;
-pub mod attempts;
-pub mod bench;
-pub mod calibrate;
-mod cells;
-pub mod child;
-pub mod cost;
-pub mod emit;
-pub mod failing;
-pub mod frames;
-pub mod gc;
-mod layers;
-pub mod merge;
-pub mod nnls;
-pub mod pack;
-pub mod plan;
-pub mod pool;
-pub mod reference;
-pub mod run;
-pub mod slurm;
-pub mod split;
-pub mod status;
-pub mod store;
-pub mod study;
-pub mod synced;
+mod attempts;
+mod calibrate;
+mod calibration;
+mod cost;
+mod cut;
+mod cut_reference;
+mod gc;
+mod journal;
+mod manifest;
+mod merge;
+mod node;
+mod plan;
+mod pool;
+pub(crate) mod process;
+mod ranges;
+mod run;
+mod scene_source;
+pub(crate) mod slurm;
+mod status;
+mod store;
+mod transient;
+mod work;
+mod workplace;
+
+pub(crate) use calibrate::{calibrate, calibrate_by_farms, n_frames};
+pub(crate) use calibration::FileModel;
+pub(crate) use cost::{
+    Estimate, Rate, StudyTurns, Workload, bench_workload, frames_workload, study_workload,
+};
+pub(crate) use cut::{Cut, CutOptions, ShardSize};
+pub(crate) use cut_reference::ReferenceDivision;
+pub(crate) use gc::{GcOptions, gc};
+pub(crate) use merge::{MergeOptions, merge};
+pub(crate) use plan::{Plan, PlanRequest};
+pub(crate) use pool::{Ended, Pool};
+pub(crate) use ranges::ranges;
+pub(crate) use run::{Outcome, RunOptions, give_up_after, run};
+pub(crate) use status::{ShardStatus, State, Status};
+pub(crate) use work::{AnyWork, Frames, PictureFormat, Study, Sweep};

@@ -1,143 +1,103 @@
-//! The engine of one machine: every shard in a process of its own, some at a time, tried again
-//! where it may go well.
+//! A pool of processes that does the shards of a plan on one machine.
 
-use std::collections::VecDeque;
-use std::os::unix::process::CommandExt;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::process::Child;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
-use super::child::EXCLUSIVE;
+use super::process::{self, EXCLUSIVE, POLL};
 use crate::error::{Error, Result};
 
-/// What there is to run.
+/// The pause before another try, times the tries so far: a transient cause lasts a while.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// Processes to be run, and how many at a time.
 #[derive(Debug, Clone)]
 pub struct Pool<'a> {
-    /// The program; without arguments.
+    /// The program.
     pub program: &'a Path,
-    /// All but the shard's index, which comes last.
+    /// Its arguments, except for the shard's number, which comes last.
     pub arguments: Vec<String>,
+    /// The number of processes at a time. A single one has the node to itself.
     pub n_processes: usize,
-    /// A shard that fails in a way that may pass is tried so often.
-    pub n_tries: usize,
-    /// Nobody else uses the device, as far as is known here.
-    pub exclusive: bool,
+    /// The number of tries of a shard that fails transiently.
+    pub n_tries: u32,
 }
 
-/// How a shard's last try ended.
+/// The end of a shard's last try.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ended {
+    /// The shard's number.
     pub index: usize,
-    /// None where a signal ended it.
+    /// The exit code; none where a signal ended the process.
     pub exit_code: Option<i32>,
-    pub n_tries: usize,
 }
-
-/// A shard that is to be run.
-#[derive(Debug, Clone, Copy)]
-struct Waiting {
-    index: usize,
-    /// So often it was.
-    n_tries: usize,
-    from: Instant,
-}
-
-/// Before another try, times those before: what may pass takes a while.
-const PAUSE: Duration = Duration::from_secs(1);
-/// How often children are looked at: short beside a shard, which takes a second at least.
-const LOOK: Duration = Duration::from_millis(5);
 
 impl Pool<'_> {
-    /// Runs `indices`; `on_end` is told of each. On `stop`, and on an error, no more begin, and
-    /// those that run are asked to end: they keep what they have.
+    /// Runs shards and calls `on_end` after each. On `stop` the processes that run are asked to
+    /// keep what they have and to end.
+    ///
+    /// # Errors
+    /// When a process cannot be started, or the pool was stopped.
     pub fn run(
         &self,
         indices: &[usize],
         stop: &AtomicBool,
-        on_end: &mut dyn FnMut(&Ended),
+        on_end: &dyn Fn(),
     ) -> Result<Vec<Ended>> {
-        let now = Instant::now();
-        let mut waiting: VecDeque<Waiting> =
-            indices.iter().map(|i| Waiting { index: *i, n_tries: 0, from: now }).collect();
-        let mut running: Vec<(Waiting, Child)> = Vec::new();
-        let mut all = Vec::new();
-        let ended = loop {
-            if waiting.is_empty() && running.is_empty() {
-                break Ok(());
+        let next = AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            let (sender, receiver) = channel();
+            for _ in 0..self.n_processes {
+                let (sender, next) = (sender.clone(), &next);
+                scope.spawn(move || {
+                    while let Some(&index) = indices.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let ended = self.try_shard(index, stop);
+                        let ended = ended.map(|exit_code| Ended { index, exit_code });
+                        // Sending fails after an error of another thread.
+                        if sender.send(ended).is_err() {
+                            break;
+                        }
+                    }
+                });
             }
-            if stop.load(Ordering::Relaxed) {
-                break Err(Error::Interrupted);
-            }
-            if let Err(error) = self.step(&mut waiting, &mut running, &mut all, on_end) {
-                break Err(error);
-            }
-            std::thread::sleep(LOOK);
-        };
-        running.iter().for_each(|(_, child)| ask_to_end(child));
-        for (_, child) in &mut running {
-            // It was asked to.
-            let _ = child.wait();
-        }
-        ended.map(|()| all)
+            drop(sender);
+            receiver.into_iter().inspect(|_| on_end()).collect()
+        })
     }
 
-    /// Starts what there is room for, and looks at what runs.
-    fn step(
-        &self,
-        waiting: &mut VecDeque<Waiting>,
-        running: &mut Vec<(Waiting, Child)>,
-        all: &mut Vec<Ended>,
-        on_end: &mut dyn FnMut(&Ended),
-    ) -> Result<()> {
-        while running.len() < self.n_processes
-            && let Some(i) = waiting.iter().position(|shard| shard.from <= Instant::now())
-            && let Some(next) = waiting.remove(i)
-        {
-            let child = self.start(next.index)?;
-            running.push((Waiting { n_tries: next.n_tries + 1, ..next }, child));
-        }
-        let mut i = 0;
-        while let Some((shard, child)) = running.get_mut(i) {
-            let Some(status) = child.try_wait().map_err(|cause| Error::io(self.program, cause))?
-            else {
-                i += 1;
-                continue;
-            };
-            let Waiting { index, n_tries, .. } = *shard;
-            running.swap_remove(i);
-            // One that was killed is worth another try as well.
-            if matches!(status.code(), None | Some(75)) && n_tries < self.n_tries {
-                let from = Instant::now() + PAUSE * n_tries as u32;
-                waiting.push_back(Waiting { index, n_tries, from });
-                continue;
+    /// Runs a shard until it is done, fails permanently, or has had all its tries. Returns the last
+    /// exit code.
+    fn try_shard(&self, index: usize, stop: &AtomicBool) -> Result<Option<i32>> {
+        let failed = |cause| Error::io(self.program, cause);
+        let mut n_tries = 1;
+        loop {
+            let mut child = self.start(index).map_err(failed)?;
+            let code = process::wait(&mut child, stop).map_err(failed)?.code();
+            let is_stopped = || stop.load(Ordering::Relaxed);
+            // A process that was killed gets another try, too.
+            let is_final = !matches!(code, None | Some(75)) || n_tries == self.n_tries;
+            let until = Instant::now() + PAUSE * n_tries;
+            while !is_final && !is_stopped() && Instant::now() < until {
+                std::thread::sleep(POLL);
             }
-            let ended = Ended { index, exit_code: status.code(), n_tries };
-            on_end(&ended);
-            all.push(ended);
+            if is_stopped() {
+                return Err(Error::Interrupted);
+            }
+            if is_final {
+                return Ok(code);
+            }
+            n_tries += 1;
         }
-        Ok(())
     }
 
-    fn start(&self, index: usize) -> Result<Child> {
-        let mut command = Command::new(self.program);
-        command
-            .args(&self.arguments)
-            .arg(index.to_string())
-            .stdin(Stdio::null())
-            .stdout(Stdio::null());
-        if self.exclusive {
+    fn start(&self, index: usize) -> std::io::Result<Child> {
+        let mut command = process::quiet(self.program);
+        command.args(&self.arguments).arg(index.to_string());
+        if self.n_processes == 1 {
             command.env(EXCLUSIVE, "1");
         }
-        // A terminal's Ctrl-C would reach them twice, and twice means at once.
-        command.process_group(0);
-        command.spawn().map_err(|cause| Error::io(self.program, cause))
+        command.spawn()
     }
-}
-
-/// As Ctrl-C does.
-pub(super) fn ask_to_end(child: &Child) {
-    // One that has ended meanwhile is waited for all the same.
-    let _ =
-        Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
 }

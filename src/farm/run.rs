@@ -1,146 +1,148 @@
-//! One shard, from whatever is there of it to its verified result.
+//! A run of one shard, from what earlier attempts have left to the verified result.
 
 use std::cell::Cell;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use super::attempts::{Event, Log};
-use super::failing::may_pass;
-use super::frames;
-use super::plan::{Plan, Shard, Work};
-use super::store::{Manifest, Placed, SCHEMA_VERSION, Standing, Store};
-use super::{bench, child, reference, study};
+use super::attempts::{Event, Log, n_fruitless};
+use super::manifest::{Manifest, SCHEMA_VERSION};
+use super::plan::{Plan, Shard};
+use super::process::EXCLUSIVE;
+use super::store::{Placement, ResultState, Store};
+use super::transient::as_transient;
+use super::work::Task;
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::scene_file::LoadedScene;
 use crate::timing::machine;
 
-/// How a shard came to be there.
+/// The way in which a shard was completed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Outcome {
-    /// It was there.
+    /// A verified result was there.
     Skipped,
+    /// This run made the result.
     Done {
+        /// Duration of the run.
         seconds: f64,
+        /// Files that earlier attempts had finished.
         n_resumed: usize,
     },
-    /// Another run put the same there while this one worked.
+    /// Another run put an equal result into place first.
     Beaten,
 }
 
-/// On which device, until when, and who is told of every item.
-pub struct How<'a> {
-    /// But for the shaders, which are the plan's, as the device is where none is named here.
+/// The device of a run, its end and its progress.
+pub struct RunOptions<'a> {
+    /// The device to open. Its shaders are the plan's, and without a name its device is, too.
     pub choice: &'a DeviceChoice,
+    /// Set when the run is to keep what is finished and end.
     pub stop: &'a AtomicBool,
+    /// Called after every item.
     pub on_item: &'a dyn Fn(),
 }
 
-/// Does shard `index` of the plan in `folder`, unless it is done. Errors have the exit code that
-/// engines are told: 75 where another try may go well, 70 where the result contradicts one that is
-/// there.
-pub fn run(folder: &Path, index: usize, how: &How<'_>) -> Result<Outcome> {
+/// Does shard `index` of the plan in `folder` unless it is done.
+///
+/// # Errors
+/// With exit code 75 when another try may succeed, with 70 when the result differs from one that is
+/// there, with others when no try helps.
+pub fn run(folder: &Path, index: usize, options: &RunOptions<'_>) -> Result<Outcome> {
     let plan = Plan::read(folder)?;
     let shard = plan.shard(index)?;
-    let log = Log::open(folder)?;
-    let store = Store::open(folder);
-    let (begin, n_new) = (Instant::now(), Cell::new(0));
-    // A stale plan is refused even where its results are there: they are not of what the files say
-    // now.
-    let ended = plan.scene_as_planned().and_then(|loaded| {
-        let attempt = Attempt {
-            plan: &plan,
-            loaded: &loaded,
-            shard,
-            store: &store,
-            log: &log,
-            how,
-            n_new: &n_new,
-        };
-        attempt.run(begin).or_else(|error| match store.standing(&plan, shard) {
-            // Whatever went wrong here: somebody else may have done it meanwhile, and cleared away
-            // what we worked in.
-            Standing::Verified(_) if !matches!(error, Error::Conflict { .. }) => {
+    let (store, log) = (Store::new(folder, &plan), Log::open(folder)?);
+    let begin = Instant::now();
+    let run = Run { plan: &plan, shard, store, log, options, begin, n_new: Cell::new(0) };
+    // A stale plan is refused even where results are there: they are not of the present files.
+    let outcome = plan.scene_as_planned().and_then(|loaded| {
+        run.attempt(&loaded).or_else(|error| match run.store.state(shard) {
+            // Another run has finished the shard meanwhile, and may have removed the files that
+            // this one missed.
+            ResultState::Verified(_) if !matches!(error, Error::Conflict { .. }) => {
                 Ok(Outcome::Beaten)
             }
-            _ => Err(may_pass(error)),
+            _ => Err(as_transient(error)),
         })
     });
-    let seconds = begin.elapsed().as_secs_f64();
-    let event = match &ended {
+    run.log(match &outcome {
         Ok(Outcome::Skipped) => Event::Skipped,
         Ok(Outcome::Done { seconds, n_resumed }) => {
             Event::Done { seconds: *seconds, n_resumed: *n_resumed }
         }
-        Ok(Outcome::Beaten) => Event::Beaten { seconds },
-        Err(error) => {
-            let (exit_code, what) = (error.exit_code(), error.to_string());
-            Event::Failed { seconds, exit_code, n_new: n_new.get(), what }
-        }
-    };
-    // On a full disk nothing can be written down either, and a result counts without a line about
-    // it.
-    let _ = log.say(index, &shard.key, event);
-    ended
+        Ok(Outcome::Beaten) => Event::Beaten { seconds: begin.elapsed().as_secs_f64() },
+        Err(error) => Event::Failed {
+            seconds: begin.elapsed().as_secs_f64(),
+            exit_code: error.exit_code(),
+            n_new: run.n_new.get(),
+            what: error.to_string(),
+        },
+    });
+    outcome
 }
 
-struct Attempt<'a> {
+/// Turns a transient error into a permanent one after `n_tries` failures of the same Slurm task in
+/// a row that finished nothing.
+pub fn give_up_after(n_tries: u32, folder: &Path, index: usize, error: Error) -> Error {
+    let Error::Transient { what } = &error else { return error };
+    match n_fruitless(folder, index) {
+        n if n >= n_tries as usize => Error::Check {
+            what: format!("{what}; nothing was finished {n} times in a row: this task ends here"),
+        },
+        _ => error,
+    }
+}
+
+struct Run<'a> {
     plan: &'a Plan,
-    loaded: &'a LoadedScene,
     shard: &'a Shard,
-    store: &'a Store,
-    log: &'a Log,
-    how: &'a How<'a>,
-    /// Is told how many files it finished, also where it fails.
-    n_new: &'a Cell<usize>,
+    store: Store<'a>,
+    log: Log,
+    options: &'a RunOptions<'a>,
+    begin: Instant,
+    /// The number of files that this run has finished, also where it fails.
+    n_new: Cell<usize>,
 }
 
-impl Attempt<'_> {
-    fn run(&self, begin: Instant) -> Result<Outcome> {
-        let Attempt { plan, loaded, shard, store, log, .. } = self;
-        let who = format!("{}.{}", log.node, log.pid);
-        match store.standing(plan, shard) {
-            Standing::Verified(_) => return Ok(Outcome::Skipped),
-            Standing::Missing => {}
-            Standing::Unreadable(error) => return Err(error),
-            Standing::Broken(what) => {
-                if let Some(to) = store.put_aside(plan, shard, &who)? {
-                    let event = Event::PutAside { what, to: to.display().to_string() };
-                    let _ = log.say(shard.index, &shard.key, event);
+impl Run<'_> {
+    /// Records an event. A failure is ignored: on a full disk nothing can be recorded, and a result
+    /// counts without its record.
+    fn log(&self, event: Event) {
+        let _ = self.log.append(self.shard.index, &self.shard.key, event);
+    }
+
+    fn attempt(&self, loaded: &LoadedScene) -> Result<Outcome> {
+        let Run { plan, shard, store, log, options, .. } = self;
+        let name = format!("{}.{}", log.node, log.pid);
+        match store.state(shard) {
+            ResultState::Verified(_) => return Ok(Outcome::Skipped),
+            ResultState::Missing => {}
+            ResultState::Unreadable(error) => return Err(error),
+            ResultState::Broken(what) => {
+                if let Some(to) = store.put_aside(shard, &name)? {
+                    self.log(Event::PutAside { what, to: to.display().to_string() });
                 }
             }
         }
         let begun = machine::utc_now();
-        // The log tells people; without it work goes on.
-        let _ = log.say(shard.index, &shard.key, Event::Begun);
-        let mut workplace = store.begin(shard, &who)?;
-        let choice = DeviceChoice {
-            device: self.how.choice.device.clone().or_else(|| plan.device.clone()),
-            shaders: plan.scene.shaders.clone(),
-            ..self.how.choice.clone()
-        };
-        let stop = self.how.stop;
-        let made = match &plan.work {
-            Work::Frames { .. } => {
-                let of = (*store, *plan, *shard, *loaded);
-                frames::draw(of, &choice, &mut workplace, stop, self.how.on_item)
-            }
-            Work::Reference(cut) => {
-                let of = (*store, *plan, *shard, *loaded);
-                reference::draw(of, cut, &mut workplace, stop, self.how.on_item)
-            }
-            Work::Error { arguments, .. } => {
-                study::measure((*plan, *shard, arguments), &choice, &mut workplace, stop)
-            }
-            Work::Bench { arguments, .. } => {
-                bench::measure((*plan, *shard, arguments), &choice, &mut workplace, stop)
-            }
-        };
+        self.log(Event::Begun);
+        let mut workplace = store.begin(shard, &name)?;
+        let device = options.choice.device.clone().or_else(|| plan.device.clone());
+        let shaders = plan.scene.shaders.clone();
+        let choice = DeviceChoice { device, shaders, ..options.choice.clone() };
+        let made = plan.work.run(&mut Task {
+            scene: &plan.scene,
+            loaded,
+            items: shard.items(),
+            choice: &choice,
+            workplace: &mut workplace,
+            stop: options.stop,
+            on_item: options.on_item,
+        });
         self.n_new.set(workplace.n_new());
         let device = made?;
-        let (seconds, n_resumed) = (begin.elapsed().as_secs_f64(), workplace.n_resumed);
-        let manifest = Manifest {
+        let (seconds, n_resumed) = (self.begin.elapsed().as_secs_f64(), workplace.n_resumed());
+        workplace.finish(Manifest {
             schema: SCHEMA_VERSION,
             key: shard.key.clone(),
             index: shard.index,
@@ -153,12 +155,11 @@ impl Attempt<'_> {
             begun,
             seconds,
             n_resumed,
-            exclusive: std::env::var_os(child::EXCLUSIVE).is_some_and(|value| value == "1"),
-        };
-        workplace.finish(manifest)?;
-        match store.put(workplace, plan, shard, &who)? {
-            Placed::First => Ok(Outcome::Done { seconds, n_resumed }),
-            Placed::Same => Ok(Outcome::Beaten),
+            exclusive: std::env::var_os(EXCLUSIVE).is_some_and(|value| value == "1"),
+        })?;
+        match store.put(&workplace, shard, &name)? {
+            Placement::First => Ok(Outcome::Done { seconds, n_resumed }),
+            Placement::Same => Ok(Outcome::Beaten),
         }
     }
 }

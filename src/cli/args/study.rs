@@ -63,7 +63,7 @@ pub struct ErrorArgs {
     pub budget_error: Vec<f64>,
     /// Only these of the configurations, counted from 0, and the scene as it stands; nothing is put
     /// together. What the nodes of a farm run
-    #[arg(long, value_name = "FIRST..END", value_parser = super::farm::parse_span, requires = "out", hide_short_help = true)]
+    #[arg(long, value_name = "FIRST..END", value_parser = super::farm_plan::parse_span, requires = "out", hide_short_help = true)]
     pub part: Option<super::Span>,
     /// Folder for study.json, configurations.csv, times.csv, front.svg and pictures
     #[arg(long, value_name = "DIR")]

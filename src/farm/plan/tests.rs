@@ -1,58 +1,59 @@
 use super::*;
+use crate::farm::work::{Frames, PictureFormat};
 
-fn wish(sizes: &[u32]) -> Wish {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
-    let work = Work::Frames { first: 3, n: sizes.iter().sum(), format: PictureFormat::Png };
-    Wish {
-        scene,
+/// Frames 3 and following of hello.toml, in shards of these sizes.
+fn request(sizes: &[u32], format: PictureFormat) -> PlanRequest {
+    let n = sizes.iter().sum();
+    let cut = Cut::single(AnyWork::Frames(Frames { first: 3, n, format }));
+    PlanRequest {
+        scene: Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml"),
         set: vec![],
         seed: None,
         shaders: None,
         device: None,
-        work,
-        sizes: sizes.to_vec(),
-        counted: vec![],
-        predicted_s: None,
-        predicted_for: None,
+        cut: Cut { sizes: sizes.to_vec(), ..cut },
     }
 }
 
-#[test]
-fn keys_follow_from_all_that_a_result_follows_from() {
-    let plan = Plan::new(wish(&[4, 4])).unwrap();
-    let again = Plan::new(wish(&[4, 4])).unwrap();
-    assert_eq!(plan.shards, again.shards);
-    assert_eq!(plan.shards[1].items(), 7..11);
-    assert_eq!(plan.outputs(&plan.shards[0])[0], "frame-00000003.png");
-    let key = |plan: &Plan| plan.shards[0].key.clone();
-    let mut others = vec![key(&plan), plan.shards[1].key.clone()];
-    others.push(key(&Plan::new(wish(&[3, 5])).unwrap()));
-    others.push(key(&Plan::new(Wish { seed: Some(9), ..wish(&[4, 4]) }).unwrap()));
-    others.push(key(
-        &Plan::new(Wish { set: vec!["film.width=64".into()], ..wish(&[4, 4]) }).unwrap()
-    ));
-    let exr = Work::Frames { first: 3, n: 8, format: PictureFormat::Exr };
-    others.push(key(&Plan::new(Wish { work: exr, ..wish(&[4, 4]) }).unwrap()));
-    let (mut built, mut shaded) = (plan.clone(), plan.clone());
-    built.code = "0123".into();
-    shaded.scene.shaders_hash = "4567".into();
-    others.extend([built.key(3, 4), shaded.key(3, 4)]);
-    let n = others.len();
-    others.sort();
-    others.dedup();
-    assert_eq!(others.len(), n);
-    assert!(others.iter().all(|key| key.len() == KEY_DIGITS));
+fn png(sizes: &[u32]) -> PlanRequest {
+    request(sizes, PictureFormat::Png)
 }
 
 #[test]
-fn what_is_read_is_what_was_planned_and_what_was_changed_is_refused() {
+fn keys_change_with_everything_that_results_depend_on() {
+    let plan = Plan::new(png(&[4, 4])).unwrap();
+    assert_eq!(plan.shards, Plan::new(png(&[4, 4])).unwrap().shards);
+    assert_eq!(plan.shards[1].items(), 7..11);
+    assert_eq!(plan.work.outputs(3..4), ["frame-00000003.png"]);
+    let key = |request: PlanRequest| Plan::new(request).unwrap().shards[0].key.clone();
+    let (mut built, mut shaded) = (plan.clone(), plan.clone());
+    built.code = "0123".into();
+    shaded.scene.shaders_hash = "4567".into();
+    let mut keys = vec![
+        plan.shards[0].key.clone(),
+        plan.shards[1].key.clone(),
+        key(png(&[3, 5])),
+        key(PlanRequest { seed: Some(9), ..png(&[4, 4]) }),
+        key(PlanRequest { set: vec!["film.width=64".into()], ..png(&[4, 4]) }),
+        key(request(&[4, 4], PictureFormat::Exr)),
+        built.key(3, 4),
+        shaded.key(3, 4),
+    ];
+    assert!(keys.iter().all(|key| key.len() == KEY_DIGITS));
+    keys.sort();
+    keys.dedup();
+    assert_eq!(keys.len(), 8);
+}
+
+#[test]
+fn a_plan_is_read_as_written_and_a_changed_one_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().join("farm");
-    let plan = Plan::new(wish(&[4, 4, 2])).unwrap();
+    let plan = Plan::new(png(&[4, 4, 2])).unwrap();
     plan.write(&folder).unwrap();
     assert_eq!(Plan::read(&folder).unwrap(), plan);
     assert!(plan.write(&folder).unwrap_err().to_string().contains("is not replaced"));
-    let path = folder.join(PLAN_FILE);
+    let path = folder.join(Plan::FILE);
     let text = std::fs::read_to_string(&path).unwrap();
     for (from, to, expected) in [
         ("\"schema\": 1", "\"schema\": 2", "schema 2"),
@@ -60,23 +61,25 @@ fn what_is_read_is_what_was_planned_and_what_was_changed_is_refused() {
         ("\"first\": 7", "\"first\": 8", "begin"),
         ("\"n\": 10", "\"n\": 11", "end at 13"),
         ("\"work\"", "\"wrok\"", "wrok"),
-        ("{", "", "not a plan"),
+        ("\"format\"", "\"fromat\"", "fromat"),
+        ("{", "", "not JSON"),
     ] {
         assert!(text.contains(from), "{from}");
         std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
-        let said = Plan::read(&folder).unwrap_err().to_string();
-        assert!(said.contains(expected), "{said}");
+        let error = Plan::read(&folder).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
     }
 }
 
 #[test]
-fn another_build_and_a_changed_scene_are_stale() {
+fn plans_of_another_build_or_a_changed_scene_are_stale() {
     let dir = tempfile::tempdir().unwrap();
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     for name in ["hello.toml", "hello.csv"] {
         std::fs::copy(scenes.join(name), dir.path().join(name)).unwrap();
     }
-    let mut plan = Plan::new(Wish { scene: dir.path().join("hello.toml"), ..wish(&[1]) }).unwrap();
+    let scene = dir.path().join("hello.toml");
+    let mut plan = Plan::new(PlanRequest { scene, ..png(&[1]) }).unwrap();
     plan.scene_as_planned().unwrap();
     let list = dir.path().join("hello.csv");
     let text = std::fs::read_to_string(&list).unwrap();
@@ -88,8 +91,8 @@ fn another_build_and_a_changed_scene_are_stale() {
 }
 
 #[test]
-fn frames_that_need_others_are_refused() {
+fn frames_that_depend_on_others_are_refused() {
     let set = vec!["draw.impostors=\"on\"".to_owned()];
-    let said = Plan::new(Wish { set, ..wish(&[1]) }).unwrap_err().to_string();
-    assert!(said.contains("draw.impostors"), "{said}");
+    let error = Plan::new(PlanRequest { set, ..png(&[1]) }).unwrap_err().to_string();
+    assert!(error.contains("draw.impostors"), "{error}");
 }

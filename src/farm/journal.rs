@@ -1,0 +1,32 @@
+//! Append-only files of JSON lines that several processes share.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::error::{Error, Result};
+use crate::io::atomic;
+
+/// Appends `record` as a line and syncs the file. The line is written by a single call, so that
+/// lines of two processes never mix.
+///
+/// # Errors
+/// When the file cannot be written; transient where another try may succeed.
+pub fn append<T: Serialize>(path: &Path, record: &T) -> Result<()> {
+    let line = serde_json::to_string(record).map_err(|cause| Error::io(path, cause))?;
+    atomic::append_synced(path, &line)
+}
+
+/// Returns the records of a journal in their order. Lines that were cut off when their writer was
+/// killed, or have another form, are left out.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn read<T: DeserializeOwned>(path: &Path) -> io::Result<Vec<T>> {
+    let bytes = fs::read(path)?;
+    let text = String::from_utf8_lossy(&bytes);
+    Ok(text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect())
+}

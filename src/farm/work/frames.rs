@@ -1,0 +1,192 @@
+//! Frames of an animation: the pictures that `nimbus render` draws, to the byte.
+
+use std::collections::HashSet;
+use std::fs;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::task::{Merge, ShardResult, Task, Work};
+use crate::error::{Error, Result};
+use crate::farm::transient::io_error;
+use crate::frame::stage::{Bed, Player};
+use crate::io::atomic;
+use crate::io::folder::replace_files;
+use crate::io::image::{ImageKind, encoded};
+use crate::io::scene_file::LoadedScene;
+use crate::model::scene::{Impostors, Scene};
+use crate::timing::machine::{Device, device_record};
+
+/// The pictures of frames `first` to `first + n − 1`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Frames {
+    /// The first frame.
+    pub first: u32,
+    /// The number of frames.
+    pub n: u32,
+    /// The format of the pictures.
+    pub format: PictureFormat,
+}
+
+/// A format of picture files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PictureFormat {
+    /// 8-bit sRGB, tone-mapped, over the background.
+    Png,
+    /// Linear premultiplied RGBA in f32.
+    Exr,
+}
+
+impl PictureFormat {
+    /// Returns the extension of file names.
+    pub fn extension(self) -> &'static str {
+        match self {
+            PictureFormat::Png => "png",
+            PictureFormat::Exr => "exr",
+        }
+    }
+
+    /// Returns the encoder's name of the format.
+    pub fn kind(self) -> ImageKind {
+        match self {
+            PictureFormat::Png => ImageKind::Png,
+            PictureFormat::Exr => ImageKind::Exr,
+        }
+    }
+}
+
+impl Work for Frames {
+    fn kind(&self) -> String {
+        "frames".to_owned()
+    }
+
+    fn noun(&self) -> &'static str {
+        "frames"
+    }
+
+    fn items(&self) -> Range<u64> {
+        u64::from(self.first)..u64::from(self.first) + u64::from(self.n)
+    }
+
+    /// Other frames of the same plan do not change a frame.
+    fn identity(&self) -> Value {
+        json!({"kind": "frames", "format": self.format.extension()})
+    }
+
+    fn outputs(&self, items: Range<u32>) -> Vec<String> {
+        items.map(|i_frame| file_name(i_frame, self.format)).collect()
+    }
+
+    fn is_exact(&self) -> bool {
+        true
+    }
+
+    /// Refuses scenes in which a frame does not follow from its number alone.
+    fn check_scene(&self, loaded: &LoadedScene) -> Result<()> {
+        let Frames { first, n, .. } = self;
+        if *n == 0 || first.checked_add(*n).is_none() {
+            let most = u32::MAX;
+            return Err(Error::usage(format!(
+                "--frames: expected at least one, up to {most}, found {n} from {first}"
+            )));
+        }
+        let phases = loaded.phases.iter().map(|phase| &phase.scene);
+        let mut scenes = std::iter::once(&loaded.scene).chain(phases);
+        if scenes.any(|scene| scene.draw.exact().impostors != Impostors::Off) {
+            return Err(Error::usage(
+                "a frame with impostors depends on the frames before it, which another shard \
+                 draws: expected draw.impostors = \"off\" (--set draw.impostors=off)",
+            ));
+        }
+        Ok(())
+    }
+
+    fn run(&self, task: &mut Task<'_>) -> Result<Device> {
+        let bed = Bed::open(task.choice)?;
+        let device = device_record(bed.device.info());
+        task.workplace.resume(&device)?;
+        let loaded = task.loaded;
+        let mut playing: Option<(Arc<Scene>, Player)> = None;
+        task.make_files(
+            |i_frame| file_name(i_frame, self.format),
+            |i_frame| {
+                let (scene, player) = match playing.take() {
+                    // A scene without phases is the same in all frames.
+                    Some((scene, player))
+                        if loaded.phases.is_empty() || *scene == scene_at(loaded, i_frame) =>
+                    {
+                        playing.insert((scene, player))
+                    }
+                    previous => {
+                        // Frees the device's memory before the next phase allocates.
+                        drop(previous);
+                        let scene = Arc::new(scene_at(loaded, i_frame));
+                        playing.insert((scene.clone(), bed.player(scene, true)?))
+                    }
+                };
+                let packet = player.game.step(i_frame)?;
+                player.renderer.step(packet)?;
+                let (rgba, film) = (player.renderer.image()?, scene.film);
+                encoded(self.format.kind(), &film, film.width, film.height, &rgba)
+            },
+        )?;
+        drop(playing);
+        // Closing reports the validation layers' messages. Later attempts must not take over
+        // pictures that such a message may be about.
+        bed.close().inspect_err(|_| task.workplace.disown())?;
+        Ok(device)
+    }
+
+    fn merge(&self, merge: &Merge<'_>) -> Result<usize> {
+        let files = merge.results.iter().flat_map(|result| &result.manifest.files);
+        let names: Vec<&str> = files.map(|file| file.name.as_str()).collect();
+        let kept: HashSet<&str> = names.iter().copied().collect();
+        let earlier = frames_in(merge.out);
+        let removed = earlier.iter().map(String::as_str).filter(|name| !kept.contains(name));
+        let replaced: Vec<&str> = removed.chain(names.iter().copied()).collect();
+        replace_files(merge.out, &replaced, |staged| copy_all(merge.results, staged))?;
+        Ok(names.len())
+    }
+}
+
+/// Returns the scene of a frame with every "auto" resolved to what needs no measurement: measured
+/// choices may differ between nodes, and their pictures would, too.
+fn scene_at(loaded: &LoadedScene, i_frame: u32) -> Scene {
+    loaded.clone().at_frame(i_frame).exact().into_owned()
+}
+
+/// Returns a frame's file name. Names sort as the frames do.
+fn file_name(i_frame: u32, format: PictureFormat) -> String {
+    format!("frame-{i_frame:08}.{}", format.extension())
+}
+
+fn is_file_name(name: &str) -> bool {
+    let stem = name.strip_suffix(".png").or(name.strip_suffix(".exr"));
+    let number = stem.and_then(|stem| stem.strip_prefix("frame-"));
+    number.is_some_and(|digits| digits.len() >= 8 && digits.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Returns the names of all frames in a folder.
+fn frames_in(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    names.filter(|name| is_file_name(name)).collect()
+}
+
+/// Copies all files to a folder and verifies each copy.
+fn copy_all(results: &[ShardResult], to: &Path) -> Result<()> {
+    for ShardResult { folder, manifest, .. } in results {
+        for file in &manifest.files {
+            let copy = to.join(&file.name);
+            fs::copy(folder.join(&file.name), &copy).map_err(io_error(&copy))?;
+            file.check(to).map_err(|defect| defect.into_error(to))?;
+            atomic::sync(&copy)?;
+        }
+    }
+    atomic::sync(to)
+}

@@ -1,0 +1,92 @@
+//! Configurations of an error study: each shard is a `nimbus error --part`, and all shards together
+//! are the study that one `nimbus error` makes.
+
+use std::fs;
+use std::io::Write;
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::subprocess;
+use super::task::{Merge, ShardResult, Task, Work};
+use crate::error::{Error, Result};
+use crate::farm::transient::io_error;
+use crate::io::atomic::write_atomic;
+use crate::report::charts::{self, Chart};
+use crate::studies::error::files::{self, CONFIGURATIONS_FILE};
+use crate::studies::error::parts::{Part, differences, join};
+use crate::studies::error::records::{self, STUDY_FILE, TIMES_FILE};
+use crate::timing::json;
+use crate::timing::machine::Device;
+use crate::timing::results::prepare_out_dir;
+
+/// An error study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Study {
+    /// The arguments of `nimbus error`.
+    pub arguments: Vec<String>,
+    /// The names of all configurations.
+    pub configurations: Vec<String>,
+}
+
+impl Work for Study {
+    fn kind(&self) -> String {
+        "error study".to_owned()
+    }
+
+    fn noun(&self) -> &'static str {
+        "configurations"
+    }
+
+    fn items(&self) -> Range<u64> {
+        0..self.configurations.len() as u64
+    }
+
+    fn identity(&self) -> Value {
+        json!({"kind": "error", "work": self})
+    }
+
+    /// Every shard has pictures besides these.
+    fn outputs(&self, _: Range<u32>) -> Vec<String> {
+        [CONFIGURATIONS_FILE, STUDY_FILE, TIMES_FILE].map(str::to_owned).to_vec()
+    }
+
+    fn is_exact(&self) -> bool {
+        false
+    }
+
+    fn run(&self, task: &mut Task<'_>) -> Result<Device> {
+        let read = json::read::<records::Study>;
+        Ok(subprocess::run("error", &self.arguments, task, read)?.made.device)
+    }
+
+    fn merge(&self, merge: &Merge<'_>) -> Result<usize> {
+        let Merge { results, out, force, .. } = merge;
+        let read = |result: &ShardResult| {
+            let (study, found) = files::read_found(&result.folder)?;
+            Ok(Part { name: result.name(), study, found })
+        };
+        let parts: Vec<Part> = results.iter().map(read).collect::<Result<_>>()?;
+        subprocess::check_comparable(differences(&parts), results)?;
+        let Some((study, found, moved)) = join(&parts) else {
+            return Err(Error::usage("the plan has no shards"));
+        };
+        prepare_out_dir(out, *force)?;
+        files::remove_earlier(out)?;
+        let copy = |i_part: usize, from: &str, to: &str| {
+            let to = out.join(to);
+            fs::copy(results[i_part].folder.join(from), &to).map_err(io_error(&to))
+        };
+        for picture in &moved {
+            copy(picture.i_part, &picture.from, &picture.to)?;
+        }
+        copy(0, "reference.png", "reference.png")?;
+        files::write(out, &study, &found)?;
+        let chart = charts::error::chart(&study);
+        let svg = chart.svg(chart.size())?;
+        write_atomic(&out.join("front.svg"), |file| file.write_all(svg.as_bytes()))?;
+        Ok(study.configurations.len())
+    }
+}

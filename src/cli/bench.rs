@@ -12,8 +12,8 @@ use super::{bench_plot, bench_table, device_choice, load, output, say_sizes, war
 use crate::error::{Error, Result};
 use crate::farm::amounts::{Played, textures_of};
 use crate::farm::cost::Work as Counted;
+use crate::frame::Stage;
 use crate::frame::limits;
-use crate::frame::stage::Stage;
 use crate::gpu::ClockFit;
 use crate::io::atomic;
 use crate::measure::zones::Zones;

@@ -13,7 +13,7 @@ use crate::farm::pool::{Ended, Pool};
 use crate::farm::run::{How, Outcome};
 use crate::farm::status::{State, Status, status};
 use crate::farm::{attempts, gc, merge, run as shard_run};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 
 /// `stop` is set by Ctrl-C, and by the signal with which an engine takes a node back, where
 /// `graceful` says that something is kept.

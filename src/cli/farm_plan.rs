@@ -15,7 +15,7 @@ use crate::farm::calibrate::{calibrate, n_runs, of_farms};
 use crate::farm::pack::{Packing, Rate, pack, price};
 use crate::farm::plan::{PictureFormat, Plan, Wish, Work};
 use crate::farm::run::How;
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::io::atomic;
 use crate::io::scene_file::{self, LoadedScene};
 

@@ -14,8 +14,8 @@ use super::render_reference::Shown;
 use super::{device_choice, load, output, say_sizes, tradeoff_table};
 use crate::error::{Error, Result};
 use crate::farm::amounts::{Played, textures_of, work_of};
+use crate::frame::GpuContext;
 use crate::frame::limits;
-use crate::frame::stage::Bed;
 use crate::io::image;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;
@@ -56,7 +56,7 @@ pub fn run(
     let film = scene.film;
     let axes = axes(args, scene)?;
     check_values(args, &options, &axes, &film)?;
-    let bed = Bed::open(&device_choice(&args.options))?;
+    let bed = GpuContext::open(&device_choice(&args.options))?;
     limits::check(scene, bed.device.limits())?;
     let clocks =
         machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;

@@ -8,8 +8,9 @@ use super::cost::Work;
 use crate::error::Result;
 use crate::farm::cells::Visits;
 use crate::farm::layers::Layers;
-use crate::frame::game::Game;
-use crate::frame::plan::{Pass, Plan, Tensors, Traits, plan};
+use crate::frame::Game;
+use crate::frame::plan::{Pass, Plan, Skipping, plan};
+use crate::frame::{SceneFeatures, Tensors};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::picture::FrameReference;
@@ -88,7 +89,8 @@ fn plan_of(scene: &Scene, i_frame: u32) -> Result<Option<Plan>> {
     let mut game = Game::new(scene.clone(), None);
     let i_last = i_frame.max(1) - 1;
     let (last, next) = (game.step(i_last)?, game.step(i_last + 1)?);
-    Ok(Some(plan(&Traits::of(&scene, Tensors::Needless, true), Some(&last), &next)))
+    let features = SceneFeatures::new(&scene, Tensors::Needless);
+    Ok(Some(plan(&features, Skipping::new(true), Some(&last), &next)))
 }
 
 /// What making a scene's textures once is.

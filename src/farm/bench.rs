@@ -8,7 +8,7 @@ use super::child;
 use super::plan::{Plan, Shard};
 use super::store::{Manifest, Workplace};
 use crate::error::{Error, Result};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::timing::attachments::{Attachments, picture_file};
 use crate::timing::frame_rows::FRAMES_FILE;
 use crate::timing::json;

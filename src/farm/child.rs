@@ -11,7 +11,7 @@ use super::plan::{Plan, Shard};
 use super::pool::ask_to_end;
 use super::store::Manifest;
 use crate::error::{Error, Result};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 
 /// Said by job scripts of whole nodes, and by a pool of one process: nobody else's work is in the
 /// times.

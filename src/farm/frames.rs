@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::plan::{PictureFormat, Plan, Shard, Work, output};
 use super::store::{Store, Workplace};
 use crate::error::{Error, Result};
-use crate::frame::stage::{Bed, DeviceChoice, Player};
+use crate::frame::{DeviceChoice, GpuContext, Player};
 use crate::io::image::{ImageKind, encoded};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::Scene;
@@ -27,7 +27,7 @@ pub fn draw(
         PictureFormat::Png => ImageKind::Png,
         PictureFormat::Exr => ImageKind::Exr,
     };
-    let bed = Bed::open(choice)?;
+    let bed = GpuContext::open(choice)?;
     let device = device_record(bed.device.info());
     store.resume(workplace, plan, shard, &device)?;
     let mut playing: Option<(Arc<Scene>, Player)> = None;

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::{bench, cost, reference, study, synced};
 use crate::error::{Error, Result};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::io::scene_file::{self, LoadedScene};
 use crate::io::text_file::{RECORD_LIMIT, read_result};
 use crate::model::scene::Impostors;

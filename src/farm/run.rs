@@ -12,7 +12,7 @@ use super::plan::{Plan, Shard, Work};
 use super::store::{Manifest, Placed, SCHEMA_VERSION, Standing, Store};
 use super::{bench, child, reference, study};
 use crate::error::{Error, Result};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::io::scene_file::LoadedScene;
 use crate::timing::machine;
 

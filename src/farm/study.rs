@@ -10,7 +10,7 @@ use super::failing::of_io;
 use super::plan::{Plan, Shard};
 use super::store::{Manifest, Workplace};
 use crate::error::{Error, Result};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::io::atomic::write_atomic;
 use crate::report::charts::{self, Chart};
 use crate::studies::error::files::{self, CONFIGURATIONS_FILE};

@@ -27,7 +27,7 @@ use crate::passes::transmit::Transmit;
 pub(super) struct FramePasses {
     pub generate: Generate,
     pub live: Option<LiveParticles>,
-    pub place: MemoryUsage,
+    pub place: Place,
     /// Places of particles that the game thread moves.
     pub placed_uploads: Option<PlacedUploads>,
     pub grid: Grid,
@@ -70,7 +70,7 @@ impl FramePasses {
         let passes = FramePasses {
             generate: Generate::new(device, compiler)?,
             live: LiveParticles::new(device, compiler, scene)?,
-            place: MemoryUsage::new(device, compiler)?,
+            place: Place::new(device, compiler)?,
             placed_uploads: is_moved_by_host
                 .then(|| PlacedUploads::new(device, scene))
                 .transpose()?,

@@ -10,7 +10,6 @@ use super::attachments::CasePicture;
 use super::cases::{Case, Loop};
 use crate::error::{Error, Result};
 use crate::frame::Counts;
-use crate::frame::Counts;
 use crate::frame::FrameTimes;
 use crate::frame::Renderer;
 use crate::frame::Stage;

@@ -90,7 +90,9 @@ impl OnGpu {
 
     fn run(&mut self) {
         let (pass, buffers, n) = (&self.pass, self.buffers.each_ref(), self.n);
-        self.commands.run(|rec| pass.record(rec, buffers, n, MAX_ATTEMPTS)).expect("generate runs");
+        self.commands
+            .run(|rec| pass.record(rec, buffers, [0, n], MAX_ATTEMPTS))
+            .expect("generate runs");
     }
 }
 

@@ -9,7 +9,10 @@ use divan::Bencher;
 use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, MemoryUsage};
 use nimbus::measure::stats::Summary;
 use nimbus::model::philox::philox4x32_10;
-use nimbus::passes::{self, sort::Sort};
+use nimbus::passes::{
+    self,
+    sort::{Count, Sort},
+};
 
 const COUNTS: [u32; 4] = [10_000, 50_000, 100_000, 1_000_000];
 const BITS: [u32; 2] = [16, 32];
@@ -55,7 +58,7 @@ impl OnGpu {
         let (n, n_bits) = (self.n, self.n_bits);
         let run = self.commands.run(|rec| {
             rec.copy(input, entries);
-            sort.record(rec, entries, n, n_bits)
+            sort.record(rec, entries, n_bits, Count::Known(n)).map(|_| ())
         });
         run.expect("sort runs");
     }

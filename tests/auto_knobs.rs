@@ -4,8 +4,8 @@
 
 use std::fmt::Write;
 
-use nimbus::frame::choice::{Choice, Tried};
-use nimbus::frame::stage::{DeviceChoice, Stage};
+use nimbus::frame::{Candidate, Choice};
+use nimbus::frame::{DeviceChoice, Stage};
 use nimbus::io::scene_file;
 use nimbus::model::cutoff::Cutoff;
 use nimbus::model::resolution::Resolution;
@@ -101,16 +101,19 @@ fn check(blobs: &[([f64; 3], f64, f64)], error: f64, more: &[&str]) -> Frame {
     assert!(found <= error, "RMSE {found:e}, {error:e} allowed");
     assert!(exact.values.iter().any(|v| *v > 0.1), "something is drawn");
     // What the last one says of all together is what is found, and every value was tried.
-    let n_tried: Vec<(&str, usize)> = auto.choices.iter().map(|c| (c.key, c.tried.len())).collect();
+    let n_tried: Vec<(&str, usize)> =
+        auto.choices.iter().map(|c| (c.key, c.candidates.len())).collect();
     let of_sprites = if auto.draw.path == DrawPath::Sprites { &[("chunks", 4)][..] } else { &[] };
     let of_size =
         if asked.draw.resolution == Resolution::Auto { &[("resolution", 3)][..] } else { &[] };
     let cuts = [("threshold", 4), ("smallest", 4)];
     assert_eq!(n_tried, [&[("path", 2)], of_sprites, &[("cull", 2)], of_size, &cuts].concat());
     let last =
-        auto.choices.last().map(|c| &c.tried[c.taken]).and_then(|t| t.rmse).expect("an error");
+        auto.choices.last().map(|c| &c.candidates[c.taken]).and_then(|t| t.rmse).expect("an error");
     assert!((last - found).abs() <= 1e-6 * (1.0 + found), "told {last:e}, found {found:e}");
-    assert!(auto.choices.iter().flat_map(|c| &c.tried).all(|t| t.ms().is_some_and(|ms| ms > 0.0)));
+    assert!(
+        auto.choices.iter().flat_map(|c| &c.candidates).all(|t| t.ms().is_some_and(|ms| ms > 0.0))
+    );
     if error == 0.0 {
         assert!(auto.bytes == exact.bytes);
     }
@@ -129,10 +132,11 @@ fn with_sprites_chunks_are_chosen_too() {
     let asked = scene(&layers, &set);
     let auto = frame(asked.clone());
     auto.choices.iter().for_each(|choice| println!("{}", choice.text()));
-    let keys: Vec<(&str, usize)> = auto.choices.iter().map(|c| (c.key, c.tried.len())).collect();
+    let keys: Vec<(&str, usize)> =
+        auto.choices.iter().map(|c| (c.key, c.candidates.len())).collect();
     assert_eq!(keys, [("chunks", 4), ("threshold", 4)]);
     // They round otherwise than half floats do layer by layer, which is no error of theirs.
-    assert!(auto.choices[0].tried[1..].iter().all(|t| t.rmse.is_some_and(|rmse| rmse > 0.0)));
+    assert!(auto.choices[0].candidates[1..].iter().all(|t| t.rmse.is_some_and(|rmse| rmse > 0.0)));
     let [named, exact] = named(&asked, &auto).map(frame);
     assert!(auto.bytes == named.bytes && rmse(&auto.values, &exact.values) <= asked.draw.error);
 }
@@ -194,8 +198,10 @@ fn other_knobs_stay_what_they_are() {
     );
     // Errors are by what the scene asks for: its first value has none.
     let [choice] = &auto.choices[..] else { panic!("{:?}", auto.choices) };
-    assert_eq!(choice.tried[0].rmse, Some(0.0));
-    assert!(choice.tried[1..].iter().all(|t: &Tried| t.rmse.is_some_and(|rmse| rmse > 0.0)));
+    assert_eq!(choice.candidates[0].rmse, Some(0.0));
+    assert!(
+        choice.candidates[1..].iter().all(|t: &Candidate| t.rmse.is_some_and(|rmse| rmse > 0.0))
+    );
     // A scene without particles has nothing to choose, and what shells show is not culled.
     for (blobs, set) in [(&[][..], &ALL[..]), (&few, &["draw.cull='auto'", "draw.impostors='on'"])]
     {

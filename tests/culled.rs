@@ -19,9 +19,9 @@ use std::sync::Arc;
 use bounded::{Random, greatest_ratio};
 use glam::DVec3;
 use harness::{Gpu, assert_within};
-use nimbus::frame::game::Game;
-use nimbus::frame::render::Renderer;
-use nimbus::frame::tiling::saturated;
+use nimbus::frame::Game;
+use nimbus::frame::Renderer;
+use nimbus::frame::saturation_bound;
 use nimbus::gpu::Compiler;
 use nimbus::io::scene_file;
 use nimbus::model::film::FilmFormat;
@@ -72,7 +72,7 @@ fn frame(gpu: &Gpu, compiler: &Compiler, scene: &Scene) -> Frame {
     let scene = Arc::new(scene.clone());
     let mut renderer = Renderer::new(&gpu.device, compiler, &scene, true).expect("a renderer");
     // The groups are all drawn, so that what is left out is the device's doing.
-    let packet = Game::new(scene.clone(), None).culling(false).step(0).expect("a packet");
+    let packet = Game::new(scene.clone(), None).with_culling(false).step(0).expect("a packet");
     let (camera, radius) = (packet.camera, packet.radius);
     let n_kept = renderer.step(packet).expect("a frame").n_kept;
     let eye = DVec3::from(camera.eye.map(f64::from));
@@ -110,9 +110,9 @@ const WAYS: [(&str, &str); 3] = [("'sprites'", "0"), ("'sprites'", "5"), ("'tile
 
 fn truth(picture: &Picture, way: (&str, &str)) -> (Vec<f64>, Vec<f64>) {
     match way {
-        ("'tiles'", _) => picture.tiled_truth(FORMAT, saturated(FORMAT)),
+        ("'tiles'", _) => picture.tiled_truth(FORMAT, saturation_bound(FORMAT)),
         (_, "0") => picture.truth(FORMAT),
-        _ => picture.chunked_truth(FORMAT, saturated(FORMAT)),
+        _ => picture.chunked_truth(FORMAT, saturation_bound(FORMAT)),
     }
 }
 

@@ -8,10 +8,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use harness::Gpu;
-use nimbus::frame::game::Game;
-use nimbus::frame::packet::Packet;
+use nimbus::frame::Game;
+use nimbus::frame::Packet;
+use nimbus::frame::Renderer;
 use nimbus::frame::plan::Pass;
-use nimbus::frame::render::Renderer;
 use nimbus::io::scene_file;
 use nimbus::model::camera::CameraKey;
 use nimbus::model::scene::Scene;
@@ -81,7 +81,7 @@ fn leaving_out_what_is_out_of_view_changes_no_byte() {
             |skip| Renderer::new(&gpu.device, &gpu.compiler, &scene, skip).expect("a renderer");
         let (mut culled, mut whole) = (renderer(true), renderer(false));
         let (mut game, mut all) =
-            (Game::new(scene.clone(), None), Game::new(scene.clone(), None).culling(false));
+            (Game::new(scene.clone(), None), Game::new(scene.clone(), None).with_culling(false));
         let mut counts = vec![];
         for i in 0..20 {
             let (packet, bytes, _) = frame(&mut culled, &mut game, i);
@@ -144,7 +144,7 @@ fn counts_are_those_of_the_formula() {
         looking(&mut scene, DVec3::new(-24.0, 0.0, 9.0), DVec3::ZERO);
         let (groups, clouds) = (scene.groups(), scene.clouds.clone());
         let eye = scene.camera.keys[0].position;
-        let mut game = Game::new(Arc::new(scene), None).culling(false);
+        let mut game = Game::new(Arc::new(scene), None).with_culling(false);
         for time_s in [0.0, 13.0] {
             let packet = game.step_at(0, time_s).expect("a packet");
             let mut n_drawn = 0;

@@ -19,7 +19,7 @@ use bounded::{Random, greatest_ratio};
 use glam::DVec3;
 use harness::{Gpu, assert_within};
 use mixed::{cases, front};
-use nimbus::frame::tiling::saturated;
+use nimbus::frame::saturation_bound;
 use nimbus::gpu::Compiler;
 use nimbus::gpu::TargetFormat;
 use nimbus::model::film::FilmFormat;
@@ -33,9 +33,9 @@ fn tiled(gpu: &Gpu, format: FilmFormat, portable: bool) -> Tiled {
     Tiled {
         invocations,
         portable,
-        most_pairs: None,
-        most_tiles: None,
-        saturated: saturated(format),
+        max_pairs: None,
+        max_tiles: None,
+        saturated: saturation_bound(format),
     }
 }
 
@@ -74,7 +74,7 @@ fn ellipsoids_match_the_reference() {
         for (target, format) in formats.iter().copied() {
             // Every third case runs without subgroup operations.
             let by_tiles = Way::Tiles(tiled(&gpu, format, i.is_multiple_of(3)));
-            for way in [Way::Sprites, by_tiles, Way::Chunks(5, saturated(format))] {
+            for way in [Way::Sprites, by_tiles, Way::Chunks(5, saturation_bound(format))] {
                 let [values, truths, bounds] =
                     drawn(&mut gpu, None, &picture, (target, format), way);
                 println!(
@@ -118,7 +118,7 @@ fn flat_blobs_match_the_reference_from_all_sides() {
             for way in [
                 Way::Sprites,
                 Way::Tiles(tiled(&gpu, F32.1, false)),
-                Way::Chunks(7, saturated(F32.1)),
+                Way::Chunks(7, saturation_bound(F32.1)),
             ] {
                 let [values, truths, bounds] = drawn(&mut gpu, None, &picture, F32, way);
                 println!(

@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
-use nimbus::frame::game::Game;
-use nimbus::frame::render::Renderer;
-use nimbus::frame::stage::{DeviceChoice, Stage};
+use nimbus::frame::Game;
+use nimbus::frame::Renderer;
+use nimbus::frame::{DeviceChoice, Stage};
 use nimbus::io::scene_file;
 use nimbus::model::cutoff::Cutoff;
 use nimbus::model::scene::{LightingMode, Scene, Threading};
@@ -242,7 +242,7 @@ fn the_devices_picture_has_the_expected_error() {
         let mut stage = Stage::new(scene_of_window, &choice, true).expect("a stage");
         let picture = |stage: &mut Stage, flown: bool| {
             let game = Game::new(stage.scene.clone(), None);
-            stage.game = if flown { game.seen_from(Box::new(move || pose)) } else { game };
+            stage.game = if flown { game.with_viewpoint(Box::new(move || pose)) } else { game };
             let mut rgba = vec![];
             let mut on_frame = |_, renderer: &mut Renderer| {
                 rgba = renderer.image()?;

@@ -31,7 +31,8 @@ fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
     let (density, modes) = (gpu.buffer::<f32>(512), gpu.buffer::<ModeRecord>(1));
     let record = GridRecord::from(&spec);
     let recorded = gpu.commands.record(barriers, |rec| {
-        place.record(rec, [&particles, &i_group, &groups, &modes, &placed], 64)?;
+        let buffers = [&particles, &i_group, &groups, &modes, &placed];
+        place.record(rec, &place::PlaceBuffers::from_bindings(buffers), 64)?;
         grid.record(rec, [&placed, &particles, &density], &record, 64, 1.0)
     });
     recorded.unwrap();

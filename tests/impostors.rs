@@ -8,9 +8,9 @@ use std::sync::Arc;
 
 use harness::Gpu;
 use nimbus::frame::FrameTimes;
-use nimbus::frame::game::Game;
+use nimbus::frame::Game;
+use nimbus::frame::Renderer;
 use nimbus::frame::plan::{Pass, Plan, Reason};
-use nimbus::frame::render::Renderer;
 use nimbus::frame::{parallel, serial};
 use nimbus::io::scene_file;
 use nimbus::model::scene::{Scene, Threading};

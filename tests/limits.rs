@@ -37,7 +37,7 @@ fn a_buffer_of_more_texels_than_the_device_reads_is_refused() {
     limits.max_texels = 1000;
     let refused = check(&scene, &limits).unwrap_err().to_string();
     assert!(
-        refused.contains("the density grid") && refused.contains("takes 1000 at most"),
+        refused.contains("grid.density") && refused.contains("takes 1000 at most"),
         "{refused}"
     );
     // Without light only a pool of textures is read by texels.
@@ -45,7 +45,7 @@ fn a_buffer_of_more_texels_than_the_device_reads_is_refused() {
     assert!(check(&unlit, &limits).is_ok());
     unlit.clouds[0].texture.choice = Choice::ByBox;
     let refused = check(&unlit, &limits).unwrap_err().to_string();
-    assert!(refused.contains("the pool of textures: 698880 texels of 16 bytes"), "{refused}");
+    assert!(refused.contains("texture.pool: 698880 texels of 16 bytes"), "{refused}");
 }
 
 #[test]

@@ -9,9 +9,9 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use harness::Gpu;
-use nimbus::frame::game::Game;
+use nimbus::frame::Game;
+use nimbus::frame::Renderer;
 use nimbus::frame::plan::Pass;
-use nimbus::frame::render::Renderer;
 use nimbus::frame::{parallel, serial};
 use nimbus::gpu::Compiler;
 use nimbus::io::scene_file;
@@ -48,7 +48,7 @@ fn started(gpu: &Gpu, compiler: &Compiler, scene: Scene, skip: bool) -> (Rendere
         Simulate::Gpu => None,
         Simulate::Cpu => Some(renderer.generate_now(&gpu.device).expect("particles").0),
     };
-    (renderer, Game::new(scene, rest).culling(skip))
+    (renderer, Game::new(scene, rest).with_culling(skip))
 }
 
 fn draw(renderer: &mut Renderer, game: &mut Game, i_frame: u32) -> Vec<u8> {

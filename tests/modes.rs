@@ -6,9 +6,9 @@ mod harness;
 
 use harness::Gpu;
 use nimbus::frame::FrameTimes;
-use nimbus::frame::game::Game;
+use nimbus::frame::Game;
+use nimbus::frame::Renderer;
 use nimbus::frame::plan::Pass;
-use nimbus::frame::render::Renderer;
 use nimbus::frame::{parallel, serial};
 use nimbus::io::scene_file;
 use nimbus::model::camera::CameraKey;
@@ -52,7 +52,7 @@ fn run_for(
         Simulate::Gpu => None,
         Simulate::Cpu => Some(renderer.generate_now(&gpu.device).expect("particles").0),
     };
-    let mut game = Game::new(scene.clone(), rest).culling(skip);
+    let mut game = Game::new(scene.clone(), rest).with_culling(skip);
     let mut frames = Vec::new();
     let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
         frames.push((renderer.image_bytes()?, times));
@@ -212,12 +212,13 @@ fn smaller_pictures_give_the_same_bytes_in_every_mode() {
 #[test]
 fn the_faster_way_is_taken_and_named() {
     let stage = |path: &str| {
-        let choice = nimbus::frame::stage::DeviceChoice { validation: true, ..Default::default() };
-        nimbus::frame::stage::Stage::new(scene(&[path]), &choice, true).expect("a stage")
+        let choice = nimbus::frame::DeviceChoice { validation: true, ..Default::default() };
+        nimbus::frame::Stage::new(scene(&[path]), &choice, true).expect("a stage")
     };
     let mut auto = stage("draw.path='auto'");
     let choice = auto.choices.pop().expect("a choice");
-    let [sprites_ms, tiles_ms] = [0, 1].map(|i| choice.tried[i].ms().expect("both can draw it"));
+    let [sprites_ms, tiles_ms] =
+        [0, 1].map(|i| choice.candidates[i].ms().expect("both can draw it"));
     let (faster, path) = [("sprites", DrawPath::Sprites), ("tiles", DrawPath::Tiles)][choice.taken];
     // What comes first is taken also where the other one is faster by noise.
     assert!(path == DrawPath::Sprites || tiles_ms < sprites_ms, "{}", choice.text());

@@ -1,7 +1,7 @@
 //! Faults injected into the shaders, each of which must fail a case of the stress suite
 //! (docs/explanation/stability.md, "Faults that are found").
 
-use nimbus::frame::stage::DeviceChoice;
+use nimbus::frame::DeviceChoice;
 use nimbus::passes;
 use nimbus::stress::{Outcome, StressContext, Verdict, cases};
 

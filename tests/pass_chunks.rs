@@ -24,10 +24,10 @@ use bounded::greatest_ratio;
 use glam::DVec3;
 use harness::{Gpu, assert_within};
 use mixed::{EYE, assert_small, cases, front, mixed};
-use nimbus::frame::game::Game;
+use nimbus::frame::Game;
+use nimbus::frame::Renderer;
 use nimbus::frame::plan::Pass;
-use nimbus::frame::render::Renderer;
-use nimbus::frame::tiling::saturated;
+use nimbus::frame::saturation_bound;
 use nimbus::gpu::TargetFormat;
 use nimbus::io::scene_file;
 use nimbus::model::film::FilmFormat;
@@ -41,7 +41,7 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     let mut greatest = 0f64;
     for ((target, format), n_chunks) in FORMATS.into_iter().zip([1, 3, 16]).chain([(F32, 256)]) {
         let what = format!("{what}, {format:?}, {n_chunks} chunks");
-        let saturated = saturated(format);
+        let saturated = saturation_bound(format);
         let values = picture.draw_by(gpu, None, target, Way::Chunks(n_chunks, saturated));
         let (truths, bounds) = picture.chunked_truth(format, saturated);
         println!("{what}: error/bound {:.3}", greatest_ratio(&values, &truths, &bounds));
@@ -118,7 +118,7 @@ fn wrong_pictures_are_noticed() {
     let picture = mixed(150, 2, 3.0, -1.0);
     // Bounds of what leaves nothing out.
     let (truths, bounds) = picture.chunked_truth(F32.1, 0.0);
-    let way = Way::Chunks(5, saturated(F32.1));
+    let way = Way::Chunks(5, saturation_bound(F32.1));
     let mut values = picture.draw_by(&mut gpu, None, F32.0, way);
     assert!(greatest_ratio(&values, &truths, &bounds) <= 1.0);
     let i = (0..truths.len()).max_by(|a, b| truths[*a].total_cmp(&truths[*b])).expect("pixels");
@@ -154,7 +154,8 @@ fn ten_thousand_thin_layers_in_half_floats() {
     let truths = picture.truth(FilmFormat::Rgba32f).0;
     let off =
         |values: &[f64]| values.iter().zip(&truths).map(|(v, t)| (v - t).abs()).fold(0.0, f64::max);
-    let chunked = off(&picture.draw_by(&mut gpu, None, target, Way::Chunks(4, saturated(format))));
+    let chunked =
+        off(&picture.draw_by(&mut gpu, None, target, Way::Chunks(4, saturation_bound(format))));
     let layered = off(&picture.draw(&mut gpu, None, target));
     println!("greatest error near to far {chunked:.2e}, far to near {layered:.2e}");
     // Half a step of half floats below 1 is left out, half a step is rounded off, and 10 000 sums

@@ -17,7 +17,7 @@ use nimbus::layout::facet::{
 use nimbus::layout::facet::{RegionRecord, lobe_width};
 use nimbus::layout::frame::LightRecord;
 use nimbus::model::sums::{Precision, Sums};
-use nimbus::passes::contract::{Contract, Push, TILE};
+use nimbus::passes::contract::{Contract, ContractBuffers, Push, TILE};
 use nimbus::reference::contract::{Receiver, Reflected, Tensors, contract};
 use nimbus::reference::rounding::sum_error;
 use sums::{KAHAN, PAIRWISE, PLAIN, every_way};
@@ -136,7 +136,8 @@ impl Case {
             n_rows: self.n_rows,
             n_columns: self.n_columns,
         };
-        gpu.run(|rec| pass.record(rec, buffers.each_ref(), &push));
+        let named = ContractBuffers::from_bindings(buffers.each_ref());
+        gpu.run(|rec| pass.record(rec, &named, &push));
         let lit: Vec<LitRecord> = gpu.download(&buffers[7], self.facets.len());
         assert!((0..).zip(&lit).all(|(j, l)| (l.n_unresolved, l.unresolved) == (j as f32, 0.5)));
         lit.iter()

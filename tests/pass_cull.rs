@@ -14,8 +14,9 @@ use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::camera::Pose;
 use nimbus::model::cloud::SQRT_TAU;
-use nimbus::passes::cull::{self, Cull, Order};
-use nimbus::passes::sort::{NO_COUNT, Sort, TILE};
+use nimbus::passes::blobs::{BlobVariant, BlobView};
+use nimbus::passes::cull::{Cull, CullBuffers, CullView, Order};
+use nimbus::passes::sort::{Count, Depths, DeviceCount, NO_COUNT, Sort, TILE};
 use nimbus::reference::Blob;
 use nimbus::reference::cull::{CullOutcome, CullTolerance, outcome};
 use nimbus::reference::view::View;
@@ -112,22 +113,25 @@ impl Scene {
 
     fn run_by(&self, gpu: &mut Gpu, compiler: Option<&Compiler>) -> Found {
         let compiler = compiler.unwrap_or(&gpu.compiler);
-        let variant = [
-            self.weighted,
-            self.view.threshold > 0.0,
-            self.particles.iter().any(|p| p.aspect != 1.0),
-        ];
+        let variant = BlobVariant {
+            weighted: self.weighted,
+            threshold: self.view.threshold > 0.0,
+            ellipsoids: self.particles.iter().any(|p| p.aspect != 1.0),
+            ..BlobVariant::default()
+        };
         let pass = Cull::new(&gpu.device, compiler, self.n(), variant).expect("cull");
         let (placed, particles) = (gpu.upload(&self.placed), gpu.upload(&self.particles));
         let (i_group, drawn) = (gpu.upload(&self.i_group), gpu.upload(&self.drawn));
         let entries = gpu.upload(&vec![UNTOUCHED; self.placed.len()]);
         let kept = gpu.upload(&[KeptRecord { sort: [9; 4], draw: [9; 4], splat: [9; 4] }]);
         let View { width, height, cutoff, threshold, smallest, .. } = self.view;
-        let view = cull::View { camera: &self.camera, width, height, cutoff, threshold, smallest };
+        let blobs = BlobView { camera: &self.camera, cutoff, threshold, saturated: 0.0 };
+        let view = CullView { blobs, size: [width, height], smallest };
         let order =
             Order { radius: RADIUS, n_bits: self.n_bits, sort_tile: TILE, splat_block: 256 };
         let buffers = [&placed, &particles, &i_group, &drawn, &entries, &kept];
-        gpu.run(|rec| pass.record(rec, buffers, &view, &order, self.n()));
+        let buffers = CullBuffers::from_bindings(buffers);
+        gpu.run(|rec| pass.record(rec, &buffers, &view, &order, self.n()));
         Found {
             kept: gpu.download(&kept, 1)[0],
             entries: gpu.download(&entries, self.placed.len()),
@@ -142,9 +146,8 @@ impl Scene {
         let i_group = gpu.upload(&vec![0u32; self.placed.len()]);
         let entries = gpu.buffer::<Entry>(self.placed.len());
         let buffers = [&placed, &i_group, &drawn, &entries];
-        gpu.run(|rec| {
-            sort.record_keys(rec, buffers, self.camera.forward, self.n(), RADIUS, self.n_bits)
-        });
+        let depths = Depths { forward: self.camera.forward, radius: RADIUS, n_bits: self.n_bits };
+        gpu.run(|rec| sort.record_keys(rec, buffers, &depths, self.n()));
         gpu.download::<Entry>(&entries, self.placed.len()).iter().map(|e| e[0]).collect()
     }
 
@@ -376,12 +379,13 @@ fn ties_stay_in_order_through_the_sort() {
         let sort = Sort::new(&gpu.device, &gpu.compiler, 3000).expect("sort");
         let (entries, kept) = (gpu.upload(&found.entries), gpu.upload(&[found.kept]));
         assert_ne!(KeptRecord::I_COUNT, NO_COUNT);
-        let counts = nimbus::passes::sort::Counts {
+        let counts = DeviceCount {
             buffer: &kept,
             i_count: KeptRecord::I_COUNT,
             i_groups: KeptRecord::I_SORT,
         };
-        gpu.run(|rec| sort.record_counted(rec, &entries, n_bits, counts).map(|_| ()));
+        let counted = Count::Counted(counts);
+        gpu.run(|rec| sort.record(rec, &entries, n_bits, counted).map(|_| ()));
         let sorted: Vec<Entry> = gpu.download(&entries, 3000);
         let mut expected = found.entries[..n as usize].to_vec();
         expected.sort_by_key(|e| (e[0], e[1]));

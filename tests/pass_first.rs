@@ -16,7 +16,7 @@ use nimbus::gpu::Compiler;
 use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, RegionRecord};
 use nimbus::model::basis::{self, Basis, Sampling};
 use nimbus::model::light::Light;
-use nimbus::passes::first::{First, Push};
+use nimbus::passes::first::{First, FirstBuffers, Push};
 use nimbus::reference::first::{irradiance, radiance};
 
 const N_FACETS: usize = 10_000;
@@ -94,7 +94,8 @@ impl Case {
             gpu.upload(&[LitRecord::default(); N_FACETS]),
         ];
         let push = Push { eye: EYE, n_facets: N_FACETS as u32, n_lights: self.lights.len() as u32 };
-        gpu.run(|rec| first.record(rec, buffers.each_ref(), &push));
+        let named = FirstBuffers::from_bindings(buffers.each_ref());
+        gpu.run(|rec| first.record(rec, &named, &push));
         gpu.download(&buffers[5], N_FACETS)
     }
 

@@ -52,7 +52,7 @@ fn generate_with(gpu: &mut Gpu, compiler: &Compiler, boxes: &[CloudBox], law: &S
     let (list, i_group) = (gpu.upload(&list), gpu.upload(&i_group));
     let (particles, status) = (gpu.buffer::<ParticleRecord>(n), gpu.buffer::<u32>(n));
     gpu.run(|rec| {
-        generate.record(rec, [&list, &i_group, &particles, &status], n as u32, MAX_ATTEMPTS)
+        generate.record(rec, [&list, &i_group, &particles, &status], [0, n as u32], MAX_ATTEMPTS)
     });
     (gpu.download(&particles, n), gpu.download(&status, n))
 }
@@ -329,9 +329,9 @@ fn given_groups_and_empty_lists_are_left_alone() {
     let (list, i_group) = (gpu.upload(&list), gpu.upload(&i_group));
     let (particles, status) = (gpu.upload(&[before; 220]), gpu.upload(&[77u32; 220]));
     let buffers = [&list, &i_group, &particles, &status];
-    gpu.run(|rec| generate.record(rec, buffers, 0, MAX_ATTEMPTS));
+    gpu.run(|rec| generate.record(rec, buffers, [0, 0], MAX_ATTEMPTS));
     assert_eq!(gpu.download::<ParticleRecord>(&particles, 220), vec![before; 220]);
-    gpu.run(|rec| generate.record(rec, buffers, 220, MAX_ATTEMPTS));
+    gpu.run(|rec| generate.record(rec, buffers, [0, 220], MAX_ATTEMPTS));
     let after: Vec<ParticleRecord> = gpu.download(&particles, 220);
     assert_eq!(after[100..170], [before; 70]);
     assert_eq!([&after[..100], &after[170..]].concat(), made);

@@ -10,7 +10,7 @@ use nimbus::gpu::{Buffer, Compiler, Image, MemoryUsage, Target};
 use nimbus::layout::facet::{LitRecord, RegionRecord};
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::impostor::{FarField, Shell, View};
-use nimbus::passes::impostors::{Impostors, Shown};
+use nimbus::passes::impostors::{Impostors, LayerView, PartBuffers};
 use nimbus::passes::surfaces::Surfaces;
 use nimbus::reference::impostors::{Picture, part, place_of, sample};
 
@@ -74,10 +74,11 @@ fn views() -> Vec<(&'static str, View)> {
     ]
 }
 
-fn shown(shell: &Shell, now: &View, depth: f32) -> Shown {
-    Shown {
-        to_shell: shell.homography(now),
-        tangents: [now.tangents, shell.view.tangents],
+fn shown(shell: &Shell, now: &View, depth: f32) -> LayerView {
+    LayerView {
+        to_layer: shell.homography(now),
+        view_tangents: now.tangents,
+        layer_tangents: shell.view.tangents,
         size: SHELL,
         bounds: [-now.tangents, now.tangents],
         depth,
@@ -132,7 +133,7 @@ fn draw(
     gpu: &mut Gpu,
     compiler: Option<&Compiler>,
     format: TargetFormat,
-    shown: &Shown,
+    shown: &LayerView,
 ) -> Vec<f64> {
     let pass = Impostors::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, false)
         .expect("the pass");
@@ -190,8 +191,12 @@ fn nothing_is_drawn_beyond_the_bounds() {
     let whole = draw(&mut gpu, None, TargetFormat::Rgba32f, &shown(&shell, &now, 0.0));
     // Slopes of pixel edges: 24 to 72 of 96 columns, and 8 to 32 of 64 rows from the top.
     let bounds = [DVec2::new(-0.3, 0.0), DVec2::new(0.3, 0.3)];
-    let part =
-        draw(&mut gpu, None, TargetFormat::Rgba32f, &Shown { bounds, ..shown(&shell, &now, 0.0) });
+    let part = draw(
+        &mut gpu,
+        None,
+        TargetFormat::Rgba32f,
+        &LayerView { bounds, ..shown(&shell, &now, 0.0) },
+    );
     for (p, (a, b)) in part.chunks(4).zip(whole.chunks(4)).enumerate() {
         let (i, j) = (p as u32 % SIZE[0], p as u32 / SIZE[0]);
         let within = (24..72).contains(&i) && (8..32).contains(&j);
@@ -325,7 +330,8 @@ fn what_is_far_and_what_is_near() {
         for (from, cut, n_drawn) in
             [(&first, Some(cut), n), (&second, None, n), (&second, None, n - 900)]
         {
-            gpu.run(|rec| pass.record_part(rec, [from, &members, &far, &near], n_drawn, cut));
+            let part = PartBuffers { entries: from, members: &members, far: &far, near: &near };
+            gpu.run(|rec| pass.record_part(rec, part, n_drawn, cut));
             let count = n_drawn as usize;
             found.push((
                 gpu.download::<[u32; 2]>(&far, count),

@@ -13,7 +13,8 @@ use harness::Gpu;
 use nimbus::gpu::Compiler;
 use nimbus::layout::facet::{FacetRecord, KeyBits, RegionBoundsRecord};
 use nimbus::layout::particle::{GroupRecord, PlacedRecord};
-use nimbus::passes::{morton::Morton, sort::Sort};
+use nimbus::passes::morton::{Morton, ParticleBuffers};
+use nimbus::passes::sort::{Count, Sort};
 use nimbus::reference::{morton, sort};
 
 type Entry = [u32; 2];
@@ -98,7 +99,8 @@ impl Cloud {
         let entries = gpu.buffer::<Entry>(N);
         let n = self.positions.len();
         let buffers = [&placed, &i_group, &groups, &bounds, &entries];
-        gpu.run(|rec| pass.record_particles(rec, buffers, n as u32, self.bounds.len() as u32));
+        let buffers = ParticleBuffers::from_bindings(buffers);
+        gpu.run(|rec| pass.record_particles(rec, &buffers, n as u32, self.bounds.len() as u32));
         gpu.download(&entries, n)
     }
 
@@ -173,7 +175,7 @@ fn places_are_the_references_order() {
     let entries = cloud.facet_entries(&mut gpu, &compiler());
     let (from, to) = (gpu.upload(&entries), gpu.buffer::<u32>(N));
     gpu.run(|rec| {
-        sort.record(rec, &from, N as u32, 32)?;
+        sort.record(rec, &from, 32, Count::Known(N as u32))?;
         morton.record_order(rec, [&from, &to], N as u32)
     });
     let places: Vec<u32> = gpu.download(&to, N);

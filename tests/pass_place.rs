@@ -10,7 +10,7 @@ use nimbus::model::cloud::{Cloud, CloudSource, Group, Particle};
 use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
 use nimbus::model::texture::Texture;
-use nimbus::passes::place::Place;
+use nimbus::passes::place::{Place, PlaceBuffers};
 use nimbus::reference::generate::uniforms;
 use nimbus::reference::live;
 use nimbus::reference::place::{add_gusts, cloud_centers, grown, offsets, place, placed_bound};
@@ -112,7 +112,8 @@ fn run(gpu: &mut Gpu, compiler: &Compiler, scene: &Scene) -> Vec<PlacedRecord> {
     let modes =
         if scene.modes.is_empty() { gpu.buffer::<ModeRecord>(1) } else { gpu.upload(&scene.modes) };
     let (groups, placed) = (gpu.upload(&scene.records), gpu.buffer::<PlacedRecord>(n));
-    gpu.run(|rec| pass.record(rec, [&particles, &i_group, &groups, &modes, &placed], n as u32));
+    let buffers = PlaceBuffers::from_bindings([&particles, &i_group, &groups, &modes, &placed]);
+    gpu.run(|rec| pass.record(rec, &buffers, n as u32));
     gpu.download(&placed, n)
 }
 

@@ -10,7 +10,7 @@ use harness::Gpu;
 use nimbus::gpu::Compiler;
 use nimbus::layout::particle::{DrawnRecord, PlacedRecord};
 use nimbus::passes;
-use nimbus::passes::sort::{Counts, Sort, TILE};
+use nimbus::passes::sort::{Count, Depths, DeviceCount, Sort, TILE};
 use nimbus::reference::sort::{depths, key32, order};
 
 type Entry = [u32; 2];
@@ -19,7 +19,8 @@ type Entry = [u32; 2];
 fn sorted(gpu: &mut Gpu, sort: &Sort, keys: &[u32], n_bits: u32) -> Vec<Entry> {
     let entries: Vec<Entry> = keys.iter().zip(0..).map(|(&key, i)| [key, i]).collect();
     let buffer = gpu.upload(&entries);
-    gpu.run(|rec| sort.record(rec, &buffer, keys.len() as u32, n_bits));
+    let n = Count::Known(keys.len() as u32);
+    gpu.run(|rec| sort.record(rec, &buffer, n_bits, n).map(|_| ()));
     gpu.download(&buffer, keys.len())
 }
 
@@ -77,8 +78,8 @@ fn keys_of_any_width_come_out_in_order_counted_by_the_device() {
             let (buffer, out) = (gpu.upload(&entries), gpu.buffer::<Entry>(n as usize));
             let counts = gpu.upload(&[7, n_counted, n_counted.div_ceil(TILE), 1, 1]);
             gpu.run(|rec| {
-                let counts = Counts { buffer: &counts, i_count: 1, i_groups: 2 };
-                let sorted = sort.record_counted(rec, &buffer, n_bits, counts)?;
+                let counts = DeviceCount { buffer: &counts, i_count: 1, i_groups: 2 };
+                let sorted = sort.record(rec, &buffer, n_bits, Count::Counted(counts))?;
                 rec.copy(sorted, &out);
                 Ok(())
             });
@@ -96,7 +97,7 @@ fn fewer_entries_than_there_is_room_for_leave_the_rest_alone() {
     let mut random = Random(3);
     let entries: Vec<Entry> = (0..5000).map(|i| [random.word() as u32, i]).collect();
     let buffer = gpu.upload(&entries);
-    gpu.run(|rec| sort.record(rec, &buffer, 1500, 32));
+    gpu.run(|rec| sort.record(rec, &buffer, 32, Count::Known(1500)).map(|_| ()));
     let found: Vec<Entry> = gpu.download(&buffer, 5000);
     let keys: Vec<u32> = entries[..1500].iter().map(|e| e[0]).collect();
     assert_eq!(misplaced(&found[..1500], &keys, 32), None);
@@ -166,16 +167,9 @@ fn keys(
     let (from, entries) = (gpu.upload(placed), gpu.buffer::<Entry>(n));
     let all = DrawnRecord { shift: 0, end: n as u32, ..DrawnRecord::default() };
     let (i_group, drawn) = (gpu.upload(&vec![0u32; n]), gpu.upload(&[all]));
-    gpu.run(|rec| {
-        sort.record_keys(
-            rec,
-            [&from, &i_group, &drawn, &entries],
-            forward,
-            n as u32,
-            radius,
-            n_bits,
-        )
-    });
+    let buffers = [&from, &i_group, &drawn, &entries];
+    let depths = Depths { forward, radius, n_bits };
+    gpu.run(|rec| sort.record_keys(rec, buffers, &depths, n as u32));
     let found: Vec<Entry> = gpu.download(&entries, n);
     assert!(found.iter().zip(0..).all(|(e, i)| e[1] == i), "every entry names its particle");
     found.iter().map(|e| e[0]).collect()
@@ -313,8 +307,9 @@ fn entries_are_those_of_the_drawn_particles() {
         let entries = gpu.upload(&vec![[7u32, u32::MAX]; N_PLACED]);
         gpu.run(|rec| {
             let buffers = [&from, &groups, &parts, &entries];
-            sort.record_keys(rec, buffers, forward, N_PLACED as u32, RADIUS, 32)?;
-            sort.record(rec, &entries, n_sorted, 32)
+            let depths = Depths { forward, radius: RADIUS, n_bits: 32 };
+            sort.record_keys(rec, buffers, &depths, N_PLACED as u32)?;
+            sort.record(rec, &entries, 32, Count::Known(n_sorted)).map(|_| ())
         });
         gpu.download::<Entry>(&entries, N_PLACED)
     };

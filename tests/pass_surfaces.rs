@@ -17,10 +17,11 @@ use glam::DVec3;
 use harness::{Gpu, assert_within};
 use nimbus::error::Error;
 use nimbus::gpu::TargetFormat;
-use nimbus::gpu::{Barriers, Image, RecordCount, Target};
+use nimbus::gpu::{Barriers, BlendMode, Image, LoadOp, RecordCount, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::film::FilmFormat;
+use nimbus::passes::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
 use nimbus::passes::sprites::Sprites;
 use nimbus::passes::surfaces::Surfaces;
 use picture::{FORMATS, Picture};
@@ -416,9 +417,10 @@ fn wrong_pictures_are_noticed() {
 fn a_target_that_does_not_fit_is_refused() {
     let mut gpu = Gpu::new();
     let format = TargetFormat::Rgba16f;
+    let variant = BlobVariant::default();
     let over =
-        |behind| Sprites::new(&gpu.device, &gpu.compiler, format, false, behind).expect("sprites");
-    let (alone, behind) = (over([false; 6]), over([true, false, false, false, false, false]));
+        |blend| Sprites::new(&gpu.device, &gpu.compiler, format, variant, blend).expect("sprites");
+    let (alone, behind) = (over(BlendMode::Over), over(BlendMode::OverTested));
     let surfaces = Surfaces::new(&gpu.device, &gpu.compiler, format, false).expect("surfaces");
     let mut color =
         Image::color_target(&gpu.device, "test.target", 8, 4, format).expect("a target");
@@ -429,14 +431,14 @@ fn a_target_that_does_not_fit_is_refused() {
     let mut record = |pass: Option<&Sprites>, depth: Option<&mut Image>| {
         let target = Target { color: &mut color, depth };
         gpu.commands.record(Barriers::Placed, |rec| match pass {
-            Some(pass) => pass.record(
-                rec,
-                [&buffer; 9],
-                target,
-                &camera,
-                [3.0, 0.0],
-                (RecordCount::Known(0), 0),
-            ),
+            Some(pass) => {
+                let start = if target.depth.is_some() { LoadOp::Load } else { LoadOp::Clear };
+                let buffers = BlobBuffers::from_bindings([&buffer; 9]);
+                let view =
+                    BlobView { camera: &camera, cutoff: 3.0, threshold: 0.0, saturated: 0.0 };
+                let count = BlobCount { n: RecordCount::Known(0), i_first_facet: 0 };
+                pass.record(rec, &buffers, (target, start), &view, count)
+            }
             None => surfaces.record(rec, [&buffer; 2], target, &camera, 0),
         })
     };

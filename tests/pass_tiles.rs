@@ -21,7 +21,7 @@ use bounded::{Random, greatest_ratio};
 use glam::DVec3;
 use harness::{Gpu, assert_within};
 use mixed::{assert_small, cases, front, mixed};
-use nimbus::frame::tiling::saturated;
+use nimbus::frame::saturation_bound;
 use nimbus::gpu::Compiler;
 use nimbus::gpu::TargetFormat;
 use nimbus::model::film::FilmFormat;
@@ -36,9 +36,9 @@ fn usual(gpu: &Gpu, format: FilmFormat) -> Tiled {
     Tiled {
         invocations,
         portable: false,
-        most_pairs: None,
-        most_tiles: None,
-        saturated: saturated(format),
+        max_pairs: None,
+        max_tiles: None,
+        saturated: saturation_bound(format),
     }
 }
 
@@ -120,15 +120,15 @@ fn workgroups_and_rounds_do_not_show() {
         let other = Tiled { invocations, portable: true, ..tiled };
         assert!(draw(&other) == once, "{invocations} invocations without subgroups");
     }
-    for most_tiles in [1, 3, 16].map(Some) {
-        assert!(draw(&Tiled { most_tiles, ..tiled }) == once, "{most_tiles:?} tiles a workgroup");
+    for max_tiles in [1, 3, 16].map(Some) {
+        assert!(draw(&Tiled { max_tiles, ..tiled }) == once, "{max_tiles:?} tiles a workgroup");
         assert!(
-            draw(&Tiled { invocations: 32, portable: true, most_tiles, ..tiled }) == once,
-            "{most_tiles:?}, portable"
+            draw(&Tiled { invocations: 32, portable: true, max_tiles, ..tiled }) == once,
+            "{max_tiles:?}, portable"
         );
     }
     // What one round hands to the next is what the next would have had.
-    assert!(draw(&Tiled { most_pairs: Some(1), ..tiled }) == once, "several rounds");
+    assert!(draw(&Tiled { max_pairs: Some(1), ..tiled }) == once, "several rounds");
 }
 
 /// As many splats as a round may have, all in one bin, of which the last ones alone reach another

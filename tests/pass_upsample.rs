@@ -10,7 +10,7 @@ use harness::{Gpu, assert_within_and_say};
 use nimbus::gpu::{Buffer, Compiler};
 use nimbus::gpu::{TargetFormat, has_depth24};
 use nimbus::model::resolution::{ALIKE, LowResLayout};
-use nimbus::passes::upsample::{Extents, Upsample};
+use nimbus::passes::upsample::{Extents, SolidBuffers, Upsample};
 use nimbus::reference::upsample::{OpaqueLayer, Summed, render_alike};
 
 const FORMATS: [TargetFormat; 3] =
@@ -151,7 +151,11 @@ impl Case {
             let [small_depths, depths] = words.map(|w| upload(gpu, w));
             [upload(gpu, picture_words(&s.picture)), small_depths, depths]
         });
-        let surfaces = surfaces.as_ref().map(|s| [&s[0], &s[1], &s[2]]);
+        let surfaces = surfaces.as_ref().map(|s| SolidBuffers {
+            under: &s[0],
+            small_depths: &s[1],
+            depths: &s[2],
+        });
         gpu.run(|rec| pass.record(rec, [&blobs, &picture], surfaces));
         numbers(*format, &gpu.download(&picture, n_words))
     }

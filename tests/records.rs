@@ -6,7 +6,7 @@ mod results;
 use std::fs;
 use std::path::Path;
 
-use nimbus::frame::counts::Counts;
+use nimbus::frame::Counts;
 use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::Summary;
 use nimbus::timing::attachments::Attachments;

@@ -10,11 +10,11 @@ use std::sync::Arc;
 use bounded::Random;
 use glam::DVec3;
 use nimbus::error::Error;
-use nimbus::frame::limits::n_cells_max;
+use nimbus::frame::Reshaped;
+use nimbus::frame::n_cells;
 use nimbus::frame::plan::Pass;
-use nimbus::frame::reshape::Reshaped;
 use nimbus::frame::serial;
-use nimbus::frame::stage::{Bed, DeviceChoice, Player};
+use nimbus::frame::{DeviceChoice, GpuContext, Player};
 use nimbus::io::scene_file;
 use nimbus::layout::particle::ParticleRecord;
 use nimbus::model::boxes::CloudBox;
@@ -53,8 +53,9 @@ fn with(scene: &Scene, document: &Document) -> Arc<Scene> {
     scene.into()
 }
 
-fn bed() -> Bed {
-    Bed::open(&DeviceChoice { validation: true, ..DeviceChoice::default() }).expect("a device")
+fn bed() -> GpuContext {
+    GpuContext::open(&DeviceChoice { validation: true, ..DeviceChoice::default() })
+        .expect("a device")
 }
 
 /// Particles and picture of a player.
@@ -66,7 +67,7 @@ struct Contents {
 }
 
 /// Draws a frame. Returns the contents, and whether particles were generated.
-fn contents(bed: &Bed, player: &mut Player) -> (Contents, bool) {
+fn contents(bed: &GpuContext, player: &mut Player) -> (Contents, bool) {
     let mut generates = false;
     serial::run(&mut player.game, &mut player.renderer, 0..1, &mut |times, _| {
         generates = times.plan.runs(Pass::Generate);
@@ -79,7 +80,7 @@ fn contents(bed: &Bed, player: &mut Player) -> (Contents, bool) {
     (Contents { particles, status, picture }, generates)
 }
 
-fn fresh(bed: &Bed, scene: &Arc<Scene>) -> Contents {
+fn fresh(bed: &GpuContext, scene: &Arc<Scene>) -> Contents {
     contents(bed, &mut bed.player(scene.clone(), true).expect("a player")).0
 }
 
@@ -265,7 +266,7 @@ fn the_density_grid_grows_for_other_proportions() {
     let mut long = round.clone();
     long.boxes[0].center.x += 80.0;
     let [long, round] = [long, round].map(|document| with(&base, &document));
-    assert!(4 * n_cells_max(&long) < n_cells_max(&round));
+    assert!(4 * n_cells(&long) < n_cells(&round));
     let mut player = bed.player(long.clone(), true).expect("a player");
     contents(&bed, &mut player);
     for scene in [&round, &long, &round] {

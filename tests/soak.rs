@@ -9,9 +9,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use nimbus::frame::FrameTimes;
+use nimbus::frame::Renderer;
 use nimbus::frame::plan::Pass;
-use nimbus::frame::render::Renderer;
-use nimbus::frame::stage::{DeviceChoice, Stage};
+use nimbus::frame::{DeviceChoice, Stage};
 use nimbus::io::scene_file;
 use nimbus::model::scene::Threading;
 use sha2::{Digest, Sha256};

@@ -13,11 +13,11 @@ use std::sync::Arc;
 use bounded::{Random, U};
 use glam::DVec3;
 use harness::{Gpu, assert_within_and_say, check_within};
-use nimbus::frame::game::Game;
-use nimbus::frame::limits;
-use nimbus::frame::plan::{Pass, Plan, Tensors};
-use nimbus::frame::render::Renderer;
-use nimbus::frame::tensor::{Shape, basis_of};
+use nimbus::frame::Game;
+use nimbus::frame::Renderer;
+use nimbus::frame::Tensors;
+use nimbus::frame::plan::{Pass, Plan};
+use nimbus::frame::{Shape, basis_of};
 use nimbus::gpu::Compiler;
 use nimbus::io::scene_file;
 use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, RegionRecord};
@@ -26,7 +26,7 @@ use nimbus::model::basis::{Basis, N_NODES, Sampling};
 use nimbus::model::light::Light;
 use nimbus::model::material::MaterialKey;
 use nimbus::model::scene::Scene;
-use nimbus::passes::first::{FirstTensor, TensorPush};
+use nimbus::passes::first::{FirstTensor, FirstTensorBuffers, TensorPush};
 use nimbus::reference::first;
 
 fn scene(overrides: &[&str]) -> Scene {
@@ -184,7 +184,7 @@ fn numbers(lit: &[LitRecord]) -> Vec<f64> {
 /// albedo/π less the lobe's negative part.
 fn bounds(scene: &Scene, fused: &Frames) -> Vec<f64> {
     let basis = basis_of(scene).expect("a basis");
-    let shape = Shape::of(scene, basis.n_bases());
+    let shape = Shape::new(scene, basis.n_bases());
     let n = MAX_CELLS * scene.n_facets() as f64
         + f64::from(shape.n_columns)
         + f64::from(basis.n_bases())
@@ -233,7 +233,7 @@ fn greatest(table: &[f64], n: f64) -> f64 {
 fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
     let gpu = Gpu::new();
     let scene = scene(&[]);
-    let shape = Shape::of(&scene, basis_of(&scene).expect("a basis").n_bases());
+    let shape = Shape::new(&scene, basis_of(&scene).expect("a basis").n_bases());
     // Floor 25, ceiling 16, wall 16 (a lobe), shelf 4 facets, 40 particles with colours and a lobe,
     // 5 vectors. The floor has a lobe, too.
     let n_rows: u64 = 6 * 25 + 16 + 6 * 16 + 4 + 6 * 40;
@@ -250,30 +250,21 @@ fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
     assert_eq!(of(3), [[6, 7], [14, 8]]);
     assert_eq!(of(4), [[0, 22]]);
     let mut limits = *gpu.device.limits();
-    assert_eq!(limits::tensors(&shape, &limits, u64::MAX), Tensors::Kept);
+    assert_eq!(shape.fits(&limits, u64::MAX), Tensors::Kept);
     let first = 4 * 3 * shape.n_rows;
-    assert_eq!(limits::tensors(&shape, &limits, bytes + first), Tensors::Kept);
+    assert_eq!(shape.fits(&limits, bytes + first), Tensors::Kept);
     assert_eq!(
-        limits::tensors(&shape, &limits, bytes + first - 1),
+        shape.fits(&limits, bytes + first - 1),
         Tensors::TooLarge { bytes, most: bytes - 1 }
     );
     limits.max_storage_buffer_bytes = bytes - 4;
-    assert_eq!(
-        limits::tensors(&shape, &limits, u64::MAX),
-        Tensors::TooLarge { bytes, most: bytes - 4 }
-    );
+    assert_eq!(shape.fits(&limits, u64::MAX), Tensors::TooLarge { bytes, most: bytes - 4 });
     limits.max_storage_buffer_bytes = u64::MAX;
     limits.max_texels = bytes / 4 - 1;
-    assert_eq!(
-        limits::tensors(&shape, &limits, u64::MAX),
-        Tensors::TooLarge { bytes, most: bytes - 4 }
-    );
+    assert_eq!(shape.fits(&limits, u64::MAX), Tensors::TooLarge { bytes, most: bytes - 4 });
     // Sizes beyond 64 bits are still only large.
     let huge = Shape { n_rows: u64::MAX / 4, ..shape };
-    assert!(matches!(
-        limits::tensors(&huge, &limits, u64::MAX),
-        Tensors::TooLarge { bytes: u64::MAX, .. }
-    ));
+    assert!(matches!(huge.fits(&limits, u64::MAX), Tensors::TooLarge { bytes: u64::MAX, .. }));
 }
 
 #[test]
@@ -379,7 +370,8 @@ fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
         n_rows,
         i_vectors: 0,
     };
-    gpu.run(|rec| pass.record(rec, buffers.each_ref(), &push));
+    let named = FirstTensorBuffers::from_bindings(buffers.each_ref());
+    gpu.run(|rec| pass.record(rec, &named, &push));
     let values =
         gpu.download::<f32>(&buffers[5], 2 * n_rows as usize).into_iter().map(f64::from).collect();
     let (mut truths, mut bounds) = (vec![0.0; 2 * n_rows as usize], vec![0.0; 2 * n_rows as usize]);

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use bounded::{Random, greatest_ratio};
 use glam::{DVec2, DVec3};
 use harness::{Gpu, assert_within};
-use nimbus::frame::tiling::saturated;
+use nimbus::frame::saturation_bound;
 use nimbus::gpu::TargetFormat;
 use nimbus::layout::particle::{DrawnRecord, TexturedRecord};
 use nimbus::model::film::FilmFormat;
@@ -89,9 +89,9 @@ fn usual(gpu: &Gpu) -> Tiled {
     Tiled {
         invocations,
         portable: false,
-        most_pairs: None,
-        most_tiles: None,
-        saturated: saturated(FORMAT.1),
+        max_pairs: None,
+        max_tiles: None,
+        saturated: saturation_bound(FORMAT.1),
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, PoisonError};
 
-use nimbus::frame::stage::{DeviceChoice, Stage};
+use nimbus::frame::{DeviceChoice, Stage};
 use nimbus::gpu::{ClockFit, ClockSample};
 use nimbus::io::scene_file;
 use nimbus::measure::zones::{Collected, Zones};

@@ -3,7 +3,7 @@
 use super::args::{BasisArg, InspectArgs};
 use super::{check_time, device_choice, load, output, say_notes, say_sizes};
 use crate::error::Result;
-use crate::frame::stage::Stage;
+use crate::frame::Stage;
 use crate::inspect::{air, basis, stages as inspect};
 use crate::model::scene::Scene;
 

@@ -7,8 +7,8 @@ use super::args::LedgerArgs;
 use super::render_reference::Shown;
 use super::{device_choice, load, output};
 use crate::error::{Error, Result};
+use crate::frame::GpuContext;
 use crate::frame::limits;
-use crate::frame::stage::Bed;
 use crate::io::atomic::check_place;
 use crate::reference::picture::{Pixels, ReferenceKind, RenderStage, n_reflections};
 use crate::report::charts;
@@ -50,7 +50,7 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
             n_reflections(&scene)
         )));
     }
-    let bed = Bed::open(&device_choice(&args.options))?;
+    let bed = GpuContext::open(&device_choice(&args.options))?;
     limits::check(&scene, bed.device.limits())?;
     let clocks =
         machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;
@@ -85,7 +85,7 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
 
 fn measure(
     args: &LedgerArgs,
-    bed: &Bed,
+    bed: &GpuContext,
     scene: &crate::model::scene::Scene,
     time_s: f64,
     made: Provenance,

@@ -36,9 +36,9 @@ use std::time::{Duration, Instant};
 use clap::Parser;
 
 use crate::error::{Error, Result};
-use crate::frame::light_notes::light_notes;
+use crate::frame::light_notes;
 use crate::frame::limits::advice;
-use crate::frame::stage::{DeviceChoice, Stage};
+use crate::frame::{DeviceChoice, Stage};
 use crate::inspect::basis::basis_warnings;
 use crate::io::atomic;
 use crate::io::bounds::{GREATEST, is_carried_place, shortest};

@@ -8,10 +8,10 @@ use super::{
     say_sizes,
 };
 use crate::error::Result;
-use crate::frame::counts::Counts;
+use crate::frame::Counts;
+use crate::frame::Rendered;
+use crate::frame::Stage;
 use crate::frame::plan::Pass;
-use crate::frame::render::Rendered;
-use crate::frame::stage::Stage;
 use crate::io::image::{self, ImageKind, image_hash};
 use crate::model::film::FilmFormat;
 use crate::timing::machine::device_record;
@@ -49,7 +49,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
         }
     }
     let counts = (args.options.verbose || args.json)
-        .then(|| Counts::of(&mut stage.renderer, &stage.device, &stage.scene))
+        .then(|| Counts::new(&mut stage.renderer, &stage.device, &stage.scene))
         .transpose()?;
     if let (Some(counts), true) = (&counts, args.options.verbose) {
         eprintln!("  {}", counts.text());

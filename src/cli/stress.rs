@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::args::StressArgs;
 use super::output;
 use crate::error::{Error, Result};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::stress::{Case, Outcome, StressContext, Verdict, cases};
 use crate::timing::machine::{self, Cpu, Device};
 

@@ -13,7 +13,7 @@ use super::store::{Placement, ResultState, Store};
 use super::transient::as_transient;
 use super::work::Task;
 use crate::error::{Error, Result};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::io::scene_file::LoadedScene;
 use crate::timing::machine;
 

@@ -1,48 +1,56 @@
-//! What of a frame is odd, counted: what is no finite number, at the end of what a format holds,
-//! folded back, negative, left out. Zero is counted as zero.
+//! Counts of defects of a frame: values that are not finite or at the end of their format's range,
+//! particles that were folded back, negative light, and lost sources. A count of zero is reported
+//! too.
 
 use serde::{Deserialize, Serialize};
 
+use super::renderer::Renderer;
 use crate::error::Result;
-use crate::frame::render::Renderer;
 use crate::gpu::Device;
 use crate::layout::facet::LitRecord;
 use crate::model::film::FilmFormat;
 use crate::model::scene::{LightingMode, Scene};
 use crate::passes::generate::FOLDED;
 
+/// Counts of a frame's values and of their defects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counts {
-    /// Numbers of the picture, four a pixel; those that are NaN or infinite; and colours at the end
-    /// of what the format holds (1 of "rgba8", 65504 of "rgba16f"), which may have been cut to it.
+    /// Numbers of the picture, four a pixel.
     pub values: u64,
+    /// Numbers of the picture that are NaN or infinite.
     pub not_finite: u64,
+    /// Colors at the end of the format's range (1 of "rgba8", 65504 of "rgba16f"), which may have
+    /// been clipped.
     pub saturated: u64,
-    /// Particles of boxes, and those that no attempt found a place for, so that they were folded
-    /// back into their box.
+    /// Particles of boxes.
     pub particles: u64,
+    /// Particles that no attempt found a place for, so that they were folded back into their box.
     pub folded: u64,
-    /// Lit facets; those with light that is NaN or infinite, and with radiance below 0 (a basis
-    /// that is cut off).
+    /// Lit facets.
     pub facets: u64,
+    /// Facets with light that is NaN or infinite.
     pub facets_not_finite: u64,
+    /// Facets with negative radiance, from a basis that is cut off.
     pub facets_negative: u64,
-    /// Pairs of facets that stayed wider than `lighting.pair_size` asks for, and sources that the
-    /// driver's loops ended before.
+    /// Pairs of facets that stayed wider than `lighting.pair_size` asks for.
     pub pairs_unresolved: u64,
+    /// Sources that the driver's loops ended before.
     pub sources_lost: u64,
 }
 
-/// Greatest finite number of a half float.
+/// The greatest finite half float.
 const HALF_MAX: f32 = 65504.0;
 
 impl Counts {
-    /// Of the last frame that `renderer` drew of `scene`. No frame may be in flight.
-    pub fn of(renderer: &mut Renderer, device: &Device, scene: &Scene) -> Result<Counts> {
+    /// Returns the counts of the last frame that `renderer` drew of `scene`.
+    ///
+    /// # Errors
+    /// Fails if a frame is in flight or the device is lost.
+    pub fn new(renderer: &mut Renderer, device: &Device, scene: &Scene) -> Result<Counts> {
         let rgba = renderer.image()?;
         let mut counts = Counts::of_picture(&rgba, scene.film.format);
         let status = renderer.status(device)?;
-        // Of lists there are no attempts.
+        // Particles of lists have no attempts.
         counts.particles = status.iter().filter(|s| **s & !FOLDED != 0).count() as u64;
         counts.folded = status.iter().filter(|s| **s & FOLDED != 0).count() as u64;
         if scene.lighting.mode != LightingMode::None {
@@ -59,7 +67,7 @@ impl Counts {
         };
         let count =
             |is_odd: &dyn Fn(f32) -> bool| rgba.iter().filter(|v| is_odd(**v)).count() as u64;
-        // Alpha is 1 where it should be.
+        // Alpha is 1 where a pixel is opaque, which is no defect.
         let colours = rgba.chunks_exact(4).flat_map(|p| &p[..3]);
         Counts {
             values: rgba.len() as u64,
@@ -80,7 +88,7 @@ impl Counts {
         self.sources_lost = lit.iter().map(|l| f64::from(l.n_lost)).sum::<f64>() as u64;
     }
 
-    /// In a line.
+    /// Returns the counts as one line.
     pub fn text(&self) -> String {
         let mut parts = vec![format!(
             "of {} numbers of the picture {} not finite, {} at the format's end",
@@ -108,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_odd_is_counted_and_nothing_else() {
+    fn defects_and_nothing_else_are_counted() {
         let rgba =
             [0.5, 1.0, 0.2, 1.0, f32::NAN, 0.0, 65504.0, 1.0, f32::INFINITY, -70000.0, 1.0, 0.3];
         let of = |format| {
@@ -136,7 +144,7 @@ mod tests {
         assert_eq!((counts.pairs_unresolved, counts.sources_lost), (8, 3));
         assert!(
             Counts::default().text().contains("0 not finite, 0 at the format's end"),
-            "zero is said as zero"
+            "zero is reported as zero"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! The game step: where camera, clouds and (where the scene says so) every particle are at a
+//! The game step: computes the camera, the clouds and, with `simulate = "cpu"`, every particle at a
 //! frame's time.
 
 use std::sync::Arc;
@@ -7,11 +7,12 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 use tracing::info_span;
 
-use super::drawn::drawn;
-use super::exchange::is_glossy;
-use super::lives::{disc_records, lived, lives};
+use super::clock::ms;
+use super::features::{has_impostors, has_live, is_glossy};
+use super::live::{disc_records, live_particles};
 use super::packet::{Extent, Packet};
-use super::tensor::{Shape, basis_of, is_edited, kind_of};
+use super::tensor_shape::{Shape, basis_of, is_edited, kind_of};
+use super::visibility::drawn_groups;
 use crate::error::Result;
 use crate::layout::facet::{KeyBits, NO_LOBE, RegionBoundsRecord, RegionRecord, lobe_width};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
@@ -24,34 +25,36 @@ use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::gust::Mode;
 use crate::model::gust_lanes::{LANES, Lanes, Waves};
 use crate::model::material::{Brdf, Material};
-use crate::model::scene::{Impostors, Scene};
+use crate::model::scene::Scene;
 
+/// The game side of a scene, which makes the packet of any frame.
 pub struct Game {
     scene: Arc<Scene>,
     groups: Vec<Group>,
-    /// Waves of each cloud's gusts, and how many those before it have.
+    /// Waves of each cloud's gusts.
     modes: Vec<Vec<Mode>>,
+    /// Index of each cloud's first wave.
     i_modes: Vec<u32>,
     basis: Option<Basis>,
-    /// At no particular time where no lobe is edited.
+    /// The table of lobes, if no lobe is edited.
     table: Arc<Vec<f32>>,
-    /// Where materials are edited.
+    /// The shape of the tensors, if materials are edited.
     shape: Option<Shape>,
-    /// Every particle relative to its group, where this thread moves them.
+    /// Every particle relative to its group, if the game thread moves them.
     rest: Option<Vec<ParticleRecord>>,
-    /// Groups that cannot be in the picture are not drawn.
+    /// Groups that cannot be in the picture are left out.
     culls: bool,
-    /// Where somebody looks from, in place of the scene's camera.
+    /// The pose that replaces the scene's camera.
     viewpoint: Option<Viewpoint>,
 }
 
-/// Asked for at every step, on the thread that plays; the width of the view and the near plane are
-/// the scene's.
+/// A function that returns the camera's pose. It is called at every step, on the game thread; the
+/// field of view and the near plane are the scene's.
 pub type Viewpoint = Box<dyn Fn() -> Pose + Send>;
 
 impl Game {
-    /// `rest` are all particles in order, given where the game thread is to move them (`simulate =
-    /// "cpu"`).
+    /// Creates the game side of `scene`. `rest` has all particles in order if the game thread is to
+    /// move them (`simulate = "cpu"`).
     pub fn new(scene: Arc<Scene>, rest: Option<Vec<ParticleRecord>>) -> Game {
         let groups = scene.groups();
         let modes: Vec<Vec<Mode>> = scene.clouds.iter().map(|c| c.gust.modes(c.seed)).collect();
@@ -61,7 +64,7 @@ impl Game {
         let basis = basis_of(&scene);
         let table = Arc::new(table(&scene, basis.as_ref(), scene.time.start_s));
         let n_bases = basis.as_ref().map_or(1, Basis::n_bases);
-        let shape = is_edited(&scene).then(|| Shape::of(&scene, n_bases));
+        let shape = is_edited(&scene).then(|| Shape::new(&scene, n_bases));
         Game {
             scene,
             groups,
@@ -76,39 +79,44 @@ impl Game {
         }
     }
 
-    /// Whether groups that cannot be in the picture are left out of it, as they are unless told
-    /// otherwise.
-    pub fn culling(self, culls: bool) -> Game {
+    /// Sets whether groups that cannot be in the picture are left out, which is the default.
+    pub fn with_culling(self, culls: bool) -> Game {
         Game { culls, ..self }
     }
 
-    /// The same for the next steps of a game that is under way.
+    /// Sets whether the next steps leave out groups that cannot be in the picture.
     pub fn set_culling(&mut self, culls: bool) {
         self.culls = culls;
     }
 
-    /// The same, seen from where `viewpoint` says.
-    pub fn seen_from(self, viewpoint: Viewpoint) -> Game {
+    /// Replaces the scene's camera by `viewpoint`.
+    pub fn with_viewpoint(self, viewpoint: Viewpoint) -> Game {
         Game { viewpoint: Some(viewpoint), ..self }
     }
 
-    /// The same scene, drawn otherwise.
-    pub fn drawn_by(self, scene: Arc<Scene>) -> Game {
+    /// Replaces the scene by one that differs in its `draw` alone.
+    pub(super) fn with_scene(self, scene: Arc<Scene>) -> Game {
         Game { scene, ..self }
     }
 
-    /// Another scene, culled and seen as this one was.
+    /// Replaces the scene and its particles; culling and viewpoint stay.
     pub(super) fn replay(&mut self, scene: Arc<Scene>, rest: Option<Vec<ParticleRecord>>) {
         let (culls, viewpoint) = (self.culls, self.viewpoint.take());
         *self = Game { culls, viewpoint, ..Game::new(scene, rest) };
     }
 
-    /// Frame `i_frame`, from nothing but its number: any frame can be made alone, in any order.
+    /// Returns frame `i_frame`, which depends on its number alone: frames can be made in any order.
+    ///
+    /// # Errors
+    /// Fails if the scene has no state at that time or a file of moving particles cannot be read.
     pub fn step(&mut self, i_frame: u32) -> Result<Packet> {
         self.step_at(i_frame, self.scene.time.at(i_frame))
     }
 
-    /// A frame at any time.
+    /// Returns a frame at any time.
+    ///
+    /// # Errors
+    /// Fails as [`Game::step`] does.
     pub fn step_at(&mut self, i_frame: u32, time_s: f64) -> Result<Packet> {
         let begin = Instant::now();
         let _zone = info_span!("game step").entered();
@@ -120,15 +128,15 @@ impl Game {
         let origins: Vec<DVec3> =
             self.scene.clouds.iter().map(|c| c.origin_at(time_s) - setting.light_origin).collect();
         let grown = self.scene.grown(&self.groups, time_s);
-        // What a shell has must not depend on where the camera looks.
-        let culls = self.culls && self.scene.draw.impostors == Impostors::Off;
-        let (drawn, n_drawn) =
-            info_span!("visibility").in_scope(|| drawn(&self.scene, &grown, &setting, culls));
-        let lived = self.lived(time_s)?;
-        let placed = lived.as_ref().or(self.rest.as_ref()).map(|rest| {
+        // Impostor layers include every particle, so that they stay valid when the camera turns.
+        let culls = self.culls && !has_impostors(&self.scene);
+        let (drawn, n_drawn) = info_span!("visibility")
+            .in_scope(|| drawn_groups(&self.scene, &grown, &setting, culls));
+        let live = self.live(time_s)?;
+        let placed = live.as_ref().or(self.rest.as_ref()).map(|rest| {
             info_span!("place particles").in_scope(|| self.place(rest, &grown, &origins, time_s))
         });
-        // The device moves nothing that is placed already.
+        // The device does not move particles that the host has placed.
         let (modes, discs) = match placed {
             Some(_) => (vec![], vec![]),
             None => (
@@ -136,7 +144,7 @@ impl Game {
                 disc_records(&self.scene, &self.groups, time_s),
             ),
         };
-        let heaviest = self.heaviest(&grown, lived.as_ref());
+        let heaviest = self.heaviest(&grown, live.as_ref());
         Ok(Packet {
             i_frame,
             time_s,
@@ -153,7 +161,7 @@ impl Game {
             n_drawn,
             modes,
             discs,
-            lived,
+            live,
             placed,
             table: self.table_at(time_s),
             coefficients: self.coefficients(time_s),
@@ -170,28 +178,32 @@ impl Game {
             radius: setting.radius,
             sort_bits: self.sort_bits(&grown, setting.radius),
             extents: self.extents(&grown, &origins),
-            game_ms: super::ms(begin, Instant::now()),
+            game_ms: ms(begin, Instant::now()),
         })
     }
 
-    /// Every particle relative to its group, where this thread moves them and some are of discs.
-    fn lived(&self, time_s: f64) -> Result<Option<Vec<ParticleRecord>>> {
-        let Some(rest) = self.rest.as_ref().filter(|_| lives(&self.scene)) else { return Ok(None) };
-        info_span!("live").in_scope(|| lived(&self.scene, &self.groups, rest, time_s)).map(Some)
+    /// Returns every particle relative to its group, if the game thread recomputes particles.
+    fn live(&self, time_s: f64) -> Result<Option<Vec<ParticleRecord>>> {
+        let Some(rest) = self.rest.as_ref().filter(|_| has_live(&self.scene)) else {
+            return Ok(None);
+        };
+        info_span!("live")
+            .in_scope(|| live_particles(&self.scene, &self.groups, rest, time_s))
+            .map(Some)
     }
 
-    /// Bounds every blob's mass: of those that somebody else moves as they are.
-    fn heaviest(&self, groups: &[Group], lived: Option<&Vec<ParticleRecord>>) -> f64 {
+    /// Returns a bound of every blob's mass; moving particles are looked at one by one.
+    fn heaviest(&self, groups: &[Group], live: Option<&Vec<ParticleRecord>>) -> f64 {
         let mass_of =
             |p: &ParticleRecord| mass(f64::from(p.kappa), f64::from(p.sigma)) * f64::from(p.aspect);
-        let moved = lived
+        let moved = live
             .filter(|_| self.scene.is_animated())
             .map_or(0.0, |all| all.iter().map(mass_of).fold(0.0, f64::max));
         let scale = groups.iter().map(|g| g.scale.powi(3)).fold(1.0, f64::max);
         max_blob_mass(groups).max(scale * moved)
     }
 
-    /// Of the sort's keys.
+    /// Returns the bits of a sort key.
     fn sort_bits(&self, groups: &[Group], radius: f64) -> u32 {
         let sigmas = groups
             .iter()
@@ -200,9 +212,9 @@ impl Game {
         self.scene.draw.sort_bits.of(radius, sigmas.fold(f64::INFINITY, f64::min))
     }
 
-    /// Where the groups are that a shell may show.
+    /// Returns the extents of the groups, for impostors.
     fn extents(&self, groups: &[Group], origins: &[DVec3]) -> Vec<Extent> {
-        if self.scene.draw.impostors == Impostors::Off {
+        if !has_impostors(&self.scene) {
             return vec![];
         }
         let of = |g: &Group| Extent {
@@ -215,7 +227,7 @@ impl Game {
         groups.iter().filter(|g| g.n_particles > 0).map(of).collect()
     }
 
-    /// Where each region's Morton cells lie.
+    /// Returns the bounds of each region's Morton cells.
     fn bounds(&self, setting: &FrameState) -> Vec<RegionBoundsRecord> {
         let bits = KeyBits::of(self.scene.n_regions() as u32);
         let of = |b| RegionBoundsRecord::new(b, setting.light_origin, bits);
@@ -226,7 +238,7 @@ impl Game {
             .collect()
     }
 
-    /// The regions and their materials, surfaces before ground, both before clouds.
+    /// Returns surfaces, terrains and clouds with their materials.
     fn regions(&self, time_s: f64, light_origin: DVec3) -> Vec<RegionRecord> {
         let scene = &self.scene;
         let mut i_facet = 0;
@@ -272,13 +284,13 @@ impl Game {
         }
     }
 
-    /// C of every column of the tensors.
+    /// Returns C of every column of the tensors.
     fn coefficients(&self, time_s: f64) -> Vec<[f32; 4]> {
         let (Some(shape), scene) = (&self.shape, &self.scene) else { return vec![] };
         let brdfs: Vec<Brdf> =
             (0..scene.n_regions()).map(|i| scene.region_material(i).at(time_s)).collect();
         let of = |ns: f64| self.basis.as_ref().map_or(vec![], |b| b.coefficients(ns));
-        // Regions share materials.
+        // Several regions may share a material.
         let of_materials: Vec<Vec<f64>> = scene
             .materials
             .iter()
@@ -293,7 +305,7 @@ impl Game {
         GroupRecord::new(group, i_region, origin, modes)
     }
 
-    /// Every particle at its group's place, in f64 until the last step.
+    /// Returns every particle's place, computed in f64 and rounded once.
     fn place(
         &self,
         rest: &[ParticleRecord],
@@ -307,15 +319,15 @@ impl Game {
             let offset = origins[group.i_cloud] + group.center;
             let first = group.i_first as usize;
             for some in rest[first..first + group.n_particles as usize].chunks(LANES) {
-                place_some(some, group, offset, &waves[group.i_cloud], &mut placed);
+                place_lanes(some, group, offset, &waves[group.i_cloud], &mut placed);
             }
         }
         placed
     }
 }
 
-/// At most [`LANES`] particles of one group.
-fn place_some(
+/// Places at most [`LANES`] particles of one group.
+fn place_lanes(
     some: &[ParticleRecord],
     group: &Group,
     offset: DVec3,
@@ -335,7 +347,7 @@ fn place_some(
     }));
 }
 
-/// A row a material: its lobe as the basis has it; zeros where it has none. Then a row a vector.
+/// Returns a row a material, its lobe in the basis or zeros, then a row a vector of the basis.
 fn table(scene: &Scene, basis: Option<&Basis>, time_s: f64) -> Vec<f32> {
     let Some(basis) = basis else { return vec![] };
     let lobe =

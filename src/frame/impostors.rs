@@ -1,217 +1,153 @@
-//! What is far, drawn into a picture of its own and shown from there as long as that is near enough
-//! to the truth.
+//! Impostors: distant blobs are drawn into a layer, a picture of its own, and shown from there
+//! while that is near enough to the true view.
 
-use super::buffers::Buffers;
+use super::blob_target::{BlobTarget, TargetSpec};
+use super::features::{saturation_bound, target_format};
+use super::impostor_cache::{CacheRules, CachedLayer, ImpostorCache, LayerUse, view_of};
 use super::packet::Packet;
-use super::plan::{Decision, Pass, Plan, Reason, skip};
-use super::settings::Settings;
-use super::shells::{Keeper, Kept, Rules, Step, view_of};
-use super::tiling::Tiling;
+use super::plan::{Decision, Pass, Plan, Reason};
 use crate::error::{Error, Result};
 use crate::gpu::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, Image, MemoryUsage, RecordCount, Recorder, Target};
+use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Recorder, Target, buffers};
 use crate::model::film::FilmFormat;
-use crate::model::scene::{DrawPath, Scene};
-use crate::passes;
-use crate::passes::impostors::Shown;
-use crate::passes::sprites::Sprites;
-use crate::passes::tiles::View;
+use crate::model::scene::Scene;
+use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};
+use crate::passes::impostors::{self, LayerView, PartBuffers};
 
-use super::tiling::saturated;
+/// A layer is drawn and kept in floats, so that no thin blob is lost.
+const FORMAT: FilmFormat = FilmFormat::Rgba32f;
 
-/// A shell's picture is drawn and kept in floats: no layer of it is lost.
-const FORMAT: TargetFormat = TargetFormat::Rgba32f;
-
-pub(super) struct Impostors {
-    pass: passes::impostors::Impostors,
-    keeper: Keeper,
-    /// What the frame that is recorded shows.
-    now: Step,
-    /// None where tiles draw.
-    sprites: Option<OfSprites>,
-    /// None where sprites draw.
-    tiling: Option<Tiling>,
-    /// By particle whether it is in the shell.
-    members: Buffer,
-    /// Sorted entries of what is far, and of what is near.
-    far: Buffer,
-    near: Buffer,
+buffers! {
+    /// The entries of near and distant blobs, and the layer.
+    pub(super) struct LayerBuffers(n_texels: u64, n_particles: u64) {
+        /// Pixels of the layer.
+        texels: Buffer => [f32; 4], n_texels, "impostors.texels", Texels;
+        /// Whether a particle belongs to the layer.
+        members: Buffer => u32, n_particles, "impostors.members";
+        /// Sorted entries of the layer.
+        far: Buffer => [u32; 2], n_particles, "impostors.far";
+        /// Sorted entries of all other blobs.
+        near: Buffer => [u32; 2], n_particles, "impostors.near";
+    }
 }
 
-/// What draws a shell by sprites, and its picture.
-struct OfSprites {
-    sprites: Sprites,
-    image: Image,
-    texels: Buffer,
+/// The impostor layer of a scene.
+pub(super) struct Impostors {
+    pass: impostors::Impostors,
+    cache: ImpostorCache,
+    /// The layer that the frame being recorded shows.
+    now: LayerUse,
+    target: BlobTarget,
+    pub buffers: LayerBuffers,
+}
+
+fn target_spec(rules: &CacheRules) -> TargetSpec {
+    TargetSpec {
+        size: rules.layer_size,
+        format: TargetFormat::Rgba32f,
+        n_pictures: 1,
+        has_depth: false,
+        has_layer: false,
+        has_blobs: true,
+        n_chunks: 0,
+    }
+}
+
+fn n_texels(rules: &CacheRules) -> u64 {
+    rules.layer_size.map(u64::from).iter().product()
 }
 
 impl Impostors {
-    /// `variant`: of the sprites, as [`Sprites::new`] has it but for what is behind.
-    pub fn new(
-        device: &Device,
-        compiler: &Compiler,
-        scene: &Scene,
-        format: TargetFormat,
-        (lit, variant): (bool, [bool; 5]),
-    ) -> Result<Impostors> {
-        let rules = Rules::of(scene);
-        let ([width, height], n) = (rules.shell_size, scene.n_particles());
-        let [grouped, counted, textured, threshold, ellipsoids] = variant;
-        let of_sprites = || -> Result<OfSprites> {
-            let n_texels = u64::from(width) * u64::from(height);
-            Ok(OfSprites {
-                sprites: Sprites::new(
-                    device,
-                    compiler,
-                    FORMAT,
-                    lit,
-                    [false, grouped, counted, textured, threshold, ellipsoids],
-                )?,
-                image: Image::color_target(device, "impostors.drawn", width, height, FORMAT)
-                    .map_err(|e| match e {
-                        Error::Limit { what } => Error::limit(format!("draw.impostors: {what}")),
-                        e => e,
-                    })?,
-                texels: Buffer::new::<[f32; 4]>(
-                    device,
-                    "impostors.texels",
-                    n_texels,
-                    MemoryUsage::Device,
-                )?,
-            })
-        };
-        let path = scene.draw.path;
-        let tiling = match path {
-            DrawPath::Tiles => {
-                Some(Tiling::of_size(device, compiler, scene, rules.shell_size, (FORMAT, false))?)
-            }
-            _ => None,
-        };
-        let entries = |name| Buffer::new::<[u32; 2]>(device, name, n, MemoryUsage::Device);
+    /// Creates the layer of `scene`, in which no knob is "auto".
+    pub fn new(device: &Device, compiler: &Compiler, scene: &Scene) -> Result<Impostors> {
+        let (rules, format) = (CacheRules::new(scene), target_format(scene.film.format));
+        let target = BlobTarget::new(device, compiler, scene, &target_spec(&rules));
         Ok(Impostors {
-            pass: passes::impostors::Impostors::new(device, compiler, format, scene.has_solids())?,
-            keeper: Keeper::new(rules),
-            now: Step::Nothing("there is no frame before"),
-            sprites: (path != DrawPath::Tiles).then(of_sprites).transpose()?,
-            tiling,
-            members: Buffer::new::<u32>(device, "impostors.members", n, MemoryUsage::Device)?,
-            far: entries("impostors.far")?,
-            near: entries("impostors.near")?,
+            pass: impostors::Impostors::new(device, compiler, format, scene.has_solids())?,
+            cache: ImpostorCache::new(rules),
+            now: LayerUse::None("there is no frame before"),
+            target: target.map_err(|error| match error {
+                Error::Limit { what } => Error::limit(format!("draw.impostors: {what}")),
+                error => error,
+            })?,
+            buffers: LayerBuffers::new(device, n_texels(&rules), scene.n_particles())?,
         })
     }
 
-    /// Settles what `packet`'s frame shows; `plan` as it comes out of that.
+    /// Lists the sizes of the images and buffers.
+    pub fn specs(scene: &Scene) -> Vec<BufferSpec> {
+        let rules = CacheRules::new(scene);
+        let buffers = LayerBuffers::specs(n_texels(&rules), scene.n_particles());
+        [target_spec(&rules).specs(scene), buffers].concat()
+    }
+
+    /// Decides which layer `packet`'s frame shows, and returns `plan` with that decision.
     pub fn decide(&mut self, plan: Plan, packet: &Packet) -> Plan {
         if plan.changed() == Some("there is no frame before") {
-            self.keeper.reset();
+            self.cache.reset();
         }
         if !plan.runs(Pass::Impostors) {
-            self.now = Step::Nothing("nothing is drawn");
+            self.now = LayerUse::None("nothing is drawn");
             return plan;
         }
-        self.now = self.keeper.step(packet, plan.changed());
+        self.now = self.cache.step(packet, plan.changed());
+        let run = |reason| Decision { run: true, reason };
         plan.with_impostors(match self.now {
-            Step::Nothing(why) => skip(why),
-            Step::Made { why, .. } => Decision { run: true, reason: Reason::Made(why) },
-            Step::Reused { pixels, .. } => Decision {
-                run: true,
-                reason: Reason::Reused { milli_px: (1e3 * pixels).ceil() as u32 },
-            },
+            LayerUse::None(why) => Decision::skip(why),
+            LayerUse::Made { why, .. } => run(Reason::Made(why)),
+            LayerUse::Reused { pixels, .. } => {
+                run(Reason::Reused { milli_px: (1e3 * pixels).ceil() as u32 })
+            }
         })
     }
 
-    /// Entries of the blobs that are drawn over the shell; none where there is no shell, and all
-    /// are.
-    pub fn near(&self) -> Option<&Buffer> {
-        match self.now {
-            Step::Nothing(_) => None,
-            Step::Made { .. } | Step::Reused { .. } => Some(&self.near),
-        }
+    /// Returns whether the frame being recorded shows a layer.
+    pub fn has_layer(&self) -> bool {
+        !matches!(self.now, LayerUse::None(_))
     }
 
-    /// Parts what is sorted, draws what is far where the shell is made anew, and shows it in
-    /// `target`.
+    /// Parts the entries, draws the layer if it is not cached, and shows it in `target`.
+    ///
+    /// `buffers` has all entries, `count` says how many, and `view` is that of the frame.
     pub fn record(
         &mut self,
         rec: &mut Recorder<'_>,
-        path: DrawPath,
-        b: &Buffers,
-        target: Target<'_>,
+        buffers: &BlobBuffers<'_>,
+        view: &BlobView<'_>,
+        count: BlobCount<'_>,
         packet: &Packet,
-        s: &Settings,
+        target: Target<'_>,
     ) -> Result<()> {
-        let (kept, is_new) = match self.now {
-            Step::Nothing(_) => return Ok(()),
-            Step::Made { kept, .. } => (kept, true),
-            Step::Reused { kept, .. } => (kept, false),
+        let (layer, is_new) = match &self.now {
+            LayerUse::None(_) => return Ok(()),
+            LayerUse::Made { layer, .. } => (layer, true),
+            LayerUse::Reused { layer, .. } => (layer, false),
         };
-        let lists = [&b.entries, &self.members, &self.far, &self.near];
-        self.pass.record_part(rec, lists, packet.n_drawn, is_new.then_some(kept.last_key))?;
+        let LayerBuffers { texels, members, far, near } = &self.buffers;
+        let part = PartBuffers { entries: buffers.entries, members, far, near };
+        let last_key = is_new.then_some(layer.last_key);
+        self.pass.record_part(rec, part, packet.n_drawn, last_key)?;
         if is_new {
-            self.record_shell(
-                rec,
-                path,
-                b,
-                &kept,
-                (RecordCount::Known(packet.n_drawn), s.n_solid_facets),
-                s,
-            )?;
+            let (camera, saturated) = (&layer.camera, saturation_bound(FORMAT));
+            let view = BlobView { camera, saturated, ..*view };
+            let buffers = BlobBuffers { entries: far, ..*buffers };
+            self.target.record_blobs(rec, 0, false, &buffers, &view, count)?;
+            self.target.record_copy(rec, 0, texels);
         }
-        let texels = match (&self.tiling, &self.sprites) {
-            (Some(tiling), _) if path == DrawPath::Tiles => &tiling.pictures[0],
-            (_, Some(of)) => &of.texels,
-            _ => return Err(no_shells()),
-        };
-        let now = view_of(&packet.camera);
-        let shown = Shown {
-            to_shell: kept.shell.homography(&now),
-            tangents: [now.tangents, kept.shell.view.tangents],
-            size: self.keeper.rules.shell_size,
-            bounds: kept.bounds,
-            depth: (f64::from(packet.camera.near) / kept.depth) as f32,
-        };
-        self.pass.record_show(rec, texels, target, &shown)
-    }
-
-    /// Draws what is far.
-    fn record_shell(
-        &mut self,
-        rec: &mut Recorder<'_>,
-        path: DrawPath,
-        b: &Buffers,
-        kept: &Kept,
-        counts: (RecordCount<'_>, u32),
-        s: &Settings,
-    ) -> Result<()> {
-        let buffers = b.of_sprites_from(&self.far);
-        let (cutoff, threshold) = (s.cutoff, s.threshold);
-        match (path, &self.tiling, &mut self.sprites) {
-            (DrawPath::Tiles, Some(tiling), _) => {
-                let view = View {
-                    camera: &kept.camera,
-                    cutoff,
-                    threshold,
-                    saturated: saturated(FilmFormat::Rgba32f),
-                };
-                tiling.record(rec, 0, None, buffers, &view, counts)
-            }
-            (_, _, Some(OfSprites { sprites, image, texels })) => {
-                sprites.record(
-                    rec,
-                    buffers,
-                    Target::color(image),
-                    &kept.camera,
-                    [cutoff, threshold],
-                    counts,
-                )?;
-                rec.copy_image(image, texels);
-                Ok(())
-            }
-            _ => Err(no_shells()),
-        }
+        let view = layer_view(layer, packet, self.cache.rules.layer_size);
+        self.pass.record_show(rec, texels, target, &view)
     }
 }
 
-fn no_shells() -> Error {
-    Error::usage("nothing that draws the shells was made")
+/// Returns how `layer` appears to the camera of `packet`.
+fn layer_view(layer: &CachedLayer, packet: &Packet, size: [u32; 2]) -> LayerView {
+    let now = view_of(&packet.camera);
+    LayerView {
+        to_layer: layer.shell.homography(&now),
+        view_tangents: now.tangents,
+        layer_tangents: layer.shell.view.tangents,
+        size,
+        bounds: layer.bounds,
+        depth: (f64::from(packet.camera.near) / layer.depth) as f32,
+    }
 }

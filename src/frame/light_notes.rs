@@ -1,12 +1,14 @@
-//! Sentences about a frame's light that a user should know of: values that are not finite, negative
-//! radiance, sources that were lost.
+//! Sentences about defects of a frame's light that a user should know of.
 
 use super::stage::Stage;
 use crate::error::Result;
 use crate::model::scene::LightingMode;
 
-/// What the last frame's light has that a reader should know: radiances that are negative or no
-/// numbers, and pairs that stayed too wide. Nothing for most scenes.
+/// Returns sentences about negative, infinite or NaN radiances of the last frame, lost sources, and
+/// pairs of facets that stayed too wide; none for most scenes.
+///
+/// # Errors
+/// Fails if a frame is in flight or the device is lost.
 pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
     if stage.scene.lighting.mode == LightingMode::None {
         return Ok(vec![]);
@@ -25,16 +27,15 @@ pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
             lit.iter().flat_map(|l| l.first.iter().chain(&l.second)).copied().fold(0.0, f32::min);
         notes.push(format!(
             "the radiance of {n_negative} facets is negative, {least:.3e} at the least: the lobes' \
-             basis is cut off; more \
-             lighting.bases bring it nearer to 0"
+             basis is cut off; more lighting.bases bring it nearer to 0"
         ));
     }
     let n_lost: f64 = lit.iter().map(|l| f64::from(l.n_lost)).sum();
     if n_lost > 0.0 {
         notes.push(format!(
-            "{n_lost:.0} sources were not looked at in the turns that loops may take, and their \
-             light is missing from L2; fewer \
-             facets a surface or cloud, a greater lighting.theta or broader lobes need fewer"
+            "{n_lost:.0} sources were not visited within the iterations that loops may take, and \
+             their light is missing from L2; fewer facets a surface or cloud, a greater \
+             lighting.theta or broader lobes need fewer"
         ));
     }
     let unresolved: Vec<_> = lit.iter().filter(|l| l.n_unresolved > 0.0).collect();
@@ -43,15 +44,14 @@ pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
         let most = unresolved.iter().map(|l| f64::from(l.unresolved)).fold(0.0, f64::max);
         let most = match most.is_finite() {
             true => format!("by up to {most:.3e}"),
-            false => "by an amount that is not known (there is no bound on light that was left \
-                out, or in tensors)"
+            false => "by an unknown amount (there is no bound on light that was left out, or in \
+                tensors)"
                 .to_owned(),
         };
         let brightest = lit.iter().flat_map(|l| l.second).map(f64::from).fold(0.0, f64::max);
         notes.push(format!(
             "{n_pairs} pairs of {} facets stayed wider than lighting.pair_size asks for: L2 may be \
-             off {most} \
-             there (the greatest L2 is {brightest:.3e}); finer `subdivide` or more \
+             off {most} there (the greatest L2 is {brightest:.3e}); finer `subdivide` or more \
              lighting.pair_levels resolve them",
             unresolved.len()
         ));

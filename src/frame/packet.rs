@@ -1,5 +1,5 @@
-//! All that the render step needs to know of one frame, and the only thing that crosses from game
-//! to render thread.
+//! The data of one frame that the game step hands to the render step. Nothing else crosses between
+//! their threads.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -11,59 +11,66 @@ use crate::layout::facet::{RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 
+/// The state of a scene at a frame's time.
 #[derive(Debug, Clone)]
 pub struct Packet {
+    /// Number of the frame.
     pub i_frame: u32,
+    /// Time of the scene, in seconds.
     pub time_s: f64,
-    /// When the game step began.
+    /// Time at which the game step began.
     pub begin: Instant,
-    /// How long it took.
+    /// Duration of the game step, in ms.
     pub game_ms: f64,
+    /// The camera.
     pub camera: CameraRecord,
+    /// The groups of particles.
     pub groups: Vec<GroupRecord>,
-    /// What of each group is drawn.
+    /// The drawn part of each group.
     pub drawn: Vec<DrawnRecord>,
-    /// Particles that are drawn.
+    /// Number of drawn particles.
     pub n_drawn: u32,
-    /// Gusts of all clouds, one after the other; none where the game thread moves the particles.
+    /// Gusts of all clouds; empty if the game thread moves the particles.
     pub modes: Vec<ModeRecord>,
-    /// Discs at this time; none where the game thread moves the particles.
+    /// The discs; empty if the game thread moves the particles.
     pub discs: Vec<DiscRecord>,
-    /// Every particle relative to its group, where the game thread moves the particles and some are
-    /// of discs.
-    pub lived: Option<Vec<ParticleRecord>>,
-    /// Every particle's place, where the game thread moves the particles.
+    /// Every particle relative to its group, if the game thread recomputes particles.
+    pub live: Option<Vec<ParticleRecord>>,
+    /// Every particle's place, if the game thread moves the particles.
     pub placed: Option<Vec<PlacedRecord>>,
-    /// Where each region's Morton cells lie.
+    /// Bounds of the Morton cells of each region.
     pub bounds: Vec<RegionBoundsRecord>,
-    /// Surfaces, then clouds, with their materials at this time.
+    /// Surfaces, terrains and clouds with their materials.
     pub regions: Vec<RegionRecord>,
-    /// The lobe of every material at this time as the basis has it, then the basis' vectors;
-    /// N_NODES numbers each.
+    /// The lobe of every material in the basis, then the basis' vectors; N_NODES numbers each.
     pub table: Arc<Vec<f32>>,
-    /// C of every column of the tensors at this time; empty where no material is edited.
+    /// C of every column of the tensors; empty if no material is edited.
     pub coefficients: Vec<[f32; 4]>,
+    /// The lights.
     pub lights: Vec<LightRecord>,
+    /// The density grid.
     pub grid: GridRecord,
-    /// Bounds every blob's mass κ (2π)^{3/2} σ³.
+    /// Bound of every blob's mass κ (2π)^{3/2} σ³.
     pub heaviest: f64,
-    /// Bounds |view depth| relative to the lighting origin.
+    /// Bound of |view depth| relative to the lighting origin.
     pub radius: f64,
-    /// Of the sort's keys: 16 or 32.
+    /// Bits of a sort key: 16 or 32.
     pub sort_bits: u32,
-    /// Where each group's particles are, where what is far may be shown from a picture of it; else
-    /// none.
+    /// Extent of each group; empty without impostors.
     pub extents: Vec<Extent>,
 }
 
-/// Where a group's particles are.
+/// The region of space that a group's particles are in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
-    /// Relative to the lighting origin; their centres are within ± half of it.
+    /// Center of the particles' positions, relative to the lighting origin.
     pub center: DVec3,
+    /// The positions are within ± half of the center.
     pub half: DVec3,
-    /// In the direction that they are widest in; and the mean of the narrowest.
+    /// Greatest σ along any axis.
     pub sigma_max: f64,
+    /// Mean σ along the shortest axis.
     pub sigma_mean: f64,
+    /// Number of particles.
     pub n_particles: u32,
 }

@@ -1,10 +1,9 @@
-//! Game step and render step side by side: a thread plays, one draws, one waits for the device. An
-//! owned packet a frame crosses, through bounded channels, and there is no lock that two of them
-//! take.
+//! Game step and render step in parallel: one thread plays, one draws, one waits for the device.
+//! Each frame's packet is moved through a bounded channel; no two threads share a lock.
 //!
-//! A frame's game step may begin when the second frame before it has ended. So the device has the
-//! next frame at hand, recorded while it draws, wherever game step and recording take less than it
-//! does; and a picture is never older than two frames.
+//! A frame's game step begins when the second frame before it has ended. The device then has its
+//! next frame at hand while it draws, unless game step and recording take longer than drawing; and
+//! a picture is never older than two frames.
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -12,30 +11,33 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{Builder, Scope};
 use std::time::Instant;
 
-use super::feed::IN_FLIGHT;
 use super::game::Game;
 use super::packet::Packet;
-use super::render::Renderer;
-use super::{OnFrame, Started};
+use super::renderer::Renderer;
+use super::staging::IN_FLIGHT;
+use super::times::{FrameStart, OnFrame};
 use crate::error::{Error, Result};
 use crate::gpu::Submission;
 
-/// What the drawing thread is told.
+/// A message to the drawing thread.
 enum Event {
     Packet(Box<Packet>),
-    /// The oldest frame in flight was finished at this time.
+    /// The oldest frame in flight ended at this time.
     Ended(Instant),
-    /// There is no further frame; an error where there should have been one.
+    /// The game thread has no further frame, or failed to make one.
     Played(Result<()>),
-    /// The device, or a thread: nothing more will end.
+    /// The device or a thread failed: no further frame will end.
     Failed(Error),
 }
 
-/// Room for all that can be told at once, so that nobody who tells has to wait: a packet and an end
-/// for each frame in flight, and how either thread ends.
+/// Capacity for all events at once, so that no sender waits: a packet and an end for each frame in
+/// flight, and the end of either thread.
 const EVENTS: usize = 2 * IN_FLIGHT + 2;
 
-/// Runs `frames`; `on_frame` sees each as it ends. An error or panic on either side ends both.
+/// Runs `frames` and calls `on_frame` with each as it ends. An error or panic of a thread ends all.
+///
+/// # Errors
+/// Fails if a step or `on_frame` fails, or a thread panics.
 pub fn run(
     game: &mut Game,
     renderer: &mut Renderer,
@@ -43,36 +45,32 @@ pub fn run(
     on_frame: &mut OnFrame<'_>,
 ) -> Result<()> {
     let drawn = std::thread::scope(|scope| {
-        let (tell, events) = sync_channel::<Event>(EVENTS);
+        let (events_in, events) = sync_channel::<Event>(EVENTS);
         let (grant, granted) = sync_channel::<()>(IN_FLIGHT);
         let (submit, submitted) = sync_channel::<Submission>(IN_FLIGHT);
-        let teller = tell.clone();
-        start(scope, "game", tell.clone(), move || play(game, frames, &granted, &teller))?;
-        let teller = tell.clone();
-        start(scope, "wait", tell, move || wait(&submitted, &teller))?;
+        let sender = events_in.clone();
+        start(scope, "game", events_in.clone(), move || play(game, frames, &granted, &sender))?;
+        let sender = events_in.clone();
+        start(scope, "wait", events_in, move || wait(&submitted, &sender))?;
         for _ in 0..IN_FLIGHT {
-            // There is room for as many.
+            // The channel has room for as many.
             let _ = grant.send(());
         }
-        // What is still owned here ends with this block, and with it both threads.
-        Drawing {
-            renderer: &mut *renderer,
-            grant,
-            submit,
-            started: VecDeque::new(),
-            under_way: VecDeque::new(),
-        }
-        .run(&events, on_frame)
+        // The channel ends that this value owns are dropped at the end of the block, which ends
+        // both threads.
+        let (started, under_way) = (VecDeque::new(), VecDeque::new());
+        DrawingThread { renderer: &mut *renderer, grant, submit, started, under_way }
+            .run(&events, on_frame)
     });
     renderer.drain();
     drawn
 }
 
-/// Starts a thread whose panic is told as an error.
+/// Starts a thread whose panic is sent as an error.
 fn start<'scope>(
     scope: &'scope Scope<'scope, '_>,
     name: &'static str,
-    tell: SyncSender<Event>,
+    events: SyncSender<Event>,
     work: impl FnOnce() + Send + 'scope,
 ) -> Result<()> {
     let guarded = move || {
@@ -81,8 +79,8 @@ fn start<'scope>(
             let text = text
                 .or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()))
                 .unwrap_or_default();
-            // Nobody listens when the drawing thread has ended.
-            let _ = tell.send(Event::Failed(Error::Fault {
+            // Sending fails only after the drawing thread has ended, which makes the error moot.
+            let _ = events.send(Event::Failed(Error::Fault {
                 what: format!("the {name} thread panicked: {text}"),
             }));
         }
@@ -91,15 +89,15 @@ fn start<'scope>(
     started.map(|_| ()).map_err(|e| Error::vulkan(format!("starting the {name} thread"), e))
 }
 
-/// The game thread: a step for every grant.
+/// Runs the game thread: a step for every grant.
 fn play(
     game: &mut Game,
     frames: impl Iterator<Item = u32>,
     granted: &Receiver<()>,
-    tell: &SyncSender<Event>,
+    events: &SyncSender<Event>,
 ) {
     for i_frame in frames {
-        // The other side has ended where it grants nothing any more, or hears nothing.
+        // Receiving fails after the drawing thread has ended.
         if granted.recv().is_err() {
             return;
         }
@@ -107,56 +105,56 @@ fn play(
             .step(i_frame)
             .map_or_else(|e| Event::Played(Err(e)), |packet| Event::Packet(Box::new(packet)));
         let is_last = matches!(event, Event::Played(_));
-        if tell.send(event).is_err() || is_last {
+        if events.send(event).is_err() || is_last {
             return;
         }
     }
-    let _ = tell.send(Event::Played(Ok(())));
+    let _ = events.send(Event::Played(Ok(())));
 }
 
-/// The waiting thread: tells when each submission was finished.
-fn wait(submitted: &Receiver<Submission>, tell: &SyncSender<Event>) {
+/// Runs the waiting thread: sends the time at which each submission ended.
+fn wait(submitted: &Receiver<Submission>, events: &SyncSender<Event>) {
     while let Ok(pending) = submitted.recv() {
         let event = pending.wait().map_or_else(Event::Failed, |()| Event::Ended(Instant::now()));
-        if tell.send(event).is_err() {
+        if events.send(event).is_err() {
             return;
         }
     }
 }
 
-/// The drawing thread, which is the caller's.
-struct Drawing<'a> {
+/// The state of the drawing thread, which is the caller's.
+struct DrawingThread<'a> {
     renderer: &'a mut Renderer,
     grant: SyncSender<()>,
     submit: SyncSender<Submission>,
-    started: VecDeque<Started>,
-    /// Of the same frames.
+    started: VecDeque<FrameStart>,
+    /// Submissions of the same frames.
     under_way: VecDeque<Submission>,
 }
 
-impl Drawing<'_> {
+impl DrawingThread<'_> {
     fn run(mut self, events: &Receiver<Event>, on_frame: &mut OnFrame<'_>) -> Result<()> {
         let (mut last_end, mut played) = (Instant::now(), None);
         while played.is_none() || !self.started.is_empty() {
-            // Nobody tells anything any more: both threads have ended, and said so before.
+            // Receiving fails after both threads have ended, and both send an event before.
             let Ok(event) = events.recv() else { break };
             match event {
                 Event::Packet(packet) => {
-                    let mut started = Started::of(&packet, 0);
+                    let mut start = FrameStart::new(&packet);
                     let pending = self.renderer.begin(*packet)?;
                     for before in &self.under_way {
-                        started.queue_depth += u32::from(!before.is_done()?);
+                        start.queue_depth += u32::from(!before.is_done()?);
                     }
-                    self.started.push_back(started);
+                    self.started.push_back(start);
                     self.under_way.push_back(pending.clone());
-                    // There is room for every frame in flight; a waiting thread that is gone has
-                    // told why.
+                    // The channel has room for every frame in flight. Sending fails after the
+                    // waiting thread has ended, which has sent its error.
                     let _ = self.submit.send(pending);
                 }
                 Event::Ended(end) => {
-                    let Some(started) = self.started.pop_front() else { continue };
+                    let Some(start) = self.started.pop_front() else { continue };
                     self.under_way.pop_front();
-                    let times = started.ended(self.renderer.end()?, end, &mut last_end);
+                    let times = start.end(self.renderer.end()?, end, &mut last_end);
                     if !on_frame(times, self.renderer)? {
                         return Ok(());
                     }

@@ -1,17 +1,18 @@
-//! What a renderer reads back for those who ask between frames: pictures, particles, facets.
+//! Readback between frames: pictures, particles, facets.
 
 use tracing::info_span;
 
-use super::buffers::download;
-use super::render::Renderer;
-use crate::error::{Error, Result};
+use super::buffers::SceneBuffers;
+use super::renderer::Renderer;
+use super::staging::download;
+use crate::error::Result;
 use crate::gpu::TargetFormat;
 use crate::gpu::{Buffer, Device, Recorder};
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::boxes::MAX_ATTEMPTS;
 
-/// The numbers of a picture as it lies in a target.
+/// Returns the numbers of a picture from its bytes in a target.
 pub(super) fn floats(format: TargetFormat, bytes: Vec<u8>) -> Vec<f32> {
     match format {
         TargetFormat::Rgba8 | TargetFormat::Bgra8 => {
@@ -26,72 +27,115 @@ pub(super) fn floats(format: TargetFormat, bytes: Vec<u8>) -> Vec<f32> {
 }
 
 impl Renderer {
-    /// The last frame's pixels: premultiplied linear RGBA, rows from the top.
+    /// Returns the last frame's pixels: premultiplied linear RGBA, rows from the top.
+    ///
+    /// # Errors
+    /// Fails if the device is lost.
     pub fn image(&mut self) -> Result<Vec<f32>> {
-        Ok(floats(self.settings.format, self.image_bytes()?))
+        Ok(floats(self.passes.constants.format, self.image_bytes()?))
     }
 
-    /// The last frame as it lies in the target: what "the same bytes" means.
+    /// Returns the last frame's bytes in the target, the measure of "same bytes".
+    ///
+    /// # Errors
+    /// Fails if the device is lost.
     pub fn image_bytes(&mut self) -> Result<Vec<u8>> {
+        self.bytes_of_picture(self.i_ended_picture)
+    }
+
+    /// Returns the bytes of one of the pictures.
+    pub(super) fn bytes_of_picture(&mut self, i: usize) -> Result<Vec<u8>> {
         let _zone = info_span!("read back").entered();
-        let Renderer { host, drawing, readback, traits, i_ended_picture, settings, .. } = self;
+        let Renderer { host, passes, readback, .. } = self;
         host.run(|rec| {
-            drawing.record_read(rec, traits.path, *i_ended_picture, readback);
+            passes.picture.record_copy(rec, i, readback);
             Ok(())
         })?;
-        readback.read(settings.n_bytes() as usize)
+        readback.read(passes.constants.n_bytes() as usize)
     }
 
-    /// Copies the picture of the last frame that ended, as it lies in the target: premultiplied
-    /// linear RGBA, rows from the top.
+    /// Copies the last ended frame's picture: premultiplied linear RGBA in the target's format,
+    /// rows from the top.
     pub fn record_picture(&mut self, rec: &mut Recorder<'_>, to: &Buffer) {
-        self.drawing.record_read(rec, self.traits.path, self.i_ended_picture, to);
+        self.passes.picture.record_copy(rec, self.i_ended_picture, to);
     }
 
-    /// The buffer that holds it already, where one does: until the second frame from now begins.
+    /// Returns the buffer that holds the last ended frame's picture, valid until the second frame
+    /// from now begins; `None` if an image holds it.
     pub fn picture(&self) -> Option<&Buffer> {
-        self.drawing.picture(self.traits.path, self.i_ended_picture)
+        self.passes.picture.buffer(self.i_ended_picture)
     }
 
-    /// Format of that, and its bytes.
+    /// Returns the format of a picture and its bytes.
     pub fn picture_format(&self) -> (TargetFormat, u64) {
-        (self.settings.format, self.settings.n_bytes())
+        (self.passes.constants.format, self.passes.constants.n_bytes())
     }
 
-    /// Runs `generate` alone and gives the particles relative to their groups, and each one's
-    /// status.
+    /// Runs `generate` alone and returns the particles relative to their groups, and the status of
+    /// each.
+    ///
+    /// # Errors
+    /// Fails if the device is lost.
     pub fn generate_now(&mut self, device: &Device) -> Result<(Vec<ParticleRecord>, Vec<u32>)> {
-        let n = self.settings.n_particles;
-        let (generate, b) = (&self.generate, &self.buffers);
-        if self.traits.has_boxes {
-            self.host.run(|rec| {
-                generate.record(
-                    rec,
-                    [&b.boxes, &b.i_group, &b.particles, &b.status],
-                    n,
-                    MAX_ATTEMPTS,
-                )
-            })?;
+        let (passes, n) = (&self.passes, self.passes.constants.n_particles);
+        let (b, generate) = (&passes.buffers, &passes.generate);
+        if passes.features.has_boxes {
+            let buffers = [&b.boxes, &b.i_group, &b.particles, &b.status];
+            self.host.run(|rec| generate.record(rec, buffers, [0, n], MAX_ATTEMPTS))?;
         }
-        let particles = download(device, &mut self.host, &self.buffers.particles, n)?;
-        Ok((particles, download(device, &mut self.host, &self.buffers.status, n)?))
+        let particles = download(device, &mut self.host, &b.particles, n)?;
+        Ok((particles, download(device, &mut self.host, &b.status, n)?))
     }
 
-    /// Each particle's status as `generate` left it; 0 where it is of no box. No frame may be in
-    /// flight.
+    /// Returns a number of records of a shared buffer.
+    fn read<T: bytemuck::Pod>(
+        &mut self,
+        device: &Device,
+        buffer: fn(&SceneBuffers) -> &Buffer,
+        n: u32,
+    ) -> Result<Vec<T>> {
+        self.check_idle()?;
+        download(device, &mut self.host, buffer(&self.passes.buffers), n)
+    }
+
+    /// Returns each particle's status after `generate`; 0 for particles that come from no box.
+    ///
+    /// # Errors
+    /// Fails if a frame is in flight or the device is lost.
     pub fn status(&mut self, device: &Device) -> Result<Vec<u32>> {
-        self.check_alone()?;
-        download(device, &mut self.host, &self.buffers.status, self.settings.n_particles)
+        self.read(device, |b| &b.status, self.passes.constants.n_particles)
     }
 
-    /// Every particle relative to its group, as it lies there. No frame may be in flight.
+    /// Returns every particle relative to its group.
+    ///
+    /// # Errors
+    /// Fails if a frame is in flight or the device is lost.
     pub fn particles(&mut self, device: &Device) -> Result<Vec<ParticleRecord>> {
-        self.check_alone()?;
-        download(device, &mut self.host, &self.buffers.particles, self.settings.n_particles)
+        self.read(device, |b| &b.particles, self.passes.constants.n_particles)
     }
 
-    /// What a pass that does nothing measures on the device, ns: median of several. None without
-    /// timestamps.
+    /// Returns every particle's place in the last frame, relative to its lighting origin.
+    ///
+    /// # Errors
+    /// Fails if a frame is in flight or the device is lost.
+    pub fn placed(&mut self, device: &Device) -> Result<Vec<PlacedRecord>> {
+        self.read(device, |b| &b.placed, self.passes.constants.n_particles)
+    }
+
+    /// Returns the last frame's facets and their light, which is meaningful only in a lit scene.
+    ///
+    /// # Errors
+    /// Fails if a frame is in flight or the device is lost.
+    pub fn facets(&mut self, device: &Device) -> Result<(Vec<FacetRecord>, Vec<LitRecord>)> {
+        let n = self.passes.constants.march.n_facets;
+        Ok((self.read(device, |b| &b.facets, n)?, self.read(device, |b| &b.lit, n)?))
+    }
+
+    /// Returns the median duration that the device measures for an empty pass, in ns; `None`
+    /// without timestamps.
+    ///
+    /// # Errors
+    /// Fails if the device is lost.
     pub fn empty_scope_ns(&mut self) -> Result<Option<f64>> {
         const N_SCOPES: usize = 15;
         let scopes =
@@ -99,26 +143,5 @@ impl Renderer {
         let mut ns: Vec<f64> = scopes.iter().map(|s| s.end_ns - s.begin_ns).collect();
         ns.sort_by(f64::total_cmp);
         Ok(ns.get(ns.len() / 2).copied())
-    }
-
-    /// Of frames in flight nobody knows which one's would be read.
-    pub(super) fn check_alone(&self) -> Result<()> {
-        if self.in_flight.is_empty() { Ok(()) } else { Err(Error::usage("frames are in flight")) }
-    }
-
-    /// Where the last frame had the particles, relative to its lighting origin. No frame may be in
-    /// flight.
-    pub fn placed(&mut self, device: &Device) -> Result<Vec<PlacedRecord>> {
-        self.check_alone()?;
-        download(device, &mut self.host, self.buffers.placed.buffer(), self.settings.n_particles)
-    }
-
-    /// The last frame's facets and their light; only meaningful where the scene is lit. No frame
-    /// may be in flight.
-    pub fn facets(&mut self, device: &Device) -> Result<(Vec<FacetRecord>, Vec<LitRecord>)> {
-        self.check_alone()?;
-        let n = self.settings.n_facets;
-        let facets = download(device, &mut self.host, &self.buffers.facets, n)?;
-        Ok((facets, download(device, &mut self.host, &self.buffers.lit, n)?))
     }
 }

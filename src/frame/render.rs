@@ -1,428 +1,339 @@
-//! The render step: the whole frame on one page.
+//! The whole frame on one page: every dispatch and draw call in order, with its buffers.
 
-use std::collections::VecDeque;
-use std::time::Instant;
-
-use tracing::info_span;
-
-use super::buffers::{Buffers, Placed, has_second};
-use super::culling::{Culling, record_sort};
-use super::drawing::Drawing;
-use super::exchange::gathers_from_tree;
-use super::feed::IN_FLIGHT;
-use super::grouping::{Grouping, is_grouped};
-use super::lives::Lives;
+use super::buffers::SceneBuffers;
+use super::culling::{cull_order, cull_view};
+use super::frame_passes::FramePasses;
+use super::gather::GatherScratch;
+use super::live::LiveParticles;
+use super::morton_sort::{KEY_BITS, MortonBuffers, MortonSort, RunBuffers};
 use super::packet::Packet;
-use super::plan::{Pass, Plan, Traits, pass, plan};
-use super::relay::Relay;
-use super::settings::Settings;
-use super::tensor::{TensorStage, tensor_stage};
-use super::{limits, ms};
-use crate::error::{Error, Result};
-use crate::gpu::{
-    Barriers, Buffer, Commands, Compiler, Device, MemoryUsage, ScopeTime, Submission,
-};
+use super::plan::{Pass, Plan};
+use super::tensors::{TensorBuffers, bright_lights};
+use crate::error::Result;
+use crate::gpu::{RecordCount, Recorder};
+use crate::layout::cull::KeptRecord;
 use crate::model::boxes::MAX_ATTEMPTS;
-use crate::model::scene::{LightingMode, Scene, Simulate};
-use crate::passes::facets::Facets;
-use crate::passes::first::{First, Push as FirstPush};
-use crate::passes::generate::Generate;
-use crate::passes::grid::Grid;
-use crate::passes::place::Place as PlacePass;
-use crate::passes::sort::Sort;
-use crate::passes::texture::Texture;
-use crate::passes::transmit::Transmit;
+use crate::passes::blobs::{BlobBuffers, BlobCount};
+use crate::passes::contract::ContractBuffers;
+use crate::passes::cull::CullBuffers;
+use crate::passes::facets;
+use crate::passes::first::{self, FirstBuffers, FirstTensorBuffers};
+use crate::passes::morton;
+use crate::passes::place::PlaceBuffers;
+use crate::passes::second::{MergePush, SourcesPush};
+use crate::passes::sort::{Count, Depths, DeviceCount};
+use crate::passes::transmit::TransmitBuffers;
 
-// Commands first: they are dropped first, and wait for what is still under way.
-pub struct Renderer {
-    /// One for each frame in flight.
-    frames: [Commands; IN_FLIGHT],
-    /// For what is asked between frames.
-    pub(super) host: Commands,
-    pub(super) in_flight: VecDeque<InFlight>,
-    pub(super) generate: Generate,
-    /// None where there are no discs.
-    lives: Option<Lives>,
-    place: PlacePass,
-    pub(super) grid: Grid,
-    facets: Facets,
-    grouping: Option<Grouping>,
-    transmit: Transmit,
-    first: First,
-    second: Option<Relay>,
-    tensor: Option<TensorStage>,
-    /// None where nothing is left out.
-    pub(super) culling: Option<Culling>,
-    pub(super) sort: Sort,
-    /// None where no cloud has a texture.
-    texture: Option<Texture>,
-    pub(super) buffers: Buffers,
-    pub(super) drawing: Drawing,
-    /// Which picture the last ended frame drew.
-    pub(super) i_ended_picture: usize,
-    pub(super) readback: Buffer,
-    pub(super) settings: Settings,
-    pub(super) traits: Traits,
-    pub(super) last: Option<Packet>,
-    /// Frames submitted so far.
-    n_begun: u64,
-    /// When the last one ended.
-    last_end: Instant,
-    /// A frame went wrong on its way.
-    pub(super) failed: bool,
+/// Records a pass under its timer label if the plan runs it.
+fn pass(
+    rec: &mut Recorder<'_>,
+    plan: &Plan,
+    pass: Pass,
+    f: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
+) -> Result<()> {
+    if plan.runs(pass) { rec.scope(pass.name(), f) } else { Ok(()) }
 }
 
-/// A frame that was submitted and has not been waited for.
-pub(super) struct InFlight {
-    slot: usize,
-    i_picture: usize,
-    plan: Plan,
-    recorded: [Instant; 2],
-    submitted: Instant,
-}
-
-/// What a render step tells of itself.
-pub struct Rendered {
-    pub plan: Plan,
-    /// When uploading, planning and recording began, and ended.
-    pub recorded: [Instant; 2],
-    /// When the device had been handed them.
-    pub submitted: Instant,
-    pub wait_ms: f64,
-    pub passes: Vec<ScopeTime>,
-    /// Particles that the device kept, where it was asked to.
-    pub n_kept: Option<u32>,
-}
-
-impl Renderer {
-    /// Checks the scene against the device's limits, then makes every pipeline and buffer it needs.
-    /// `skip`: leave out what a frame does not need. What is "auto" changes nothing until it is
-    /// chosen.
-    pub fn new(
-        device: &Device,
-        compiler: &Compiler,
-        scene: &Scene,
-        skip: bool,
-    ) -> Result<Renderer> {
-        let free = device.limits().device_memory_bytes - limits::check(scene, device.limits())?;
-        let scene = &*scene.exact();
-        let groups = scene.groups();
-        let n_particles = scene.n_particles() as u32;
-        let settings = Settings::of(scene);
-        let host_places = scene.threads.simulate == Simulate::Cpu;
-        let mut host = Commands::new(device, "frame.host")?;
-        let (tensors, tensor) = tensor_stage(device, compiler, &mut host, scene, free)?;
-        let two_reflections = scene.lighting.mode == LightingMode::TwoReflection;
-        // Tensors hold every pair.
-        let tree = tensor.is_none() && gathers_from_tree(scene);
-        let second = match two_reflections {
-            true => Some(Relay::new(device, compiler, &mut host, scene, tree)?),
-            false => None,
-        };
-        let grouped = is_grouped(scene);
-        let grouping = match grouped {
-            true => Some(Grouping::new(device, compiler, &mut host, scene)?),
-            false => None,
-        };
-        let textured = scene.is_textured();
-        let texture = textured.then(|| Texture::new(device, compiler)).transpose()?;
-        let mut renderer = Renderer {
-            frames: [Commands::new(device, "frame.even")?, Commands::new(device, "frame.odd")?],
-            host,
-            in_flight: VecDeque::with_capacity(IN_FLIGHT),
-            generate: Generate::new(device, compiler)?,
-            lives: Lives::of_scene(device, compiler, scene)?,
-            place: PlacePass::new(device, compiler)?,
-            grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
-            facets: Facets::new(device, compiler, scene.has_ellipsoids())?,
-            grouping,
-            transmit: Transmit::new(
-                device,
-                compiler,
-                has_second(scene),
-                &scene.lighting.sums.into(),
-            )?,
-            first: First::new(device, compiler)?,
-            second,
-            tensor,
-            culling: Culling::of_scene(device, compiler, scene)?,
-            sort: Sort::new(device, compiler, n_particles)?,
-            texture,
-            buffers: Buffers::new(device, scene, &groups, host_places)?,
-            drawing: Drawing::new(device, compiler, scene, settings.format)?,
-            i_ended_picture: 0,
-            readback: Buffer::new::<u8>(
-                device,
-                "film.readback",
-                settings.n_bytes(),
-                MemoryUsage::Readback,
-            )?,
-            settings,
-            traits: Traits::of(scene, tensors, skip),
-            last: None,
-            n_begun: 0,
-            last_end: Instant::now(),
-            failed: false,
-        };
-        renderer.buffers.fill(device, &mut renderer.host, scene, &groups)?;
-        Ok(renderer)
-    }
-
-    /// Draws one frame and waits for it.
-    pub fn step(&mut self, packet: Packet) -> Result<Rendered> {
-        self.begin(packet)?.wait()?;
-        self.end()
-    }
-
-    /// Uploads, records and submits a frame, and gives what can be waited for. At most
-    /// [`IN_FLIGHT`] frames may have begun and not ended.
-    pub fn begin(&mut self, packet: Packet) -> Result<Submission> {
-        if self.failed {
-            return Err(Error::usage(
-                "a frame has failed: what the device holds is not known any more",
-            ));
+impl FramePasses {
+    /// Records the frame of `packet`, whose data is in the staging buffers of `slot`.
+    pub fn record(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        slot: usize,
+        packet: &Packet,
+        plan: &Plan,
+    ) -> Result<()> {
+        self.record_copies(rec, slot);
+        self.record_particles(rec, slot, packet, plan)?;
+        self.record_facets(rec, packet, plan)?;
+        self.record_light(rec, packet, plan)?;
+        self.record_picture(rec, packet, plan)?;
+        if let Some(culling) = &self.culling {
+            rec.copy(&self.buffers.kept, &culling.counts.counts.0[slot]);
         }
-        if self.in_flight.len() == IN_FLIGHT {
-            return Err(Error::usage(format!(
-                "{IN_FLIGHT} frames are in flight; one must end before the next begins"
-            )));
+        Ok(())
+    }
+
+    /// Copies the host's data of the frame to where shaders read it.
+    fn record_copies(&self, rec: &mut Recorder<'_>, slot: usize) {
+        self.buffers.record_copies(rec, slot);
+        if let Some(runs) = &self.runs {
+            runs.sort.record_copies(rec, slot);
         }
-        // Until all of it has gone well the device and what is remembered of it may differ.
-        self.failed = true;
-        let pending = self.submit(packet)?;
-        self.failed = false;
-        Ok(pending)
-    }
-
-    fn submit(&mut self, packet: Packet) -> Result<Submission> {
-        let begin = Instant::now();
-        let _zone = info_span!("render step").entered();
-        let plan = info_span!("plan").in_scope(|| {
-            let plan = plan(&self.traits, self.last.as_ref(), &packet);
-            self.drawing.decide(plan, &packet)
-        });
-        let slot = (self.n_begun % IN_FLIGHT as u64) as usize;
-        if plan.runs(Pass::Surfaces)
-            || plan.runs(Pass::Terrain)
-            || plan.runs(Pass::Sprites)
-            || plan.runs(Pass::Tiles)
-        {
-            self.drawing.turn();
+        if let Some(LiveParticles::Device { buffers, .. }) = &self.live {
+            buffers.discs.record_copy(rec, slot);
         }
-        info_span!("upload").in_scope(|| self.write(slot, &packet))?;
-        self.record(slot, &packet, &plan)?;
-        let recorded = [begin, Instant::now()];
-        let pending = self.frames[slot].submit()?;
-        let (i_picture, submitted) = (self.drawing.i_picture(), Instant::now());
-        self.in_flight.push_back(InFlight { slot, i_picture, plan, recorded, submitted });
-        self.n_begun += 1;
-        self.last = Some(packet);
-        Ok(pending)
-    }
-
-    /// Waits for the oldest frame in flight and gives what it tells.
-    pub fn end(&mut self) -> Result<Rendered> {
-        let frame =
-            self.in_flight.pop_front().ok_or_else(|| Error::usage("no frame is in flight"))?;
-        self.failed = true;
-        let passes = self.frames[frame.slot].wait()?;
-        self.failed = false;
-        self.i_ended_picture = frame.i_picture;
-        let now = Instant::now();
-        // What was waited for the frame before is that one's.
-        let wait_ms = ms(frame.submitted.max(std::mem::replace(&mut self.last_end, now)), now);
-        let InFlight { plan, recorded, submitted, .. } = frame;
-        let n_kept = self.culling.as_ref().map(|c| c.n_kept(frame.slot)).transpose()?;
-        Ok(Rendered { plan, recorded, submitted, wait_ms, passes, n_kept })
-    }
-
-    /// Waits for every frame in flight, of which nothing is wanted.
-    pub fn drain(&mut self) {
-        // What went wrong was or will be told by whoever asks for a frame.
-        while !self.in_flight.is_empty() && self.end().is_ok() {}
-        self.in_flight.clear();
-    }
-
-    /// Forgets the last frame: the next one does everything, as the first did.
-    pub fn reset(&mut self) {
-        (self.last, self.traits.made) = (None, false);
-    }
-
-    /// Whether the next frames leave out what they do not need.
-    pub fn set_skip(&mut self, skip: bool) {
-        self.traits.skip = skip;
-    }
-
-    /// From the next frame on as if everything moved in each: what a run makes once is kept, all
-    /// else is done anew.
-    pub fn move_all(&mut self) {
-        (self.traits.skip, self.traits.keeps_made) = (false, true);
-    }
-
-    fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
-        self.buffers.write(slot, packet)?;
-        if let Some(lives) = &mut self.lives {
-            lives.write(slot, packet)?;
+        if let Some(order) = self.gather.as_ref().and_then(|gather| gather.order.as_ref()) {
+            order.record_copies(rec, slot);
         }
-        if let Some(grouping) = &mut self.grouping {
-            grouping.write(slot, packet)?;
+        if let Some(tensors) = &self.tensors {
+            tensors.buffers.coefficients.record_copy(rec, slot);
         }
-        if let Some(second) = &mut self.second {
-            second.write(slot, packet)?;
-        }
-        match &mut self.tensor {
-            Some(tensor) => tensor.write(slot, packet),
+    }
+
+    /// Generates and places the particles, and deposits them in the density grid.
+    fn record_particles(
+        &self,
+        rec: &mut Recorder<'_>,
+        slot: usize,
+        packet: &Packet,
+        plan: &Plan,
+    ) -> Result<()> {
+        let FramePasses { generate, live, place, placed_uploads, grid, constants: c, .. } = self;
+        let SceneBuffers {
+            boxes, i_group, particles, status, groups, modes, placed, density, ..
+        } = &self.buffers;
+        let n = c.n_particles;
+        pass(rec, plan, Pass::Generate, |rec| {
+            generate.record(rec, [boxes, i_group, particles, status], [0, n], MAX_ATTEMPTS)
+        })?;
+        pass(rec, plan, Pass::Live, |rec| match live {
+            Some(LiveParticles::Device { live, buffers, counts }) => {
+                let mut discs = (0..).zip(counts).filter(|(_, n)| **n > 0);
+                discs.try_for_each(|(i, n)| live.record(rec, [&buffers.discs, particles], i, *n))
+            }
+            Some(LiveParticles::Host(uploads)) => {
+                rec.copy(&uploads.particles.0[slot], particles);
+                Ok(())
+            }
             None => Ok(()),
-        }
+        })?;
+        pass(rec, plan, Pass::Place, |rec| match placed_uploads {
+            Some(uploads) => {
+                uploads.placed.record_copy(rec, slot, placed);
+                Ok(())
+            }
+            None => {
+                place.record(rec, &PlaceBuffers { particles, i_group, groups, modes, placed }, n)
+            }
+        })?;
+        pass(rec, plan, Pass::Grid, |rec| {
+            grid.record(rec, [placed, particles, density], &packet.grid, n, packet.heaviest)
+        })
     }
 
-    /// The frame, pass by pass.
-    fn record(&mut self, slot: usize, packet: &Packet, plan: &Plan) -> Result<()> {
-        let Renderer {
-            generate,
-            lives,
-            place,
-            grid,
+    /// Places the facets.
+    fn record_facets(&self, rec: &mut Recorder<'_>, packet: &Packet, plan: &Plan) -> Result<()> {
+        let FramePasses { runs, facets: pass_facets, constants: c, .. } = self;
+        let SceneBuffers {
+            placed,
+            particles,
+            i_group,
+            groups,
+            density,
+            regions,
+            i_region,
+            ground,
             facets,
-            grouping,
-            transmit,
-            first,
-            second,
-            tensor,
-            culling,
-            sort,
-            texture,
-            buffers: b,
-            drawing,
-            settings: s,
-            frames,
+            i_facet,
             ..
-        } = self;
-        let n = s.n_particles;
-        frames[slot].record(Barriers::Placed, |rec| {
-            b.record_feeds(rec, slot);
-            grouping.iter().for_each(|g| g.record_feeds(rec, slot));
-            lives.iter().for_each(|l| l.record_feeds(rec, slot));
-            second.iter().for_each(|s| s.record_feeds(rec, slot));
-            tensor.iter().for_each(|t| t.record_feeds(rec, slot));
-            pass(rec, plan, Pass::Generate, |rec| {
-                generate.record(
-                    rec,
-                    [&b.boxes, &b.i_group, &b.particles, &b.status],
-                    n,
-                    MAX_ATTEMPTS,
-                )
-            })?;
-            pass(rec, plan, Pass::Live, |rec| {
-                lives.iter().try_for_each(|l| l.record(rec, slot, &b.particles))
-            })?;
-            pass(rec, plan, Pass::Place, |rec| match &b.placed {
-                Placed::ByHost(feed) => {
-                    feed.record(rec, slot);
-                    Ok(())
+        } = &self.buffers;
+        let n = c.n_particles;
+        pass(rec, plan, Pass::Morton, |rec| {
+            let Some(runs) = runs else { return Ok(()) };
+            let MortonSort { morton, sort, buffers: MortonBuffers { entries, bounds } } =
+                &runs.sort;
+            let from = morton::ParticleBuffers { placed, i_group, groups, bounds, entries };
+            morton.record_particles(rec, &from, n, c.n_regions)?;
+            sort.record(rec, entries, KEY_BITS, Count::Known(n))?;
+            morton.record_order(rec, [entries, &runs.buffers.order], n)
+        })?;
+        pass(rec, plan, Pass::Facets, |rec| {
+            let (n_surface, n_solid) = (c.n_surface_facets, c.n_solid_facets);
+            match runs {
+                Some(of) => {
+                    let RunBuffers { order, runs } = &of.buffers;
+                    let buffers = facets::RunBuffers {
+                        placed,
+                        particles,
+                        i_group,
+                        groups,
+                        density,
+                        order,
+                        runs,
+                        facets,
+                        i_facet,
+                    };
+                    pass_facets.record_runs(rec, &buffers, &packet.grid, of.n_runs, n_solid)?;
                 }
-                Placed::ByDevice(placed) => place.record(
-                    rec,
-                    [&b.particles, &b.i_group, &b.groups.buffer, &b.modes.buffer, placed],
-                    n,
-                ),
-            })?;
-            let placed = b.placed.buffer();
-            pass(rec, plan, Pass::Grid, |rec| {
-                grid.record(
-                    rec,
-                    [placed, &b.particles, &b.density],
-                    &packet.grid,
-                    n,
-                    packet.heaviest,
-                )
-            })?;
-            pass(rec, plan, Pass::Morton, |rec| {
-                grouping.as_ref().map_or(Ok(()), |g| g.record_order(rec, b))
-            })?;
-            pass(rec, plan, Pass::Facets, |rec| {
-                match grouping {
-                    Some(grouping) => grouping.record_facets(rec, facets, b, packet)?,
-                    None => {
-                        let buffers = [
-                            placed,
-                            &b.particles,
-                            &b.i_group,
-                            &b.groups.buffer,
-                            &b.density,
-                            &b.facets,
-                        ];
-                        facets.record(rec, buffers, &packet.grid, n, s.n_solid_facets)?;
-                    }
+                None => {
+                    let buffers = facets::ParticleBuffers {
+                        placed,
+                        particles,
+                        i_group,
+                        groups,
+                        density,
+                        facets,
+                    };
+                    pass_facets.record(rec, &buffers, &packet.grid, n, n_solid)?;
                 }
-                let n_surface_facets = s.n_surface_facets;
-                facets.record_surfaces(
-                    rec,
-                    [&b.regions.buffer, &b.i_region, &b.facets],
-                    n_surface_facets,
-                )?;
-                let n_ground = s.n_solid_facets - n_surface_facets;
-                facets.record_terrain(
-                    rec,
-                    [&b.regions.buffer, &b.ground, &b.facets],
-                    n_ground,
-                    n_surface_facets,
-                )
-            })?;
-            pass(rec, plan, Pass::Transmit, |rec| {
-                let buffers = [
-                    &b.facets,
-                    &b.lights.buffer,
-                    &b.regions.buffer,
-                    &b.density,
-                    &b.transmittance,
-                    &b.through,
-                ];
-                transmit.record(
-                    rec,
-                    buffers,
-                    &packet.grid,
-                    [s.n_facets, s.n_lights, s.n_surfaces],
-                    s.step_cells,
-                    s.forward,
-                )
-            })?;
-            pass(rec, plan, Pass::First, |rec| {
-                if let Some(tensor) = tensor {
-                    return tensor.record_first(rec, b, packet, s);
+            }
+            pass_facets.record_surfaces(rec, [regions, i_region, facets], n_surface)?;
+            let n_ground = n_solid - n_surface;
+            pass_facets.record_terrain(rec, [regions, ground, facets], n_ground, n_surface)
+        })
+    }
+
+    /// Lights the facets.
+    fn record_light(&self, rec: &mut Recorder<'_>, packet: &Packet, plan: &Plan) -> Result<()> {
+        let FramePasses { transmit, first, tensors, constants: c, .. } = self;
+        let SceneBuffers {
+            facets,
+            lights,
+            regions,
+            density,
+            transmittance,
+            through,
+            table,
+            lit,
+            ..
+        } = &self.buffers;
+        pass(rec, plan, Pass::Transmit, |rec| {
+            let buffers =
+                TransmitBuffers { facets, lights, regions, density, transmittance, through };
+            transmit.record(rec, &buffers, &packet.grid, &c.march)
+        })?;
+        pass(rec, plan, Pass::First, |rec| match tensors {
+            Some(tensors) => {
+                let t1 = &tensors.buffers.t1;
+                let buffers =
+                    FirstTensorBuffers { facets, lights, transmittance, regions, table, t1, lit };
+                tensors.first.record(rec, &buffers, &tensors.first_push(packet, c))
+            }
+            None => {
+                let (eye, n_facets) = (packet.camera.eye, c.march.n_facets);
+                let push = first::Push { eye, n_facets, n_lights: c.march.n_lights };
+                let buffers = FirstBuffers { facets, lights, transmittance, regions, table, lit };
+                first.record(rec, &buffers, &push)
+            }
+        })?;
+        pass(rec, plan, Pass::Second, |rec| self.record_second(rec, packet, plan))?;
+        pass(rec, plan, Pass::Contract, |rec| {
+            let Some(tensors) = tensors else { return Ok(()) };
+            let TensorBuffers { t1, t2, spans, coefficients } = &tensors.buffers;
+            let buffers =
+                ContractBuffers { facets, lights, regions, coefficients, t1, t2, spans, lit };
+            tensors.contract.record(rec, &buffers, &tensors.contract_push(c))
+        })
+    }
+
+    /// Gathers the second reflection: at once, or light by light into the tensor T2.
+    fn record_second(&self, rec: &mut Recorder<'_>, packet: &Packet, plan: &Plan) -> Result<()> {
+        let FramePasses { gather, tensors, buffers: b, constants: c, .. } = self;
+        let Some(gather) = gather else { return Ok(()) };
+        let (n_facets, n_lights) = (c.march.n_facets, c.march.n_lights);
+        let n_surfaces = c.march.n_surfaces;
+        // The order follows from the facets alone.
+        if let Some(order) = gather.order.as_ref().filter(|_| plan.runs(Pass::Facets)) {
+            let MortonSort { morton, sort, buffers: MortonBuffers { entries, bounds } } = order;
+            morton.record_facets(rec, [&b.facets, bounds, entries], n_facets, c.n_regions)?;
+            sort.record(rec, entries, KEY_BITS, Count::Known(n_facets))?;
+            morton.record_order(rec, [entries, &gather.places], n_facets)?;
+        }
+        // Sources send the same light wherever the eye is.
+        if !plan.view_only() {
+            let push = SourcesPush { n_facets, n_lights, n_surfaces };
+            gather.second.record_sources(rec, &gather.source_buffers(b), &push)?;
+            let GatherScratch { sources, fluxes, .. } = &gather.sources;
+            for (i_first, n_merges) in gather.heights.iter().copied() {
+                let push = MergePush { i_first, n_merges, n_lights };
+                let buffers = [&gather.merges, &gather.nodes, sources, fluxes];
+                gather.second.record_merge(rec, buffers, &push)?;
+            }
+        }
+        for range in gather.blocks(plan.view_only()) {
+            let blocks = (range.receivers, range.n);
+            let Some(tensors) = tensors else {
+                let buffers = gather.gather_buffers(b, &gather.nodes, &b.lit);
+                rec.copy(&gather.rounds_at_rest, &gather.rounds);
+                for push in gather.pushes(packet, range) {
+                    gather.second.record(rec, &buffers, &push, blocks)?;
                 }
-                let from = [
-                    &b.facets,
-                    &b.lights.buffer,
-                    &b.transmittance,
-                    &b.regions.buffer,
-                    &b.table.buffer,
-                    &b.lit,
-                ];
-                let push = FirstPush {
-                    eye: packet.camera.eye,
-                    n_facets: s.n_facets,
-                    n_lights: s.n_lights,
-                };
-                first.record(rec, from, &push)
+                continue;
+            };
+            let Some(second) = &tensors.second else { continue };
+            let buffers = gather.gather_buffers(b, &b.lit, &tensors.buffers.t2);
+            for (k, i_light) in bright_lights(&packet.lights).enumerate() {
+                rec.copy(&gather.rounds_at_rest, &gather.rounds);
+                for push in gather.pushes(packet, range) {
+                    let push = tensors.second_push(&push, i_light, k == 0);
+                    second.record(rec, &buffers, &push, blocks)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Selects and sorts the particles, and draws the picture.
+    pub fn record_picture(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        packet: &Packet,
+        plan: &Plan,
+    ) -> Result<()> {
+        let FramePasses { culling, sort, texture, picture, buffers: b, constants: c, .. } = self;
+        let SceneBuffers { placed, particles, i_group, drawn, entries, kept, .. } = &*b;
+        let (blob_camera, blob_size) = picture.blob_camera(&packet.camera, c);
+        pass(rec, plan, Pass::Cull, |rec| {
+            let Some(culling) = culling else { return Ok(()) };
+            let buffers = CullBuffers { placed, particles, i_group, drawn, entries, kept };
+            let view = cull_view(&blob_camera, blob_size, packet, c);
+            culling.cull.record(rec, &buffers, &view, &cull_order(packet), c.n_particles)
+        })?;
+        pass(rec, plan, Pass::Sort, |rec| {
+            let (n_bits, n_drawn) = (packet.sort_bits, packet.n_drawn);
+            if culling.is_some() {
+                let (i_count, i_groups) = (KeptRecord::I_COUNT, KeptRecord::I_SORT);
+                let n = Count::Counted(DeviceCount { buffer: kept, i_count, i_groups });
+                return sort.record(rec, entries, n_bits, n).map(|_| ());
+            }
+            let (forward, radius) = (packet.camera.forward, packet.radius);
+            let depths = Depths { forward, radius, n_bits };
+            sort.record_keys(rec, [placed, i_group, drawn, entries], &depths, c.n_particles)?;
+            sort.record(rec, entries, n_bits, Count::Known(n_drawn)).map(|_| ())
+        })?;
+        pass(rec, plan, Pass::Texture, |rec| {
+            texture.iter().try_for_each(|texture| texture.record(rec, &b.pool, c.texture_seed))
+        })?;
+
+        let (i, camera) = (picture.i, &packet.camera);
+        for draws in [Pass::Surfaces, Pass::Terrain] {
+            pass(rec, plan, draws, |rec| {
+                if let (Some(solids), Some(target)) = (&picture.solids, picture.full.target(i)) {
+                    solids.record(rec, draws, b, target, camera)?;
+                }
+                let mut low_res = picture.low_res.iter_mut();
+                low_res.try_for_each(|low_res| low_res.record_solids(rec, draws, b, camera))
             })?;
-            pass(rec, plan, Pass::Second, |rec| match second {
-                Some(second) => second.record(rec, plan, b, packet, tensor.as_ref()),
-                None => Ok(()),
+        }
+
+        let n = if culling.is_some() {
+            RecordCount::Indirect(kept)
+        } else {
+            RecordCount::Known(packet.n_drawn)
+        };
+        let count = BlobCount { n, i_first_facet: c.n_solid_facets };
+        let (view, all) = (c.view(camera), b.of_blobs());
+        pass(rec, plan, Pass::Impostors, |rec| {
+            match (&mut picture.impostors, picture.full.target(i)) {
+                (Some(impostors), Some(target)) => {
+                    impostors.record(rec, &all, &view, count, packet, target)
+                }
+                _ => Ok(()),
+            }
+        })?;
+        let layer = picture.impostors.as_ref().filter(|impostors| impostors.has_layer());
+        let entries = layer.map_or(all.entries, |layer| &layer.buffers.near);
+        let (blobs, has_layer) = (BlobBuffers { entries, ..all }, layer.is_some());
+        for draws in [Pass::Sprites, Pass::Tiles] {
+            pass(rec, plan, draws, |rec| match &mut picture.low_res {
+                Some(low_res) => low_res.record_blobs(rec, &blobs, &c.view(&blob_camera), count),
+                None => picture.full.record_blobs(rec, i, has_layer, &blobs, &view, count),
             })?;
-            pass(rec, plan, Pass::Contract, |rec| match tensor {
-                Some(tensor) => tensor.record_contract(rec, b, s),
-                None => Ok(()),
-            })?;
-            pass(rec, plan, Pass::Cull, |rec| {
-                culling.as_ref().map_or(Ok(()), |c| c.record(rec, b, (packet, drawing), s))
-            })?;
-            culling.iter().for_each(|c| c.record_count(rec, b, slot));
-            pass(rec, plan, Pass::Sort, |rec| record_sort(rec, sort, b, packet, s))?;
-            pass(rec, plan, Pass::Texture, |rec| {
-                texture.iter().try_for_each(|t| t.record(rec, &b.pool, s.texture_seed))
-            })?;
-            drawing.record(rec, plan, b, packet, s)
+        }
+        pass(rec, plan, Pass::Upsample, |rec| match &mut picture.low_res {
+            Some(low_res) => low_res.record_upsample(rec, i, &mut picture.full),
+            None => Ok(()),
         })
     }
 }

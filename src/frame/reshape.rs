@@ -1,13 +1,15 @@
-//! A player's scene with other boxes: only particles that follow from what has changed are
+//! Replaces a player's scene by one with other boxes: only particles of changed boxes are
 //! generated.
 
 use std::sync::Arc;
 
-use super::buffers::{Buffers, box_records, textured_records, upload};
+use super::buffers::n_cells;
+use super::features::is_thin;
 use super::limits;
-use super::render::Renderer;
-use super::stage::{Bed, Player};
-use super::tiling::is_thin;
+use super::player::Player;
+use super::records::upload_groups;
+use super::renderer::Renderer;
+use super::stage::GpuContext;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Device, MemoryUsage};
 use crate::layout::particle::ParticleRecord;
@@ -15,38 +17,42 @@ use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::{Cloud, CloudSource, Group};
 use crate::model::scene::{Scene, Simulate};
 
-/// What became of a player's buffers and pipelines.
+/// How a player's buffers and pipelines have followed an edit of boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reshaped {
-    /// They are those that were there.
+    /// They were kept.
     InPlace,
-    /// Boxes have other numbers of particles, or there are more or fewer of them: made anew, and
-    /// particles that are the same were copied.
+    /// They were replaced, because the number of boxes or of their particles has changed. Unchanged
+    /// particles were copied.
     Anew,
 }
 
-/// A run of particles: its first there, its first here, and how many they are.
+/// A range of particles that two scenes share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Kept {
-    there: u32,
-    here: u32,
+struct SharedRange {
+    i_old: u32,
+    i_new: u32,
     n: u32,
 }
 
 impl Player {
-    /// Goes on with `scene`, which is as the player's but for boxes and seeds of clouds that are
-    /// made from boxes; what its `draw` says was settled when the player was made. `touched`:
-    /// numbers of `scene`'s groups, rising, whose particles follow from something that changed; all
-    /// others are taken to be as they were relative to their boxes' centres. The next frame is like
-    /// a first one, but that nothing is generated in it; a [`Renderer::reset`] before it takes that
-    /// back. To be called between runs. An error leaves the player as it was, but where the device
-    /// fails.
+    /// Continues with `scene`, which differs from the player's only in boxes and seeds of clouds
+    /// made from boxes. Its `draw` is replaced by the player's.
+    ///
+    /// `touched` has the indices of `scene`'s groups, rising, whose particles may change; all
+    /// others must be unchanged relative to their boxes' centers. The next frame runs every pass
+    /// except `generate`, unless [`Renderer::reset`] is called before it. No run may be under way.
+    ///
+    /// # Errors
+    /// Fails if the scenes differ otherwise, an index is wrong, or the new scene exceeds a limit of
+    /// the device. The player then stays as it was, unless the device has failed.
     pub fn reshape(
         &mut self,
-        bed: &Bed,
+        context: &GpuContext,
         scene: impl Into<Arc<Scene>>,
         touched: &[usize],
     ) -> Result<Reshaped> {
+        let device = &context.device;
         let mut scene: Arc<Scene> = scene.into();
         if scene.draw != self.scene.draw {
             Arc::make_mut(&mut scene).draw = self.scene.draw;
@@ -56,7 +62,8 @@ impl Player {
                 "only boxes and seeds may differ from the scene that is played",
             ));
         }
-        self.renderer.check_ready()?;
+        self.renderer.check_not_failed()?;
+        self.renderer.check_idle()?;
         let groups = scene.groups();
         if !touched.is_sorted() || touched.iter().any(|i| *i >= groups.len()) {
             return Err(Error::usage(format!(
@@ -64,29 +71,27 @@ impl Player {
                 groups.len()
             )));
         }
-        limits::check(&scene, bed.device.limits())?;
+        limits::check(&scene, device.limits())?;
         let old_groups = self.scene.groups();
-        let is_same_size = old_groups.len() == groups.len()
-            && old_groups
-                .iter()
-                .zip(&groups)
-                .all(|(a, b)| (a.i_cloud, a.n_particles) == (b.i_cloud, b.n_particles));
+        let size = |g: &Group| (g.i_cloud, g.n_particles);
+        let is_same_size = old_groups.iter().map(size).eq(groups.iter().map(size));
         let reshaped = if is_same_size && is_thin(&self.scene) == is_thin(&scene) {
-            self.renderer.make_room(&bed.device, &scene)?;
-            self.renderer.reshape(&bed.device, &scene, &groups, touched)?;
+            self.renderer.grow_grid(device, &scene)?;
+            self.renderer.replace_groups(device, &scene, &groups, touched)?;
             Reshaped::InPlace
         } else {
-            let mut renderer =
-                Renderer::new(&bed.device, bed.compiler(), &scene, self.renderer.traits.skip)?;
-            renderer.traits.keeps_made = self.renderer.traits.keeps_made;
-            let kept = kept((&self.scene.clouds, &old_groups), (&scene.clouds, &groups), touched);
-            renderer.adopt(&mut self.renderer, &groups, (&kept, touched))?;
+            let skipping = self.renderer.skipping;
+            let mut renderer = Renderer::new(device, context.compiler(), &scene, skipping.is_on)?;
+            renderer.skipping.keeps_made = skipping.keeps_made;
+            let shared =
+                shared_ranges((&self.scene.clouds, &old_groups), (&scene.clouds, &groups), touched);
+            renderer.adopt(&mut self.renderer, &groups, &shared, touched)?;
             self.renderer = renderer;
             Reshaped::Anew
         };
         let rest = match scene.threads.simulate {
             Simulate::Gpu => None,
-            Simulate::Cpu => Some(self.renderer.at_rest(&bed.device)?),
+            Simulate::Cpu => Some(self.renderer.particles_at_rest(device)?),
         };
         self.game.replay(scene.clone(), rest);
         self.scene = scene;
@@ -95,192 +100,148 @@ impl Player {
 }
 
 impl Renderer {
-    /// No frame is in flight and none has failed.
-    fn check_ready(&self) -> Result<()> {
-        match self.failed {
-            true => {
-                Err(Error::usage("a frame has failed: what the device holds is not known any more"))
-            }
-            false => self.check_alone(),
-        }
-    }
-
-    /// Whether the particles of boxes lie there, and the pool of textures.
-    fn is_made(&self) -> bool {
-        self.last.is_some() || self.traits.made
-    }
-
-    /// Boxes that move may give the density grid other proportions, and with them more cells.
-    fn make_room(&mut self, device: &Device, scene: &Scene) -> Result<()> {
-        let n = limits::n_cells_max(scene);
-        if n <= self.grid.room() {
+    /// Reallocates the density grid if moved boxes need more cells.
+    fn grow_grid(&mut self, device: &Device, scene: &Scene) -> Result<()> {
+        let (n, passes) = (n_cells(scene), &mut self.passes);
+        if n <= passes.grid.capacity() {
             return Ok(());
         }
-        // A drag goes on as it began: twice as many, so that few of its steps come here; a cube has
-        // room for any.
+        // Twice as many, so that few steps of a drag reallocate; a cube has room for any.
         let side = u64::from(scene.lighting.grid);
         let n = (2 * n).min(side * side * side).max(n);
         let density = Buffer::new::<f32>(device, "grid.density", n, MemoryUsage::Device)?;
-        self.grid.make_room(device, n)?;
-        self.buffers.density = density;
+        passes.grid.set_capacity(device, n)?;
+        passes.buffers.density = density;
         Ok(())
     }
 
-    fn reshape(
+    /// Uploads other boxes of the same sizes and generates the particles of `touched` ones.
+    fn replace_groups(
         &mut self,
         device: &Device,
         scene: &Scene,
         groups: &[Group],
         touched: &[usize],
     ) -> Result<()> {
-        // Until all of it has gone well nobody knows whose particles lie there.
+        // Reset by `restart`: until then boxes and particles may not belong together.
         self.failed = true;
-        upload(device, &mut self.host, &box_records(scene, groups), &self.buffers.boxes)?;
-        if self.traits.textured {
-            upload(
-                device,
-                &mut self.host,
-                &textured_records(scene, groups),
-                &self.buffers.textured,
-            )?;
-        }
+        upload_groups(device, &mut self.host, scene, groups, &self.passes.buffers)?;
         let is_made = self.is_made();
         if is_made {
-            self.generate_runs(groups, touched)?;
+            self.generate_groups(groups, touched)?;
         }
-        (self.last, self.traits.made, self.failed) = (None, is_made, false);
+        self.restart(is_made);
         Ok(())
     }
 
-    /// Takes what is the same from another renderer's buffers, and generates the rest; nothing
-    /// where that has none yet.
+    /// Copies shared particles and the pool of textures from another renderer and generates the
+    /// others; does nothing if that renderer has not drawn yet.
     fn adopt(
         &mut self,
         from: &mut Renderer,
         groups: &[Group],
-        (kept, touched): (&[Kept], &[usize]),
+        shared: &[SharedRange],
+        touched: &[usize],
     ) -> Result<()> {
         if !from.is_made() {
             return Ok(());
         }
-        let (old, new) = (&from.buffers, &self.buffers);
-        let pairs: [fn(&Buffers) -> &Buffer; 2] = [|b| &b.particles, |b| &b.status];
-        let of_record = [size_of::<ParticleRecord>() as u64, size_of::<u32>() as u64];
+        let (old, new) = (&from.passes.buffers, &self.passes.buffers);
+        let is_textured = self.passes.features.is_textured;
+        let runs = |record_bytes: usize| -> Vec<[u64; 3]> {
+            let bytes = |n: u32| u64::from(n) * record_bytes as u64;
+            shared.iter().map(|s| [s.i_old, s.i_new, s.n].map(bytes)).collect()
+        };
         self.host.run(|rec| {
-            for (buffer, bytes) in pairs.iter().zip(of_record) {
-                let run = |k: &Kept| [k.there, k.here, k.n].map(|n| u64::from(n) * bytes);
-                rec.copy_runs(buffer(old), buffer(new), &kept.iter().map(run).collect::<Vec<_>>());
-            }
-            if self.traits.textured {
+            let particles = runs(size_of::<ParticleRecord>());
+            rec.copy_runs(&old.particles, &new.particles, &particles);
+            rec.copy_runs(&old.status, &new.status, &runs(size_of::<u32>()));
+            if is_textured {
                 rec.copy(&old.pool, &new.pool);
             }
             Ok(())
         })?;
-        self.generate_runs(groups, touched)?;
-        self.traits.made = true;
+        self.generate_groups(groups, touched)?;
+        self.skipping.is_made = true;
         Ok(())
     }
 
     /// Generates the particles of `touched` groups alone.
-    fn generate_runs(&mut self, groups: &[Group], touched: &[usize]) -> Result<()> {
-        let (generate, b) = (&self.generate, &self.buffers);
+    fn generate_groups(&mut self, groups: &[Group], touched: &[usize]) -> Result<()> {
+        let (generate, b) = (&self.passes.generate, &self.passes.buffers);
         let buffers = [&b.boxes, &b.i_group, &b.particles, &b.status];
-        let runs = runs(groups, touched);
+        let ranges = particle_ranges(groups, touched);
         self.host.run(|rec| {
-            runs.iter().try_for_each(|run| generate.record_run(rec, buffers, *run, MAX_ATTEMPTS))
+            ranges.iter().try_for_each(|range| generate.record(rec, buffers, *range, MAX_ATTEMPTS))
         })?;
         Ok(())
     }
 
-    /// Every particle relative to its group.
-    fn at_rest(&mut self, device: &Device) -> Result<Vec<ParticleRecord>> {
+    /// Returns every particle relative to its group.
+    fn particles_at_rest(&mut self, device: &Device) -> Result<Vec<ParticleRecord>> {
         if self.is_made() { self.particles(device) } else { Ok(self.generate_now(device)?.0) }
     }
 }
 
-/// First and number of the particles of `touched` groups, of neighbours together.
-fn runs(groups: &[Group], touched: &[usize]) -> Vec<[u32; 2]> {
-    let mut runs: Vec<[u32; 2]> = vec![];
+/// Returns first and number of the particles of `touched` groups; contiguous ranges are merged.
+fn particle_ranges(groups: &[Group], touched: &[usize]) -> Vec<[u32; 2]> {
+    let mut ranges: Vec<[u32; 2]> = vec![];
     for group in touched.iter().map(|i| &groups[*i]).filter(|g| g.n_particles > 0) {
-        match runs.last_mut() {
+        match ranges.last_mut() {
             Some([first, n]) if *first + *n == group.i_first => *n += group.n_particles,
-            _ => runs.push([group.i_first, group.n_particles]),
+            _ => ranges.push([group.i_first, group.n_particles]),
         }
     }
-    runs
+    ranges
 }
 
-/// What particles of boxes `new` has of `old`: those of boxes with the same number in the same
-/// cloud that are not touched.
-fn kept(
+/// Returns the ranges of particles that two scenes share: those of untouched boxes with the same
+/// index in the same cloud.
+fn shared_ranges(
     (old, old_groups): (&[Cloud], &[Group]),
     (new, groups): (&[Cloud], &[Group]),
     touched: &[usize],
-) -> Vec<Kept> {
-    let mut kept: Vec<Kept> = vec![];
-    let (mut i_there, mut i_here) = (0, 0);
+) -> Vec<SharedRange> {
+    let mut shared: Vec<SharedRange> = vec![];
+    let (mut i_old, mut i_new) = (0, 0);
     for (was, cloud) in old.iter().zip(new) {
-        let (n_there, n_here) = (was.n_groups() as usize, cloud.n_groups() as usize);
-        if matches!(cloud.source, CloudSource::Boxes { .. }) {
-            for i in
-                (0..n_there.min(n_here)).filter(|i| touched.binary_search(&(i_here + i)).is_err())
-            {
-                let (there, here) = (&old_groups[i_there + i], &groups[i_here + i]);
-                let run = Kept {
-                    there: there.i_first,
-                    here: here.i_first,
-                    n: there.n_particles.min(here.n_particles),
-                };
-                match kept.last_mut() {
-                    Some(k) if k.there + k.n == run.there && k.here + k.n == run.here => {
-                        k.n += run.n
-                    }
-                    _ => kept.push(run),
+        let (n_old, n_new) = (was.n_groups() as usize, cloud.n_groups() as usize);
+        let n_both = match cloud.source {
+            CloudSource::Boxes { .. } => n_old.min(n_new),
+            _ => 0,
+        };
+        for i in (0..n_both).filter(|i| touched.binary_search(&(i_new + i)).is_err()) {
+            let (old_group, group) = (&old_groups[i_old + i], &groups[i_new + i]);
+            let range = SharedRange {
+                i_old: old_group.i_first,
+                i_new: group.i_first,
+                n: old_group.n_particles.min(group.n_particles),
+            };
+            match shared.last_mut() {
+                Some(s) if (s.i_old + s.n, s.i_new + s.n) == (range.i_old, range.i_new) => {
+                    s.n += range.n
                 }
+                _ => shared.push(range),
             }
         }
-        (i_there, i_here) = (i_there + n_there, i_here + n_here);
+        (i_old, i_new) = (i_old + n_old, i_new + n_new);
     }
-    kept
+    shared
 }
 
-/// Whether all but boxes and seeds of clouds that are made from boxes is the same, and all of their
-/// `draw` that says what is drawn.
+/// Returns whether two scenes are the same except for titles, boxes, and seeds of clouds made from
+/// boxes.
 fn differs_in_boxes_alone(a: &Scene, b: &Scene) -> bool {
-    let Scene {
-        title: _,
-        film,
-        camera,
-        time,
-        lighting,
-        draw,
-        threads,
-        lights,
-        materials,
-        surfaces,
-        terrains,
-        clouds,
-        air,
-    } = a;
-    (film, camera, time, lighting, draw, threads)
-        == (&b.film, &b.camera, &b.time, &b.lighting, &b.draw, &b.threads)
-        && (lights, materials, surfaces, terrains, air)
-            == (&b.lights, &b.materials, &b.surfaces, &b.terrains, &b.air)
-        && clouds.len() == b.clouds.len()
-        && clouds.iter().zip(&b.clouds).all(|(a, b)| is_same_but_for_boxes(a, b))
-}
-
-fn is_same_but_for_boxes(a: &Cloud, b: &Cloud) -> bool {
-    let Cloud { source, position, wind, gust, growth, texture, i_material, facing, seed } = a;
-    let same_source = match (source, &b.source) {
-        (CloudSource::Boxes { boxes: _, law }, CloudSource::Boxes { boxes: _, law: b_law }) => {
-            law == b_law
+    let mut b = Scene { title: a.title.clone(), ..b.clone() };
+    for (cloud, of) in b.clouds.iter_mut().zip(&a.clouds) {
+        if let (CloudSource::Boxes { boxes, .. }, CloudSource::Boxes { boxes: of_a, .. }) =
+            (&mut cloud.source, &of.source)
+        {
+            boxes.clone_from(of_a);
+            cloud.seed = of.seed;
         }
-        (source, b_source) => source == b_source && *seed == b.seed,
-    };
-    same_source
-        && (position, wind, gust, growth) == (&b.position, &b.wind, &b.gust, &b.growth)
-        && (texture, i_material, facing) == (&b.texture, &b.i_material, &b.facing)
+    }
+    *a == b
 }
 
 #[cfg(test)]

@@ -3,11 +3,14 @@
 use std::time::Instant;
 
 use super::game::Game;
-use super::render::Renderer;
-use super::{OnFrame, Started};
+use super::renderer::Renderer;
+use super::times::{FrameStart, OnFrame};
 use crate::error::Result;
 
-/// Runs `frames`; `on_frame` sees each as it ends.
+/// Runs `frames` and calls `on_frame` with each as it ends.
+///
+/// # Errors
+/// Fails if a step or `on_frame` fails.
 pub fn run(
     game: &mut Game,
     renderer: &mut Renderer,
@@ -17,10 +20,9 @@ pub fn run(
     let mut last_end = Instant::now();
     for i_frame in frames {
         let packet = game.step(i_frame)?;
-        let started = Started::of(&packet, 0);
+        let start = FrameStart::new(&packet);
         let done = renderer.step(packet)?;
-        let times = started.ended(done, Instant::now(), &mut last_end);
-        if !on_frame(times, renderer)? {
+        if !on_frame(start.end(done, Instant::now(), &mut last_end), renderer)? {
             break;
         }
     }

@@ -1,32 +1,37 @@
-//! A scene on a device, ready to run.
+//! Devices on which scenes run.
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::choice::Choice;
-use super::choice::impostors::ImpostorChoice;
+use super::choice::{Choice, ImpostorChoice};
 use super::game::Game;
-use super::render::Renderer;
-use super::{OnFrame, parallel, serial};
+use super::player::Player;
+use super::renderer::Renderer;
+use super::times::OnFrame;
+use super::{parallel, serial};
 use crate::error::{Error, Result};
 use crate::gpu::{Compiler, Device, DeviceInfo, Instance, Sources};
-use crate::model::scene::{Impostors, Scene, Simulate, Threading};
+use crate::model::scene::{Scene, Threading};
 use crate::passes;
 
-/// How to open a device.
+/// How a device is opened.
 #[derive(Debug, Clone, Default)]
 pub struct DeviceChoice {
-    /// An index or a part of a name; the best device without.
+    /// An index or a part of a name; without, the best device.
     pub device: Option<String>,
-    /// Shaders to use in place of those built in.
+    /// A folder of shaders that replace the embedded ones.
     pub shaders: Option<PathBuf>,
+    /// Vulkan's validation layer is on.
     pub validation: bool,
-    /// Buffers are full of NaN until something is written to them.
+    /// New buffers are filled with NaN.
     pub poison: bool,
 }
 
 impl DeviceChoice {
-    /// The shaders that are to be used.
+    /// Returns the shaders to use.
+    ///
+    /// # Errors
+    /// Fails if the folder of shaders cannot be read.
     pub fn sources(&self) -> Result<Sources> {
         let sources = passes::sources();
         match &self.shaders {
@@ -36,124 +41,157 @@ impl DeviceChoice {
     }
 }
 
-/// A device on which any number of scenes can be made ready side by side.
-pub struct Bed {
+/// An open device and its shader compiler, on which any number of scenes can run side by side.
+pub struct GpuContext {
     compiler: Compiler,
+    /// The device.
     pub device: Device,
     instance: Arc<Instance>,
 }
 
-/// What a device holds of one scene.
-pub struct Player {
-    pub renderer: Renderer,
-    pub game: Game,
-    /// Its `draw` is what is drawn by: nothing in it is "auto".
-    pub scene: Arc<Scene>,
-    /// What every "auto" of the scene's `draw` came to.
-    pub choices: Vec<Choice>,
-    /// The same of its `draw.impostors`.
-    pub impostor_choice: Option<ImpostorChoice>,
-}
-
-impl Bed {
-    pub fn open(choice: &DeviceChoice) -> Result<Bed> {
-        Bed::with_sources(choice, choice.sources()?)
+impl GpuContext {
+    /// Opens a device.
+    ///
+    /// # Errors
+    /// Fails if there is no such device or the shaders cannot be read.
+    pub fn open(choice: &DeviceChoice) -> Result<GpuContext> {
+        GpuContext::with_sources(choice, choice.sources()?)
     }
 
-    /// With these shaders, whatever `choice` says of them.
-    pub fn with_sources(choice: &DeviceChoice, sources: Sources) -> Result<Bed> {
-        Bed::of_instance(Instance::new(choice.validation)?, choice, sources)
+    /// Opens a device with shaders in place of those of `choice`.
+    ///
+    /// # Errors
+    /// Fails if there is no such device.
+    pub fn with_sources(choice: &DeviceChoice, sources: Sources) -> Result<GpuContext> {
+        GpuContext::with_instance(Instance::new(choice.validation)?, choice, sources)
     }
 
-    /// The same on an instance that is there.
-    pub fn of_instance(
+    /// Opens a device of an existing instance.
+    ///
+    /// # Errors
+    /// Fails if there is no such device.
+    pub fn with_instance(
         instance: Arc<Instance>,
         choice: &DeviceChoice,
         sources: Sources,
-    ) -> Result<Bed> {
+    ) -> Result<GpuContext> {
         let device = Device::open(&instance, choice.device.as_deref())?;
         if choice.poison {
             device.poison();
         }
         let compiler = Compiler::new(sources, Compiler::default_cache())?;
-        Ok(Bed { compiler, device, instance })
+        Ok(GpuContext { compiler, device, instance })
     }
 
+    /// Returns the compiler.
     pub fn compiler(&self) -> &Compiler {
         &self.compiler
     }
 
-    /// What is made from now on is of these shaders; the compiler of those before.
+    /// Replaces the shaders of later players, and returns the previous compiler.
+    ///
+    /// # Errors
+    /// Fails if the compiler cannot be created.
     pub fn set_sources(&mut self, sources: Sources) -> Result<Compiler> {
         let compiler = Compiler::new(sources, Compiler::default_cache())?;
         Ok(std::mem::replace(&mut self.compiler, compiler))
     }
 
-    /// What is made from now on is compiled by this one.
+    /// Replaces the compiler of later players.
     pub fn set_compiler(&mut self, compiler: Compiler) {
         self.compiler = compiler;
     }
 
-    /// All that `scene` needs. `skip`: leave out what a frame does not need.
+    /// Makes everything that `scene` needs. With `skip`, frames skip passes whose input is
+    /// unchanged.
+    ///
+    /// # Errors
+    /// Fails if the scene exceeds a limit of the device or a shader does not compile.
     pub fn player(&self, scene: impl Into<Arc<Scene>>, skip: bool) -> Result<Player> {
-        player(&self.device, &self.compiler, scene.into(), skip)
+        Player::new(&self.device, &self.compiler, scene.into(), skip)
     }
 
-    /// Ends it, once all players are gone; an error where validation or the leak report had
-    /// anything to say.
+    /// Closes the device, after all its players are dropped.
+    ///
+    /// # Errors
+    /// Fails if the validation layer or the leak report has left messages.
     pub fn close(self) -> Result<()> {
-        let Bed { device, instance, .. } = self;
+        let GpuContext { device, instance, .. } = self;
         drop(device);
-        said(&instance)
+        let messages = instance.messages().take();
+        if messages.is_empty() {
+            return Ok(());
+        }
+        let n = messages.len();
+        Err(Error::Check {
+            what: format!("{n} validation messages or leaks:\n{}", messages.join("\n")),
+        })
     }
 }
 
+/// A device with one scene that is ready to run.
 // Fields drop in order: what lies on the device before the device.
 pub struct Stage {
+    /// The render side.
     pub renderer: Renderer,
+    /// The game side.
     pub game: Game,
-    /// Its `draw` is what is drawn by: nothing in it is "auto".
+    /// The scene; in its `draw` no knob is "auto".
     pub scene: Arc<Scene>,
-    /// What every "auto" of the scene's `draw` came to.
+    /// The values that "auto" knobs of the scene's `draw` have taken.
     pub choices: Vec<Choice>,
-    /// The same of its `draw.impostors`.
+    /// The choice of `draw.impostors`, if it is "auto".
     pub impostor_choice: Option<ImpostorChoice>,
     compiler: Compiler,
+    /// The device.
     pub device: Device,
     instance: Arc<Instance>,
 }
 
 impl Stage {
-    /// Opens a device and makes everything the scene needs on it. `skip`: leave out what a frame
-    /// does not need.
+    /// Opens a device and makes everything the scene needs on it. With `skip`, frames skip passes
+    /// whose input is unchanged.
+    ///
+    /// # Errors
+    /// Fails if there is no such device, the scene exceeds its limits, or a shader does not
+    /// compile.
     pub fn new(scene: impl Into<Arc<Scene>>, choice: &DeviceChoice, skip: bool) -> Result<Stage> {
-        Stage::build(scene.into(), skip, Bed::open(choice)?)
+        Stage::with_context(scene.into(), skip, GpuContext::open(choice)?)
     }
 
-    /// Another scene on the same device; what was there for this one is given back first.
+    /// Replaces the scene by another one on the same device; the buffers of this one are freed
+    /// first.
+    ///
+    /// # Errors
+    /// Fails as [`Stage::new`] does.
     pub fn again(self, scene: impl Into<Arc<Scene>>, skip: bool) -> Result<Stage> {
-        let Stage { renderer, game, compiler, device, instance, .. } = self;
-        drop((renderer, game));
-        Stage::build(scene.into(), skip, Bed { compiler, device, instance })
+        Stage::with_context(scene.into(), skip, self.into_context())
     }
 
-    fn build(scene: Arc<Scene>, skip: bool, bed: Bed) -> Result<Stage> {
-        let Player { renderer, game, scene, choices, impostor_choice } = bed.player(scene, skip)?;
-        let Bed { compiler, device, instance } = bed;
+    fn with_context(scene: Arc<Scene>, skip: bool, context: GpuContext) -> Result<Stage> {
+        let Player { renderer, game, scene, choices, impostor_choice } =
+            context.player(scene, skip)?;
+        let GpuContext { compiler, device, instance } = context;
         Ok(Stage { renderer, game, scene, choices, impostor_choice, compiler, device, instance })
     }
 
-    /// What every "auto" came to, as users are told, once.
-    pub fn take_chosen(&mut self) -> Vec<String> {
-        let choices = std::mem::take(&mut self.choices);
-        choices
-            .iter()
-            .map(Choice::text)
-            .chain(self.impostor_choice.take().map(|c| c.text()))
-            .collect()
+    fn into_context(self) -> GpuContext {
+        let Stage { renderer, game, compiler, device, instance, .. } = self;
+        drop((renderer, game));
+        GpuContext { compiler, device, instance }
     }
 
-    /// Runs `frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.
+    /// Returns sentences about the values that "auto" knobs have taken, once.
+    pub fn take_chosen(&mut self) -> Vec<String> {
+        let choices = std::mem::take(&mut self.choices);
+        let of_impostors = self.impostor_choice.take().map(|choice| choice.text());
+        choices.iter().map(Choice::text).chain(of_impostors).collect()
+    }
+
+    /// Runs `frames` from a fresh start and calls `on_frame` with each as it ends.
+    ///
+    /// # Errors
+    /// Fails if a step or `on_frame` fails, or a thread panics.
     pub fn run(
         &mut self,
         threading: Threading,
@@ -161,96 +199,29 @@ impl Stage {
         on_frame: &mut OnFrame<'_>,
     ) -> Result<()> {
         self.renderer.reset();
+        let (game, renderer) = (&mut self.game, &mut self.renderer);
         match threading {
-            Threading::Serial => serial::run(&mut self.game, &mut self.renderer, frames, on_frame),
-            Threading::Parallel => {
-                parallel::run(&mut self.game, &mut self.renderer, frames, on_frame)
-            }
+            Threading::Serial => serial::run(game, renderer, frames, on_frame),
+            Threading::Parallel => parallel::run(game, renderer, frames, on_frame),
         }
     }
 
-    /// Whether frames leave out what they do not need, from the next run on.
+    /// Sets whether frames skip passes whose input is unchanged, from the next run on.
     pub fn set_skip(&mut self, skip: bool) {
         self.renderer.set_skip(skip);
         self.game.set_culling(skip);
     }
 
+    /// Returns the device's name, type and driver.
     pub fn info(&self) -> &DeviceInfo {
         self.device.info()
     }
 
-    /// Ends the stage; an error where validation or the leak report had anything to say.
+    /// Frees everything and closes the device.
+    ///
+    /// # Errors
+    /// Fails if the validation layer or the leak report has left messages.
     pub fn close(self) -> Result<()> {
-        let Stage { renderer, game, device, instance, .. } = self;
-        drop((renderer, game));
-        drop(device);
-        said(&instance)
+        self.into_context().close()
     }
-}
-
-/// An error where validation or the leak report had anything to say.
-fn said(instance: &Instance) -> Result<()> {
-    let said = instance.messages().take();
-    if said.is_empty() {
-        return Ok(());
-    }
-    Err(Error::Check {
-        what: format!("{} validation messages or leaks:\n{}", said.len(), said.join("\n")),
-    })
-}
-
-fn player(device: &Device, compiler: &Compiler, scene: Arc<Scene>, skip: bool) -> Result<Player> {
-    match scene.draw.impostors {
-        Impostors::Auto => faster(device, compiler, &scene, skip),
-        _ => make(device, compiler, scene, skip),
-    }
-}
-
-/// Everything that `scene`, whose impostors are decided, needs on a device.
-fn make(device: &Device, compiler: &Compiler, mut scene: Arc<Scene>, skip: bool) -> Result<Player> {
-    let mut renderer = Renderer::new(device, compiler, &scene, skip)?;
-    let rest = match scene.threads.simulate {
-        Simulate::Gpu => None,
-        Simulate::Cpu => Some(renderer.generate_now(device)?.0),
-    };
-    let mut game = Game::new(scene.clone(), rest).culling(skip);
-    let (draw, choices) = renderer.choose(device, compiler, &scene, &mut game)?;
-    if draw != scene.draw {
-        Arc::make_mut(&mut scene).draw = draw;
-        game = game.drawn_by(scene.clone());
-    }
-    Ok(Player { renderer, game, scene, choices, impostor_choice: None })
-}
-
-/// `scene` with impostors or without, whichever draws its first frames faster.
-fn faster(device: &Device, compiler: &Compiler, scene: &Arc<Scene>, skip: bool) -> Result<Player> {
-    let with = |scene: &Arc<Scene>, impostors| {
-        let mut scene = Scene::clone(scene);
-        scene.draw.impostors = impostors;
-        Arc::new(scene)
-    };
-    let mut off = make(device, compiler, with(scene, Impostors::Off), skip)?;
-    if !skip {
-        // Where nothing is skipped there are none.
-        return Ok(off);
-    }
-    let off_ms = off.renderer.time_frames(&mut off.game)?;
-    // One at a time: both may not fit. What draws stays the same.
-    let Player { scene, choices, .. } = off;
-    let made = make(device, compiler, with(&scene, Impostors::On), skip).and_then(|mut on| {
-        let ms = on.renderer.time_frames(&mut on.game)?;
-        Ok((on, ms))
-    });
-    let (on, on_ms) = match made {
-        Ok((on, ms)) => (Some(on), Some(ms)),
-        // What does not fit is not used.
-        Err(Error::Limit { .. }) => (None, None),
-        Err(error) => return Err(error),
-    };
-    let chosen = ImpostorChoice { on: on_ms.is_some_and(|ms| ms < off_ms), off_ms, on_ms };
-    let made = match on.filter(|_| chosen.on) {
-        Some(on) => on,
-        None => make(device, compiler, scene, skip)?,
-    };
-    Ok(Player { choices, impostor_choice: Some(chosen), ..made })
 }

@@ -7,6 +7,7 @@
 
 mod barriers;
 mod buffer;
+mod buffers;
 mod call;
 mod clocks;
 mod commands;
@@ -36,6 +37,7 @@ mod validation;
 
 pub use barriers::Barriers;
 pub use buffer::{Buffer, MemoryUsage, storage_bytes};
+pub use buffers::{BufferSpec, DeclaredBuffer, buffers};
 pub use clocks::{ClockFit, ClockSample};
 pub use commands::{Commands, Submission};
 pub use device::Device;

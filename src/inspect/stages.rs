@@ -4,8 +4,8 @@ use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::frame::Stage;
 use crate::frame::plan::Pass;
-use crate::frame::stage::Stage;
 use crate::model::cloud::{CloudSource, Group, SIGMA_PER_RADIUS};
 use crate::model::frame_state::FrameState;
 use crate::model::scene::{LightingMode, Scene};

@@ -140,6 +140,11 @@ record! {
 }
 
 impl CameraRecord {
+    /// Returns the sides of a pixel of a `width` × `height` picture, as slopes.
+    pub fn pixel_slopes(&self, width: u32, height: u32) -> [f32; 2] {
+        [2.0 * self.tan_x / width as f32, 2.0 * self.tan_y / height as f32]
+    }
+
     /// Returns the record of a camera at `pose`. `light_origin` is subtracted from the eye in f64.
     pub fn new(camera: &Camera, pose: &Pose, film: &Film, light_origin: DVec3) -> Self {
         let tan_y = (0.5 * camera.fov_y_rad).tan();

@@ -1,11 +1,11 @@
-//! chunks: what `sprites` draws near to far, a chunk at a time; pixels that are full leave the rest
-//! out. Its time stands under `sprites`.
+//! chunks: draws blobs near to far in chunks, and skips pixels that are already opaque.
 //!
-//! In: sorted entries, far to near, and their number; the picture that chunks are composed in (four
-//! floats a pixel). Out: the entries near to far, by chunk, and each chunk's draw; depth 1 where
-//! the picture lets less through than may be left out; and the picture over what stands behind,
-//! premultiplied linear RGBA in the film's format. Law: docs/model.md §11 "chunks". Error: of f32
-//! at each layer, of the film's format once, and what is left out behind a full pixel.
+//! Blobs of a chunk are drawn by the sprite pipeline; its time counts as `sprites`. In: sorted
+//! entries, far to near, and their number; the picture that chunks are composed in (four floats a
+//! pixel). Out: the entries near to far and each chunk's draw call; depth 1 where a pixel's
+//! transmittance is below the bound; the composed picture over the target, premultiplied linear
+//! RGBA. Source: docs/model.md §11 "chunks". Error: f32 rounding a layer, one rounding to the
+//! target's format, and the light behind opaque pixels.
 
 use crate::error::Result;
 use crate::gpu::TargetFormat;
@@ -16,66 +16,78 @@ use crate::gpu::{
 use crate::layout::record;
 
 record! {
+    /// Push constants of `chunks_order.comp`.
     pub struct OrderPush { n_chunks: u32, stride: u32 }
 }
 
 record! {
+    /// Push constants of `chunks.vert` and `chunks.frag`.
     pub struct Push { width: u32, saturated: f32 }
 }
 
-/// What chunks are composed in: with fewer bits thin layers would leave no trace in a pixel that is
-/// nearly full.
+/// Format of the picture that chunks are composed in. With fewer bits, thin layers would leave no
+/// trace in a pixel that is nearly opaque.
 pub const FORMAT: TargetFormat = TargetFormat::Rgba32f;
 
+/// The pipelines of the pass.
 pub struct Chunks {
     order: Kernel,
     pick: DrawPipeline,
     show: DrawPipeline,
 }
 
+/// The buffers of the reordered entries.
+#[derive(Clone, Copy)]
+pub struct OrderBuffers<'a> {
+    /// `[u32; 2]`: sort key and particle, far to near.
+    pub entries: &'a Buffer,
+    /// `KeptRecord`: number of entries.
+    pub kept: &'a Buffer,
+    /// Output, `[u32; 2]`: the entries near to far, `stride` places a chunk.
+    pub nearest: &'a Buffer,
+    /// Output, `[u32; 4]` by chunk: arguments of its draw call.
+    pub draws: &'a Buffer,
+}
+
 impl Chunks {
-    /// `format`: of the picture that they are shown in.
+    /// Creates the pipelines that show chunks in a target of `format`.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or a pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat) -> Result<Chunks> {
+        let draw = |is_pick: u32, blend| {
+            DrawPipeline::new(device, compiler, "chunks", Push::FIELDS, &[(0, is_pick)], blend)
+        };
         Ok(Chunks {
             order: Kernel::new(device, compiler, "chunks.order", OrderPush::FIELDS, &[])?,
-            pick: DrawPipeline::new(
-                device,
-                compiler,
-                "chunks",
-                Push::FIELDS,
-                &[(0, 1)],
-                (FORMAT, BlendMode::DepthOnly),
-            )?,
-            show: DrawPipeline::new(
-                device,
-                compiler,
-                "chunks",
-                Push::FIELDS,
-                &[(0, 0)],
-                (format, BlendMode::Over),
-            )?,
+            pick: draw(1, (FORMAT, BlendMode::DepthOnly))?,
+            show: draw(0, (format, BlendMode::Over))?,
         })
     }
 
-    /// Orders what `kept` (KeptRecord) counts of `entries` near to far into `nearest`, `stride`
-    /// places a chunk, and writes each chunk's draw (four words) to `draws`.
+    /// Reorders the entries near to far and writes the draw call of every chunk.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record_order(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 4],
-        [n_chunks, stride]: [u32; 2],
+        buffers: OrderBuffers<'_>,
+        n_chunks: u32,
+        stride: u32,
     ) -> Result<()> {
-        // Of `n_chunks` times `stride` at most.
-        rec.dispatch(
-            &self.order,
-            &buffers,
-            &OrderPush { n_chunks, stride },
-            n_chunks.max(n_chunks * stride),
-        )
+        let OrderBuffers { entries, kept, nearest, draws } = buffers;
+        let push = OrderPush { n_chunks, stride };
+        // At most n_chunks × stride entries.
+        let n_records = n_chunks.max(n_chunks * stride);
+        rec.dispatch(&self.order, &[entries, kept, nearest, draws], &push, n_records)
     }
 
-    /// Sets the depth of `target`, of which `composed` is a copy, to 1 where less than `saturated`
-    /// is let through.
+    /// Sets the depth of `target` to 1 where the transmittance of `composed`, a copy of its color,
+    /// is below `saturated`.
+    ///
+    /// # Errors
+    /// Fails if `target` has no depth or another format than [`FORMAT`].
     pub fn record_pick(
         &self,
         rec: &mut Recorder<'_>,
@@ -87,12 +99,16 @@ impl Chunks {
         rec.draw(&self.pick, target, LoadOp::Load, &[composed], &push, InstanceCount::Known(1))
     }
 
-    /// Draws `composed` over `target`, or alone where `start` clears it.
+    /// Draws `composed` over what `start` leaves of `target`.
+    ///
+    /// # Errors
+    /// Fails if `target` has another format than the pipeline.
     pub fn record_show(
         &self,
         rec: &mut Recorder<'_>,
         composed: &Buffer,
-        (target, start): (Target<'_>, LoadOp),
+        target: Target<'_>,
+        start: LoadOp,
     ) -> Result<()> {
         let target = Target::color(target.color);
         let push = Push { width: target.color.size().0, saturated: 0.0 };

@@ -1,12 +1,12 @@
-//! contract: irradiance and both reflections of every facet from the tensors.
+//! contract: sums irradiance and both reflections of every facet from the light tensors.
 //!
-//! In: T1, T2, the lights' energies, the regions' materials as coefficients of the basis. Out: I_d,
-//! I_i, L1, L2 in `lit`. Law: L1 = Σ_l E_l Σ_b' c_b' T1, L2 = Σ_l E_l Σ_b' c_b' Σ_columns C T2.
-//! Source: C (13)–(16), docs/model.md §7, §11. Error: (columns + lights + bases) roundings of the
-//! sums of magnitudes; formed otherwise, six and those of "sums".
+//! In: T1, T2, the lights' energies, and the regions' materials as coefficients of the basis. Out:
+//! I_d, I_i, L1, L2 in `lit`. Law: L1 = Σ_l E_l Σ_b' c_b' T1, L2 = Σ_l E_l Σ_b' c_b' Σ_columns C
+//! T2. Source: C (13)–(16), docs/model.md §7, §11. Error: (columns + lights + bases) roundings of
+//! the sums of magnitudes; with another kind of sum, six roundings and the bound of that kind.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
+use crate::gpu::{Compiler, Device, Kernel, Recorder};
 use crate::layout::record;
 use crate::layout::sums::SumMacros;
 
@@ -14,15 +14,43 @@ use crate::layout::sums::SumMacros;
 pub const TILE: u32 = 64;
 
 record! {
+    /// Push constants of `contract.comp`.
     pub struct Push { n_facets: u32, n_lights: u32, n_rows: u32, n_columns: u32 }
 }
 
+bindings! {
+    /// The buffers of the pass.
+    pub struct ContractBuffers {
+        /// `FacetRecord` by facet.
+        facets,
+        /// `LightRecord` by light.
+        lights,
+        /// `RegionRecord` by region.
+        regions,
+        /// `[f32; 4]` by column: coefficients of the materials.
+        coefficients,
+        /// `f32` by light and row.
+        t1,
+        /// `f32` by light, row / TILE, column and row % TILE.
+        t2,
+        /// `[u32; 2]`: by region the first span and their number, then the spans: first column and
+        /// number of columns that can light the region. Other columns are not read.
+        spans,
+        /// Output, `LitRecord` by facet.
+        lit,
+    }
+}
+
+/// The pipeline of the pass.
 pub struct Contract {
     kernel: Kernel,
 }
 
 impl Contract {
-    /// `n_bases`: N_b. `sums`: how they are formed.
+    /// Creates the pipeline for `n_bases` basis functions, whose sums are formed as `sums` says.
+    ///
+    /// # Errors
+    /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
@@ -35,11 +63,16 @@ impl Contract {
         })
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `regions`: RegionRecord; `coefficients`: [f32;
-    /// 4] by column; `t1`: f32 [light][row]; `t2`: f32 [light][row / TILE][column][row % TILE];
-    /// `spans`: [u32; 2], by region (first, number) of its spans, then these, (first, number) of
-    /// columns that it can receive light from: other columns are not read; `lit`: LitRecord.
-    pub fn record(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 8], push: &Push) -> Result<()> {
-        rec.dispatch(&self.kernel, &buffers, push, push.n_facets)
+    /// Writes the light of every facet.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: &ContractBuffers<'_>,
+        push: &Push,
+    ) -> Result<()> {
+        rec.dispatch(&self.kernel, &buffers.by_binding(), push, push.n_facets)
     }
 }

@@ -1,16 +1,19 @@
-//! cull: of the drawn particles those that can show in a pixel.
+//! cull: keeps the drawn particles that can show in a pixel.
 //!
-//! In: placed particles, particles (κ), group of each, what is drawn of the groups, the camera.
-//! Out: (key, particle) of the kept ones in ascending index, and their number. Law: near plane,
-//! optical depth, silhouette's rectangle, smallest size. Source: docs/model.md §11 "cull". Error:
-//! none that a pixel shows; with a smallest size, what is left out for it is bounded there.
+//! In: placed particles, their extinction, the group of each, the drawn part of every group, the
+//! camera. Out: sort key and index of every kept particle in ascending index, and their number.
+//! Law: near plane, optical depth, bounding rectangle of the silhouette, smallest size. Source:
+//! docs/model.md §11 "cull". Error: none that a pixel shows; the error of a smallest size is
+//! bounded there.
 
+use super::blobs::{BlobVariant, BlobView, steps_per_depth};
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, MemoryUsage, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
 record! {
+    /// Push constants of `cull_test.comp`.
     pub struct TestPush {
         camera: CameraRecord,
         pixel: [f32; 2],
@@ -24,10 +27,12 @@ record! {
 }
 
 record! {
+    /// Push constants of `cull_scan.comp`.
     pub struct ScanPush { n_tiles: u32, sort_tile: u32, splat_block: u32, max_groups: u32 }
 }
 
 record! {
+    /// Push constants of `cull_write.comp`.
     pub struct WritePush {
         forward: [f32; 3],
         n_particles: u32,
@@ -42,118 +47,136 @@ pub const TILE: u32 = 256;
 /// Words of a tile's bits; the shaders' WORDS.
 pub const WORDS: u32 = TILE / 32;
 
-/// What is seen, and what of it counts.
+buffers! {
+    /// Scratch of the pass for a number of particles.
+    pub struct Scratch(n_max: u64) {
+        /// Bits of the kept particles.
+        masks: Buffer => [u32; 2], n_tiles(n_max) * u64::from(WORDS), "cull.masks";
+        /// Number of kept particles by tile.
+        totals: Buffer => u32, n_tiles(n_max), "cull.totals";
+    }
+}
+
+fn n_tiles(n_max: u64) -> u64 {
+    n_max.div_ceil(u64::from(TILE))
+}
+
+bindings! {
+    /// The buffers of the pass.
+    pub struct CullBuffers {
+        /// `PlacedRecord` by particle.
+        placed,
+        /// `ParticleRecord` by particle.
+        particles,
+        /// `u32` group by particle.
+        i_group,
+        /// `DrawnRecord` by group.
+        drawn,
+        /// Output, `[u32; 2]`: sort key and particle.
+        entries,
+        /// Output, `KeptRecord`: number of entries.
+        kept,
+    }
+}
+
+/// The picture that particles are tested against.
 #[derive(Debug, Clone, Copy)]
-pub struct View<'a> {
-    pub camera: &'a CameraRecord,
-    pub width: u32,
-    pub height: u32,
-    /// Sprites end at this many σ.
-    pub cutoff: f64,
-    /// And where their optical depth falls under this.
-    pub threshold: f64,
-    /// σ on the screen that is too small, pixels.
+pub struct CullView<'a> {
+    /// Camera and bounds of the picture.
+    pub blobs: BlobView<'a>,
+    /// Columns and rows of the picture.
+    pub size: [u32; 2],
+    /// σ on the screen below which a blob is left out, in pixels.
     pub smallest: f64,
 }
 
-/// How kept particles are keyed, as the sort asks for it, and dealt to what comes after.
+/// The sort keys of kept particles, and the workgroups of the passes that follow.
 #[derive(Debug, Clone, Copy)]
 pub struct Order {
-    /// Bounds |depth| and places the 16-bit keys' range.
+    /// Bound of |view depth|; the range of 16-bit keys.
     pub radius: f64,
+    /// Bits of a sort key: 16 or 32.
     pub n_bits: u32,
-    /// Entries that a workgroup of the sort takes, and splats that one makes.
+    /// Entries that a workgroup of the sort takes.
     pub sort_tile: u32,
+    /// Splats that a workgroup makes.
     pub splat_block: u32,
 }
 
+/// The pipelines and scratch buffers of the pass.
 pub struct Cull {
     test: Kernel,
     scan: Kernel,
     write: Kernel,
-    masks: Buffer,
-    totals: Buffer,
+    scratch: Scratch,
     max_groups: u32,
 }
 
 impl Cull {
-    /// Room for `n_max` particles. `weighted`: κ has factors; `threshold`: there is one;
-    /// `ellipsoids`: not all are balls.
+    /// Creates the pipelines, and scratch buffers for `n_max` particles.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or the device cannot hold the buffers.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
         n_max: u32,
-        [weighted, threshold, ellipsoids]: [bool; 3],
+        variant: BlobVariant,
     ) -> Result<Cull> {
-        // One subgroup a tile: it waits for itself alone.
+        // A tile is one subgroup, which needs no barrier.
         let invocations = device.limits().subgroup_size.clamp(8, 32);
-        let together = device.limits().is_one_subgroup(invocations);
-        let macros = [("TILE_INVOCATIONS", invocations), ("ONE_SUBGROUP", u32::from(together))];
-        let constants =
-            [(3, u32::from(weighted)), (5, u32::from(threshold)), (6, u32::from(ellipsoids))];
-        let n_tiles = u64::from(n_max.div_ceil(TILE));
+        let is_one_subgroup = u32::from(device.limits().is_one_subgroup(invocations));
+        let macros = [("TILE_INVOCATIONS", invocations), ("ONE_SUBGROUP", is_one_subgroup)];
+        let (fields, constants) = (TestPush::FIELDS, variant.constants());
         Ok(Cull {
-            test: Kernel::with_macros(
-                device,
-                compiler,
-                "cull.test",
-                TestPush::FIELDS,
-                &constants,
-                &macros,
-            )?,
+            test: Kernel::with_macros(device, compiler, "cull.test", fields, &constants, &macros)?,
             scan: Kernel::new(device, compiler, "cull.scan", ScanPush::FIELDS, &[])?,
             write: Kernel::new(device, compiler, "cull.write", WritePush::FIELDS, &[])?,
-            masks: Buffer::new::<[u32; 2]>(
-                device,
-                "cull.masks",
-                n_tiles * u64::from(WORDS),
-                MemoryUsage::Device,
-            )?,
-            totals: Buffer::new::<u32>(device, "cull.totals", n_tiles, MemoryUsage::Device)?,
+            scratch: Scratch::new(device, n_max.into())?,
             max_groups: device.limits().max_workgroups_x,
         })
     }
 
-    /// Of the drawn ones of the first `n_particles` of `placed` (PlacedRecord) those that can show
-    /// go to `entries` ([key, particle]), and their number to `kept` (KeptRecord). `particles`:
-    /// ParticleRecord; `i_group`: u32 by particle; `drawn`: DrawnRecord.
+    /// Tests the first `n_particles` and writes the entries of those that are kept.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        [placed, particles, i_group, drawn, entries, kept]: [&Buffer; 6],
-        view: &View<'_>,
+        buffers: &CullBuffers<'_>,
+        view: &CullView<'_>,
         order: &Order,
         n_particles: u32,
     ) -> Result<()> {
+        let CullBuffers { placed, particles, i_group, drawn, entries, kept } = *buffers;
+        let Scratch { masks, totals } = &self.scratch;
         let Order { radius, n_bits, sort_tile, splat_block } = *order;
-        let (n_tiles, test) = (n_particles.div_ceil(TILE), view.push(n_particles));
-        let tested = [placed, particles, i_group, drawn, &self.masks, &self.totals];
-        rec.dispatch_groups(&self.test, &tested, &test, n_tiles)?;
+        let n_tiles = n_particles.div_ceil(TILE);
+        let tested = [placed, particles, i_group, drawn, masks, totals];
+        rec.dispatch_groups(&self.test, &tested, &view.push(n_particles), n_tiles)?;
         let scan = ScanPush { n_tiles, sort_tile, splat_block, max_groups: self.max_groups };
-        rec.dispatch_groups(&self.scan, &[&self.totals, kept], &scan, 1)?;
-        // A scene without extent has one depth: any finite factor gives one key.
-        let steps_per_depth = if radius > 0.0 { (65536.0 / (2.0 * radius)) as f32 } else { 0.0 };
-        let forward = view.camera.forward;
-        let write =
-            WritePush { forward, n_particles, depth_high: radius as f32, steps_per_depth, n_bits };
-        rec.dispatch(
-            &self.write,
-            &[placed, &self.masks, &self.totals, entries],
-            &write,
+        rec.dispatch_groups(&self.scan, &[totals, kept], &scan, 1)?;
+        let write = WritePush {
+            forward: view.blobs.camera.forward,
             n_particles,
-        )
+            depth_high: radius as f32,
+            steps_per_depth: steps_per_depth(radius),
+            n_bits,
+        };
+        rec.dispatch(&self.write, &[placed, masks, totals, entries], &write, n_particles)
     }
 }
 
-impl View<'_> {
+impl CullView<'_> {
     fn push(&self, n_particles: u32) -> TestPush {
-        let View { camera, width, height, cutoff, threshold, smallest } = *self;
-        let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
+        let CullView { blobs, size: [width, height], smallest } = *self;
+        let pixel = blobs.camera.pixel_slopes(width, height);
         TestPush {
-            camera: *camera,
+            camera: *blobs.camera,
             pixel,
-            cutoff: cutoff as f32,
-            inv_threshold: (1.0 / threshold) as f32,
+            cutoff: blobs.cutoff as f32,
+            inv_threshold: blobs.inv_threshold(),
             smallest: (smallest * f64::from(pixel[1])) as f32,
             n_particles,
             width,

@@ -1,12 +1,12 @@
-//! facets: what light falls on: the grids of the surfaces, the points of the ground, and one facet
-//! a particle, or a run of particles in Morton order.
+//! facets: places the points that light falls on.
 //!
-//! In: regions (rectangles), placed particles, κ, groups, density grid, order and runs. Out:
-//! position, unit normal, area, region, colour; of runs each particle's facet. Law: rectangles'
-//! grids row by row; a particle's normal against the gradient of the density smoothed to 2σ,
-//! blended to "away from the cloud's centre" where that is ill conditioned; position on the shell
-//! `p + 1.5 σ n`. Source: C §2.4, docs/model.md §5, §11. The error of the normal grows as
-//! 1/(t·conditioning).
+//! Facets are the grid cells of surfaces, the points of terrain, and one facet a particle or a run
+//! of particles in Morton order. In: regions, placed particles, extinction, groups, density grid,
+//! order and runs. Out: position, unit normal, area, region and color of every facet; the facet of
+//! each particle of a run. Law: surfaces row by row. A particle's normal points against the
+//! gradient of the density smoothed to 2σ. Where that is ill conditioned, the normal is blended
+//! toward "away from the cloud's center". The position is p + 1.5 σ n. Source: C §2.4,
+//! docs/model.md §5, §11. Error: the normal's error grows as 1/(t·conditioning).
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
@@ -14,55 +14,112 @@ use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
 record! {
+    /// Push constants of `facets.comp`.
     pub struct Push { grid: GridRecord, n_particles: u32, i_first_facet: u32 }
 }
 
 record! {
+    /// Push constants of `facets_groups.comp`.
     pub struct GroupsPush { grid: GridRecord, n_facets: u32, i_first_facet: u32 }
 }
 
 record! {
+    /// Push constants of `facets_surfaces.comp`.
     pub struct SurfacesPush { n_facets: u32 }
 }
 
 record! {
+    /// Push constants of `facets_terrain.comp`.
     pub struct TerrainPush { n_facets: u32, i_first_facet: u32 }
 }
 
+bindings! {
+    /// The buffers of the facets of single particles.
+    pub struct ParticleBuffers {
+        /// `PlacedRecord` by particle.
+        placed,
+        /// `ParticleRecord` by particle.
+        particles,
+        /// `u32` group by particle.
+        i_group,
+        /// `GroupRecord` by group.
+        groups,
+        /// `f32` by cell: extinction per length.
+        density,
+        /// Output, `FacetRecord` by facet.
+        facets,
+    }
+}
+
+bindings! {
+    /// The buffers of the facets of runs of particles.
+    pub struct RunBuffers {
+        /// `PlacedRecord` by particle.
+        placed,
+        /// `ParticleRecord` by particle.
+        particles,
+        /// `u32` group by particle.
+        i_group,
+        /// `GroupRecord` by group.
+        groups,
+        /// `f32` by cell: extinction per length.
+        density,
+        /// `u32` particle by place in Morton order.
+        order,
+        /// `RunRecord` by facet.
+        runs,
+        /// Output, `FacetRecord` by facet.
+        facets,
+        /// Output, `u32` facet by particle.
+        i_facet,
+    }
+}
+
+/// The pipelines of the pass.
 pub struct Facets {
-    kernel: Kernel,
-    groups: Kernel,
+    particles: Kernel,
+    runs: Kernel,
     surfaces: Kernel,
     terrain: Kernel,
 }
 
 impl Facets {
-    /// `ellipsoids`: not all blobs are balls.
-    pub fn new(device: &Device, compiler: &Compiler, ellipsoids: bool) -> Result<Facets> {
-        let macros = [("ELLIPSOIDS", u32::from(ellipsoids))];
+    /// Creates the pipelines; `has_ellipsoids` if some blobs are not spheres.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or a pipeline cannot be created.
+    pub fn new(device: &Device, compiler: &Compiler, has_ellipsoids: bool) -> Result<Facets> {
+        let macros = [("ELLIPSOIDS", u32::from(has_ellipsoids))];
         let kernel =
             |name, fields| Kernel::with_macros(device, compiler, name, fields, &[], &macros);
         Ok(Facets {
-            kernel: kernel("facets", Push::FIELDS)?,
-            groups: kernel("facets.groups", GroupsPush::FIELDS)?,
+            particles: kernel("facets", Push::FIELDS)?,
+            runs: kernel("facets.groups", GroupsPush::FIELDS)?,
             surfaces: Kernel::new(device, compiler, "facets.surfaces", SurfacesPush::FIELDS, &[])?,
             terrain: Kernel::new(device, compiler, "facets.terrain", TerrainPush::FIELDS, &[])?,
         })
     }
 
-    /// The first `n_facets` of `facets` (FacetRecord) from `regions` (RegionRecord); `i_region`:
-    /// u32 by facet.
+    /// Writes the first `n_facets` of `facets` (`FacetRecord`) from `regions` (`RegionRecord`);
+    /// `i_region` holds the `u32` region of each facet.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record_surfaces(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 3],
+        [regions, i_region, facets]: [&Buffer; 3],
         n_facets: u32,
     ) -> Result<()> {
-        rec.dispatch(&self.surfaces, &buffers, &SurfacesPush { n_facets }, n_facets)
+        let push = SurfacesPush { n_facets };
+        rec.dispatch(&self.surfaces, &[regions, i_region, facets], &push, n_facets)
     }
 
-    /// `n_facets` of `ground` (FacetRecord, relative to their grounds' origins) to `facets` from
-    /// `i_first_facet` on, where `regions` (RegionRecord) have their origins.
+    /// Writes `n_facets` of `facets` from `i_first_facet` on: the points of `ground`
+    /// (`FacetRecord`), moved to the origins in `regions` (`RegionRecord`).
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record_terrain(
         &self,
         rec: &mut Recorder<'_>,
@@ -74,41 +131,35 @@ impl Facets {
         rec.dispatch(&self.terrain, &[regions, ground, facets], &push, n_facets)
     }
 
-    /// `placed`: PlacedRecord; `particles`: ParticleRecord; `i_group`: u32; `groups`: GroupRecord;
-    /// `density`: f32; `facets`: FacetRecord.
+    /// Writes a facet for each particle, from `i_first_facet` on.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        [placed, particles, i_group, groups, density, facets]: [&Buffer; 6],
+        buffers: &ParticleBuffers<'_>,
         grid: &GridRecord,
         n_particles: u32,
         i_first_facet: u32,
     ) -> Result<()> {
         let push = Push { grid: *grid, n_particles, i_first_facet };
-        rec.dispatch(
-            &self.kernel,
-            &[placed, particles, i_group, groups, density, facets],
-            &push,
-            n_particles,
-        )
+        rec.dispatch(&self.particles, &buffers.by_binding(), &push, n_particles)
     }
 
-    /// `placed`, `particles`, `i_group`, `groups`, `density` as above; `order`: u32, the particle
-    /// of each place; `runs`: RunRecord by facet; `facets`: FacetRecord; `i_facet`: u32 by
-    /// particle.
-    pub fn record_groups(
+    /// Writes a facet for each of `n_facets` runs, from `i_first_facet` on.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
+    pub fn record_runs(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 9],
+        buffers: &RunBuffers<'_>,
         grid: &GridRecord,
         n_facets: u32,
         i_first_facet: u32,
     ) -> Result<()> {
-        rec.dispatch(
-            &self.groups,
-            &buffers,
-            &GroupsPush { grid: *grid, n_facets, i_first_facet },
-            n_facets,
-        )
+        let push = GroupsPush { grid: *grid, n_facets, i_first_facet };
+        rec.dispatch(&self.runs, &buffers.by_binding(), &push, n_facets)
     }
 }

@@ -1,59 +1,122 @@
-//! first: irradiance and first reflection of every facet.
+//! first: computes the direct irradiance and the first reflection of every facet.
 //!
 //! In: facets, lights, transmittance, regions (materials). Out: I_d and L1, linear RGB. Law: L1 =
 //! K_d/π Σ E V max(0, n·ω), and the sky. Source: C (15), docs/model.md §7, §8, §11. Error: a few
 //! ulp a light.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
+use crate::gpu::{Compiler, Device, Kernel, Recorder};
 use crate::layout::record;
 
 record! {
+    /// Push constants of `first.comp`.
     pub struct Push { eye: [f32; 3], n_facets: u32, n_lights: u32 }
 }
 
+bindings! {
+    /// The buffers of [`First`].
+    pub struct FirstBuffers {
+        /// `FacetRecord` by facet.
+        facets,
+        /// `LightRecord` by light.
+        lights,
+        /// `f32` by facet and light.
+        transmittance,
+        /// `RegionRecord` by region.
+        regions,
+        /// `f32`: a row a lobe.
+        table,
+        /// Output, `LitRecord` by facet.
+        lit,
+    }
+}
+
+/// The pipeline of the pass where light is gathered at once.
 pub struct First {
     kernel: Kernel,
 }
 
 impl First {
+    /// Creates the pipeline.
+    ///
+    /// # Errors
+    /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<First> {
         Ok(First { kernel: Kernel::new(device, compiler, "first", Push::FIELDS, &[])? })
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance`: f32 [facet][light];
-    /// `regions`: RegionRecord; `table`: f32, a lobe a row; `lit`: LitRecord.
-    pub fn record(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 6], push: &Push) -> Result<()> {
-        rec.dispatch(&self.kernel, &buffers, push, push.n_facets)
+    /// Writes the light of every facet.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: &FirstBuffers<'_>,
+        push: &Push,
+    ) -> Result<()> {
+        rec.dispatch(&self.kernel, &buffers.by_binding(), push, push.n_facets)
     }
 }
 
 record! {
-    pub struct TensorPush { eye: [f32; 3], n_facets: u32, n_lights: u32, n_bases: u32, n_rows: u32, i_vectors: u32 }
+    /// Push constants of `first_tensor.comp`.
+    pub struct TensorPush {
+        eye: [f32; 3],
+        n_facets: u32,
+        n_lights: u32,
+        n_bases: u32,
+        n_rows: u32,
+        i_vectors: u32,
+    }
 }
 
-/// T1: the first reflection by light and basis, for `contract` to sum (docs/model.md §11
-/// "contract").
+bindings! {
+    /// The buffers of [`FirstTensor`].
+    pub struct FirstTensorBuffers {
+        /// `FacetRecord` by facet.
+        facets,
+        /// `LightRecord` by light.
+        lights,
+        /// `f32` by facet and light.
+        transmittance,
+        /// `RegionRecord` by region.
+        regions,
+        /// `f32`: the vectors of the basis, from row `i_vectors` on.
+        table,
+        /// Output, `f32` by light and row.
+        t1,
+        /// Output, `LitRecord` by facet: cleared.
+        lit,
+    }
+}
+
+/// The pipeline that fills T1: the first reflection by light and basis function, for `contract` to
+/// sum (docs/model.md §11 "contract").
 pub struct FirstTensor {
     kernel: Kernel,
 }
 
 impl FirstTensor {
+    /// Creates the pipeline.
+    ///
+    /// # Errors
+    /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<FirstTensor> {
-        Ok(FirstTensor {
-            kernel: Kernel::new(device, compiler, "first.tensor", TensorPush::FIELDS, &[])?,
-        })
+        let kernel = Kernel::new(device, compiler, "first.tensor", TensorPush::FIELDS, &[])?;
+        Ok(FirstTensor { kernel })
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance`: f32 [facet][light];
-    /// `regions`: RegionRecord; `table`: f32, the vectors of the basis from row `i_vectors` on;
-    /// `t1`: f32 [light][row]; `lit`: LitRecord, cleared.
+    /// Writes T1.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 7],
+        buffers: &FirstTensorBuffers<'_>,
         push: &TensorPush,
     ) -> Result<()> {
-        rec.dispatch(&self.kernel, &buffers, push, push.n_facets)
+        rec.dispatch(&self.kernel, &buffers.by_binding(), push, push.n_facets)
     }
 }

@@ -1,11 +1,11 @@
-//! impostors: what is far, drawn once into a picture (a shell), shown again from where the eye is
-//! now.
+//! impostors: shows distant blobs from a picture of them that was drawn once.
 //!
-//! In: sorted entries, a shell's picture (four floats a texel), and how pixels lie in it. Out:
-//! entries of what is far and of what is near; the shell under the near blobs, premultiplied linear
-//! RGBA in the film's format. Law: a homography by the plane of one depth, Catmull and Rom's cubic.
-//! Source: Harris & Lastra 2001, docs/model.md §11. Error: places to 1e-6 of the picture's extent,
-//! and the target's rounding; what it shows of the truth is predicted by `model::impostor`.
+//! In: sorted entries; an impostor layer (a picture, four floats a texel) and how pixels map to it.
+//! Out: the entries of far and near blobs; the layer under the near blobs, premultiplied linear
+//! RGBA in the film's format. Law: a homography through the plane of one depth, Catmull and Rom's
+//! cubic. Source: Harris & Lastra 2001, docs/model.md §11. Error: positions to 1e-6 of the
+//! picture's extent, and the target's rounding; `model::impostor` predicts the error against the
+//! true view.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -18,10 +18,12 @@ use crate::gpu::{
 use crate::layout::record;
 
 record! {
+    /// Push constants of `impostors_part.comp`.
     pub struct PartPush { n_entries: u32, last_key: u32, is_new: u32, unused: u32 }
 }
 
 record! {
+    /// Push constants of `impostors.vert` and `impostors.frag`.
     pub struct Push {
         column: [f32; 3],
         depth: f32,
@@ -35,61 +37,78 @@ record! {
     }
 }
 
+/// The pipelines of the pass.
 pub struct Impostors {
     part: Kernel,
     show: DrawPipeline,
 }
 
-/// A shell as it is shown now.
+/// How an impostor layer appears in the current view.
 #[derive(Debug, Clone, Copy)]
-pub struct Shown {
-    /// From slopes of the view to slopes of the shell's picture.
-    pub to_shell: DMat3,
-    /// Greatest slopes of the view and of the shell's picture.
-    pub tangents: [DVec2; 2],
-    /// The shell's texels.
+pub struct LayerView {
+    /// Maps slopes of the view to slopes of the layer's picture.
+    pub to_layer: DMat3,
+    /// Greatest slopes of the view.
+    pub view_tangents: DVec2,
+    /// Greatest slopes of the layer's picture.
+    pub layer_tangents: DVec2,
+    /// Texels of the layer.
     pub size: [u32; 2],
-    /// The slopes that it shows anything at, least and greatest; rounded outward by whoever gives
-    /// them.
+    /// Least and greatest slopes of the view at which the layer shows anything; the caller rounds
+    /// them outward.
     pub bounds: [DVec2; 2],
-    /// near/z of what stands for all of it; surfaces that are nearer hide it.
+    /// near/z of the whole layer; nearer surfaces hide it.
     pub depth: f32,
 }
 
+/// The buffers that entries are parted by.
+#[derive(Clone, Copy)]
+pub struct PartBuffers<'a> {
+    /// `[u32; 2]`: sort key and particle, far to near.
+    pub entries: &'a Buffer,
+    /// Input and output, `u32` by particle: whether it belongs to the layer.
+    pub members: &'a Buffer,
+    /// Output, `[u32; 2]`: entries of the layer.
+    pub far: &'a Buffer,
+    /// Output, `[u32; 2]`: the other entries.
+    pub near: &'a Buffer,
+}
+
 impl Impostors {
-    /// `behind`: surfaces have been drawn, with depth.
+    /// Creates the pipelines; `over_solids` if surfaces have been drawn into the target before.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or a pipeline cannot be created.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
         format: TargetFormat,
-        behind: bool,
+        over_solids: bool,
     ) -> Result<Impostors> {
-        let meet = if behind { BlendMode::OverTested } else { BlendMode::Over };
+        let blend = (format, if over_solids { BlendMode::OverTested } else { BlendMode::Over });
         Ok(Impostors {
             part: Kernel::new(device, compiler, "impostors.part", PartPush::FIELDS, &[])?,
-            show: DrawPipeline::new(
-                device,
-                compiler,
-                "impostors",
-                Push::FIELDS,
-                &[],
-                (format, meet),
-            )?,
+            show: DrawPipeline::new(device, compiler, "impostors", Push::FIELDS, &[], blend)?,
         })
     }
 
-    /// Parts the first `n_entries` of `entries` ([key, particle]) into `far` and `near`, by
-    /// `members` (u32 a particle), which is made anew where `last_key` says the last key of what is
-    /// far.
+    /// Parts the first `n_entries` entries into those of the layer and the others.
+    ///
+    /// With `last_key`, the particles up to that sort key become the new members of the layer;
+    /// without, the members stay.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record_part(
         &self,
         rec: &mut Recorder<'_>,
-        [entries, members, far, near]: [&Buffer; 4],
+        buffers: PartBuffers<'_>,
         n_entries: u32,
         last_key: Option<u32>,
     ) -> Result<()> {
+        let PartBuffers { entries, members, far, near } = buffers;
         if last_key.is_some() {
-            // Who is not drawn is not in it.
+            // A particle that is not drawn is not a member.
             rec.fill(members, 0);
         }
         let push = PartPush {
@@ -101,31 +120,34 @@ impl Impostors {
         rec.dispatch(&self.part, &[entries, members, far, near], &push, n_entries)
     }
 
-    /// Draws `shell` (four floats a texel, rows from the top) into `target`, over the surfaces
-    /// where it has depth.
+    /// Draws `layer` (`[f32; 4]` by texel, rows from the top) into `target`, over the surfaces if
+    /// `target` has depth.
+    ///
+    /// # Errors
+    /// Fails if `target` does not fit the pipeline.
     pub fn record_show(
         &self,
         rec: &mut Recorder<'_>,
-        shell: &Buffer,
+        layer: &Buffer,
         target: Target<'_>,
-        shown: &Shown,
+        view: &LayerView,
     ) -> Result<()> {
         let (width, height) = target.color.size();
-        let push = push(shown, [width, height]);
+        let push = push(view, [width, height]);
         let start = if target.depth.is_some() { LoadOp::Load } else { LoadOp::Clear };
-        rec.draw(&self.show, target, start, &[shell], &push, InstanceCount::Known(1))
+        rec.draw(&self.show, target, start, &[layer], &push, InstanceCount::Known(1))
     }
 }
 
-/// The homography between pixels: both counted from the middles of their pictures, so that f32
+/// Returns the homography between pixels. Both pictures' pixels count from the center, so that f32
 /// holds them best.
-fn push(shown: &Shown, [width, height]: [u32; 2]) -> Push {
+fn push(shown: &LayerView, [width, height]: [u32; 2]) -> Push {
     let middle = 0.5 * DVec2::new(width.into(), height.into());
-    let [view, shell] = shown.tangents;
+    let (view, layer) = (shown.view_tangents, shown.layer_tangents);
     let slopes = DMat3::from_diagonal(DVec3::new(view.x / middle.x, -view.y / middle.y, 1.0));
-    let texels = 0.5 * DVec2::new(shown.size[0].into(), shown.size[1].into()) / shell;
+    let texels = 0.5 * DVec2::new(shown.size[0].into(), shown.size[1].into()) / layer;
     let texels = DMat3::from_diagonal(DVec3::new(texels.x, -texels.y, 1.0));
-    let of = (texels * shown.to_shell * slopes).transpose();
+    let of = (texels * shown.to_layer * slopes).transpose();
     // Rows count downward, in slopes and on the screen.
     let down = DVec2::new(1.0, -1.0);
     let on_screen =

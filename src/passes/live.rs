@@ -1,29 +1,40 @@
-//! live: the particles of discs at a frame's time.
+//! live: computes the particles of discs at a frame's time.
 //!
-//! In: a disc's law and the time. Out: its particles relative to their group's centre, with σ and κ
-//! as old as they are. Law: docs/model.md §2, in closed form of (seed, slot, time). Source: C §2.3.
-//! Error: tests/pass_live.rs derives the bound on position, σ and κ by what each operation rounds;
-//! generations and births are integers and the same as in f64.
+//! In: a disc's parameters and the time. Out: its particles relative to their group's center, with
+//! σ and κ at their age. Law: docs/model.md §2, in closed form of (seed, slot, time). Source: C
+//! §2.3. Error: tests/pass_live.rs derives the bound on position, σ and κ from the rounding of each
+//! operation; generations and births are integers, equal to those in f64.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::record;
 
 record! {
+    /// Push constants of `live.comp`.
     pub struct Push { i_disc: u32, n_particles: u32 }
 }
 
+/// The pipeline of the pass.
 pub struct Live {
     kernel: Kernel,
 }
 
 impl Live {
+    /// Creates the pipeline.
+    ///
+    /// # Errors
+    /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Live> {
         Ok(Live { kernel: Kernel::new(device, compiler, "live", Push::FIELDS, &[])? })
     }
 
-    /// `discs`: DiscRecord; `particles`: ParticleRecord. Disc `i_disc` has `n_particles`, which lie
-    /// where its record says.
+    /// Writes the `n_particles` particles of disc `i_disc`.
+    ///
+    /// `discs`: `DiscRecord`, which says where a disc's particles lie; `particles`:
+    /// `ParticleRecord`.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,

@@ -1,7 +1,36 @@
-//! The GPU's stages, one a room: the pass, its shaders, its reference, its test, its timer label
-//! and its column in the results share one name. `new` allocates and can fail; `record` only
-//! records. No pass knows another.
+//! GPU stages, one module a pass.
+//!
+//! A pass, its shaders, its f64 reference, its test, its timer label and its column in the results
+//! share one name. `new` compiles pipelines and allocates scratch buffers, and can fail; `record`
+//! only records commands. A pass receives every buffer that it shares with other passes as an
+//! argument, and imports no other pass.
 
+/// Declares a struct of named buffers in the order of the shader's binding numbers.
+macro_rules! bindings {
+    ($(#[$about:meta])* pub struct $name:ident { $($(#[$doc:meta])* $field:ident),* $(,)? }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy)]
+        pub struct $name<'a> { $($(#[$doc])* pub $field: &'a $crate::gpu::Buffer),* }
+
+        impl<'a> $name<'a> {
+            /// Names the buffers of an array, which is in the order of the binding numbers.
+            pub fn from_bindings(
+                [$($field),*]: [&'a $crate::gpu::Buffer; [$(stringify!($field)),*].len()],
+            ) -> Self {
+                $name { $($field),* }
+            }
+
+            /// Returns the buffers by binding number.
+            pub fn by_binding(
+                &self,
+            ) -> [&'a $crate::gpu::Buffer; [$(stringify!($field)),*].len()] {
+                [$(self.$field),*]
+            }
+        }
+    };
+}
+
+pub mod blobs;
 pub mod chunks;
 pub mod contract;
 pub mod cull;
@@ -27,10 +56,12 @@ pub mod upsample;
 use crate::gpu::Sources;
 
 macro_rules! shader_texts {
-    ($($name:literal),* $(,)?) => { &[$(($name, include_str!(concat!("../../shaders/", $name)))),*] };
+    ($($name:literal),* $(,)?) => {
+        &[$(($name, include_str!(concat!("../../shaders/", $name)))),*]
+    };
 }
 
-/// Every shader and include, as built into the binary.
+/// Name and text of every shader and include file that the binary embeds.
 pub const SHADERS: &[(&str, &str)] = shader_texts![
     "chunks.frag",
     "chunks.vert",
@@ -122,6 +153,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "upsample.comp",
 ];
 
+/// Returns the embedded shader sources.
 pub fn sources() -> Sources {
     Sources::embedded(SHADERS)
 }

@@ -1,9 +1,9 @@
-//! morton: facets, or particles, in the order of a space-filling curve, region by region.
+//! morton: orders facets or particles along a space-filling curve, region by region.
 //!
-//! In: positions and their regions, the regions' bounds. Out: entries [key, index] for the sort of
-//! 32 bits, and of the sorted entries the index at each place. Law: the region above, the Morton
-//! code of the cell within the region's bounds below it. Source: docs/model.md §7, §11. Error: a
-//! coordinate within some roundings of a cell's face may count to the cell beside.
+//! In: positions, their regions, and the regions' bounds. Out: sort entries with 32-bit keys; of
+//! sorted entries, the index at each place. Law: the region in the high bits, the Morton code of
+//! the cell within the region's bounds below. Source: docs/model.md §7, §11. Error: a coordinate
+//! within some roundings of a cell's face may count to the adjacent cell.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
@@ -11,13 +11,32 @@ use crate::layout::facet::KeyBits;
 use crate::layout::record;
 
 record! {
+    /// Push constants of `morton_key.comp`.
     pub struct KeyPush { n_points: u32, region_bits: u32, axis_bits: u32 }
 }
 
 record! {
+    /// Push constants of `morton_order.comp`.
     pub struct OrderPush { n_entries: u32 }
 }
 
+bindings! {
+    /// The buffers that particles get their keys from.
+    pub struct ParticleBuffers {
+        /// `PlacedRecord` by particle.
+        placed,
+        /// `u32` group by particle.
+        i_group,
+        /// `GroupRecord` by group.
+        groups,
+        /// `RegionBoundsRecord` by region.
+        bounds,
+        /// Output, `[u32; 2]`: key and particle.
+        entries,
+    }
+}
+
+/// The pipelines of the pass.
 pub struct Morton {
     facets: Kernel,
     particles: Kernel,
@@ -25,16 +44,14 @@ pub struct Morton {
 }
 
 impl Morton {
+    /// Creates the pipelines.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or a pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Morton> {
         let key = |points: u32| {
-            Kernel::with_macros(
-                device,
-                compiler,
-                "morton.key",
-                KeyPush::FIELDS,
-                &[],
-                &[("POINTS", points)],
-            )
+            let macros = [("POINTS", points)];
+            Kernel::with_macros(device, compiler, "morton.key", KeyPush::FIELDS, &[], &macros)
         };
         Ok(Morton {
             facets: key(0)?,
@@ -43,38 +60,49 @@ impl Morton {
         })
     }
 
-    /// `facets`: FacetRecord; `bounds`: RegionBoundsRecord by region; `entries`: [key, facet].
+    /// Writes the keys of facets. `facets`: `FacetRecord`; `bounds`: `RegionBoundsRecord` by
+    /// region; `entries`: `[u32; 2]`, key and facet.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record_facets(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 3],
+        [facets, bounds, entries]: [&Buffer; 3],
         n_facets: u32,
         n_regions: u32,
     ) -> Result<()> {
-        rec.dispatch(&self.facets, &buffers, &key_push(n_facets, n_regions), n_facets)
+        let push = key_push(n_facets, n_regions);
+        rec.dispatch(&self.facets, &[facets, bounds, entries], &push, n_facets)
     }
 
-    /// `placed`: PlacedRecord; `i_group`: u32; `groups`: GroupRecord; `bounds`: RegionBoundsRecord
-    /// by region; `entries`: [key, particle].
+    /// Writes the keys of particles.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record_particles(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 5],
+        buffers: &ParticleBuffers<'_>,
         n_particles: u32,
         n_regions: u32,
     ) -> Result<()> {
-        rec.dispatch(&self.particles, &buffers, &key_push(n_particles, n_regions), n_particles)
+        let push = key_push(n_particles, n_regions);
+        rec.dispatch(&self.particles, &buffers.by_binding(), &push, n_particles)
     }
 
-    /// `entries`: [key, index], sorted; `order`: u32, the index at each place. Where regions are
-    /// runs of indices, each has the same run of places.
+    /// Writes `order`, the `u32` index at each place of the sorted `entries`. A region whose
+    /// indices are contiguous keeps the same range of places.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record_order(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 2],
+        [entries, order]: [&Buffer; 2],
         n_entries: u32,
     ) -> Result<()> {
-        rec.dispatch(&self.order, &buffers, &OrderPush { n_entries }, n_entries)
+        rec.dispatch(&self.order, &[entries, order], &OrderPush { n_entries }, n_entries)
     }
 }
 

@@ -1,40 +1,60 @@
-//! place: where the particles are this frame.
+//! place: computes where the particles are in this frame.
 //!
-//! In: particles relative to their groups, group of each, groups' offsets, gust modes. Out:
-//! position relative to the lighting origin, and σ. Law: placed =
-//! `s position + offset + Σ a sin(k·x + phase)`, `s σ`. Source: docs/model.md §11 to §13. Error: an ulp of the sums and of s position; of
-//! each wave |a| (3.5 ulp of the sine + the argument's rounding).
+//! In: particles relative to their groups, group of each, the groups' offsets, gust modes. Out:
+//! position relative to the lighting origin, and σ. Law: the place is s × position, plus the group's
+//! offset, plus the sum of a sin(k·x + phase) over the gust's waves; σ is scaled by s. Source:
+//! docs/model.md §11 to §13. Error: an ulp of the sums and of the scaled position; of each wave, |a|
+//! times 3.5 ulp of the sine and the argument's rounding.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
+use crate::gpu::{Compiler, Device, Kernel, Recorder};
 use crate::layout::record;
 
 record! {
+    /// Push constants of `place.comp`.
     pub struct Push { n_particles: u32 }
 }
 
+bindings! {
+    /// The buffers of the pass.
+    pub struct PlaceBuffers {
+        /// `ParticleRecord` by particle.
+        particles,
+        /// `u32` group by particle.
+        i_group,
+        /// `GroupRecord` by group.
+        groups,
+        /// `ModeRecord`: the gusts of all clouds.
+        modes,
+        /// Output, `PlacedRecord` by particle.
+        placed,
+    }
+}
+
+/// The pipeline of the pass.
 pub struct Place {
     kernel: Kernel,
 }
 
 impl Place {
+    /// Creates the pipeline.
+    ///
+    /// # Errors
+    /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Place> {
         Ok(Place { kernel: Kernel::new(device, compiler, "place", Push::FIELDS, &[])? })
     }
 
-    /// `particles`: ParticleRecord; `i_group`: u32; `groups`: GroupRecord; `modes`: ModeRecord;
-    /// `placed`: PlacedRecord.
+    /// Writes the place of every particle.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        [particles, i_group, groups, modes, placed]: [&Buffer; 5],
+        buffers: &PlaceBuffers<'_>,
         n_particles: u32,
     ) -> Result<()> {
-        rec.dispatch(
-            &self.kernel,
-            &[particles, i_group, groups, modes, placed],
-            &Push { n_particles },
-            n_particles,
-        )
+        rec.dispatch(&self.kernel, &buffers.by_binding(), &Push { n_particles }, n_particles)
     }
 }

@@ -1,11 +1,11 @@
-//! present: a finished picture as a display shows it, in a window's image.
+//! present: shows a finished picture in a window's image.
 //!
-//! In: a picture's pixels as they lie in its target, and a second one's that it may be compared
-//! with. Out: sRGB code values, 8 bits; black where there is no picture. Law: over the background,
-//! times the exposure, tone map, sRGB, ordered dither: what is written as PNG; or the two side by
-//! side, or how far they are apart. Source: docs/model.md §11 "present". Error: 8e-6 of the
-//! greatest value, so that a code value is another where the exact one is that close to the next;
-//! of a difference besides 11 roundings of what it is of.
+//! In: a picture's pixels as its target holds them, and a second picture to compare it with. Out:
+//! sRGB code values of 8 bits; black outside the picture. Law: over the background, times the
+//! exposure, tone map, sRGB, ordered dither, as PNG files are written; or the two pictures side by
+//! side, or their difference. Source: docs/model.md §11 "present". Error: 8e-6 of the greatest
+//! value, so that a code value differs only where the exact value is that close to the next; 11
+//! more roundings for a difference.
 
 use crate::error::Result;
 use crate::gpu::TargetFormat;
@@ -16,6 +16,7 @@ use crate::gpu::{
 use crate::layout::record;
 
 record! {
+    /// Push constants of `present.vert` and `present.frag`.
     pub struct Push {
         background: [f32; 3],
         exposure: f32,
@@ -28,41 +29,51 @@ record! {
     }
 }
 
+/// The pipeline of the pass.
 pub struct Present {
     pipeline: DrawPipeline,
 }
 
-/// What is shown of two pictures, A and B.
+/// How two pictures, A and B, are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Compare {
-    /// A left of this column of the picture, B right of it, a line in it. A column outside leaves
+    /// A left of a column, B right of it, with a line between; a column outside the picture shows
     /// one of them alone.
-    Split { column: i32 },
-    /// The difference of what is shown, before the tone map, times this; black where they are the
-    /// same.
-    Difference { gain: f32 },
+    Split {
+        /// Column of the picture.
+        column: i32,
+    },
+    /// The difference before the tone map; black where the pictures are equal.
+    Difference {
+        /// Factor of the difference.
+        gain: f32,
+    },
     /// B alone.
     Second,
 }
 
-/// Which picture is shown, and how.
+/// How a picture is shown in a window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shown {
     /// Linear RGB.
     pub background: [f32; 3],
+    /// Factor of the radiance.
     pub exposure: f32,
     /// Columns and rows of the picture.
     pub size: [u32; 2],
-    /// Where its top left pixel is in the window.
+    /// The window's pixel at which the picture's top left pixel is.
     pub corner: [i32; 2],
-    /// Highlights are compressed, and not cut.
+    /// Highlights are compressed instead of clipped.
     pub is_neutral: bool,
-    /// None: A alone.
+    /// The comparison with a second picture; without one, A is shown.
     pub compare: Option<Compare>,
 }
 
 impl Present {
-    /// Of pictures in format `from`, into images of format `to`.
+    /// Creates the pipeline for pictures in format `from` and images of format `to`.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or the pipeline cannot be created.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
@@ -74,19 +85,17 @@ impl Present {
             TargetFormat::Rgba16f => 1,
             TargetFormat::Rgba32f => 2,
         };
-        let pipeline = DrawPipeline::new(
-            device,
-            compiler,
-            "present",
-            Push::FIELDS,
-            &[(0, kind)],
-            (to, BlendMode::Over),
-        )?;
+        let (constants, blend) = ([(0, kind)], (to, BlendMode::Over));
+        let pipeline =
+            DrawPipeline::new(device, compiler, "present", Push::FIELDS, &constants, blend)?;
         Ok(Present { pipeline })
     }
 
-    /// Draws `pictures`, A and B, into all of `into`. They have one format and one size; where
-    /// nothing is compared, the same twice.
+    /// Draws `pictures`, A and B, into all of `into`. Both have the same format and size; without a
+    /// comparison B is A.
+    ///
+    /// # Errors
+    /// Fails if `into` has another format than the pipeline.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
@@ -103,13 +112,7 @@ impl Present {
         };
         let tone_map = u32::from(!is_neutral);
         let push = Push { background, exposure, size, corner, tone_map, compare, split, gain };
-        rec.draw(
-            &self.pipeline,
-            Target::color(into),
-            LoadOp::DontCare,
-            &pictures,
-            &push,
-            InstanceCount::Known(1),
-        )
+        let (target, one) = (Target::color(into), InstanceCount::Known(1));
+        rec.draw(&self.pipeline, target, LoadOp::DontCare, &pictures, &push, one)
     }
 }

@@ -1,26 +1,29 @@
-//! second: the second reflection on every facet, gathered from all others.
+//! second: computes the second reflection on every facet, gathered from all other facets.
 //!
-//! In: facets, regions, lights, the facets' shares of them, the table of lobes, the density grid.
+//! In: facets, regions, lights, the facets' light of each, the table of lobes, the density grid.
 //! Out: I_i and L2 in `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16),
-//! docs/model.md §7, §11; of the sum's error "sums" there.
+//! docs/model.md §7, §11. Error: that of the sum, see "sums" there.
 
 use bytemuck::Pod;
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, Field, Kernel, Recorder};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
 use crate::layout::sums::SumMacros;
 
 record! {
+    /// Push constants of `second_sources.comp`.
     pub struct SourcesPush { n_facets: u32, n_lights: u32, n_surfaces: u32 }
 }
 
 record! {
+    /// Push constants of `second_merge.comp`.
     pub struct MergePush { i_first: u32, n_merges: u32, n_lights: u32 }
 }
 
 record! {
+    /// Push constants of `second_gather.comp`.
     pub struct GatherPush {
         grid: GridRecord,
         eye: [f32; 3],
@@ -38,124 +41,8 @@ record! {
     }
 }
 
-pub struct Second {
-    sources: Kernel,
-    merge: Kernel,
-    /// For receivers without a lobe, and with.
-    gather: [Kernel; 2],
-    /// Receivers of one block.
-    block: u32,
-}
-
-/// How a gather shares out the turns that its loops may take in one dispatch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Turns {
-    /// After these no cell is quartered any more.
-    pub quarter: u32,
-    /// After these no further source is looked at.
-    pub batch: u32,
-    /// Facets that are set aside together for a closer look.
-    pub aside: u32,
-    /// Lights that are kept at hand: all, or none.
-    pub kept: u32,
-}
-
-impl Turns {
-    fn macros(&self, device: &Device) -> [(&'static str, u32); 5] {
-        [
-            ("SPLIT_ITERATIONS", self.quarter),
-            ("BATCH_ITERATIONS", self.batch),
-            ("MAX_DEFERRED", self.aside),
-            ("N_KEPT", self.kept),
-            ("TOGETHER", u32::from(device.limits().has_subgroup_arithmetic)),
-        ]
-    }
-}
-
-/// Blocks of receivers, by whether they have a lobe.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Receivers {
-    Diffuse,
-    Glossy,
-}
-
-impl Second {
-    /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are
-    /// the nodes of a tree; `shiny`: some region has a lobe. `turns`: of a dispatch. `sums`: how a
-    /// receiver's sums over its senders are formed.
-    pub fn new(
-        device: &Device,
-        compiler: &Compiler,
-        [has_clouds, tree, shiny]: [bool; 3],
-        turns: Turns,
-        sums: &SumMacros,
-    ) -> Result<Second> {
-        let width = block_len(device);
-        let gather = |glossy: u32| {
-            let macros = [
-                ("WORKGROUP", width),
-                ("MARCH", u32::from(has_clouds)),
-                ("GLOSSY", glossy),
-                ("TREE", u32::from(tree)),
-                ("SHINY", u32::from(shiny)),
-            ];
-            let macros = [&macros[..], &turns.macros(device), sums.list()].concat();
-            Kernel::with_macros(device, compiler, "second.gather", GatherPush::FIELDS, &[], &macros)
-        };
-        Ok(Second {
-            sources: Kernel::new(device, compiler, "second.sources", SourcesPush::FIELDS, &[])?,
-            merge: Kernel::new(device, compiler, "second.merge", MergePush::FIELDS, &[])?,
-            gather: [gather(0)?, gather(1)?],
-            block: width,
-        })
-    }
-
-    /// Most receivers of a block.
-    pub fn block_len(&self) -> u32 {
-        self.block
-    }
-
-    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance` and `through`: f32
-    /// [facet][light]; `regions`: RegionRecord; `order`: u32, the facet of each place; `leaves`:
-    /// u32, the source of each place; `sources`: SourceRecord; `fluxes`: [f32; 4] [source][light].
-    pub fn record_sources(
-        &self,
-        rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 10],
-        push: &SourcesPush,
-    ) -> Result<()> {
-        rec.dispatch(&self.sources, &buffers, push, push.n_facets)
-    }
-
-    /// The clusters of one height. `merges`: u32, nodes by height; `nodes`: NodeRecord; `sources`
-    /// and `fluxes` as above.
-    pub fn record_merge(
-        &self,
-        rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 4],
-        push: &MergePush,
-    ) -> Result<()> {
-        rec.dispatch(&self.merge, &buffers, push, push.n_merges)
-    }
-
-    /// `blocks`: BlockRecord; `pairings`: PairingRecord; `occluders`: u32, surfaces; `order`: u32;
-    /// `facets`, `regions`, `lights`, `sources`, `fluxes` as above; `table`: f32, a lobe a row;
-    /// `density`: f32; `nodes`: NodeRecord; `lit`: LitRecord; `reached`: u32 by facet; `stencils`:
-    /// PackedRecord [source][light]; `rounds`: [u32; 3], the workgroups of each round. A gather
-    /// takes several dispatches, its rounds.
-    pub fn record(
-        &self,
-        rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 16],
-        push: &GatherPush,
-        receivers: Receivers,
-        n_blocks: u32,
-    ) -> Result<()> {
-        of_round(rec, &self.gather[receivers as usize], &buffers, push, push.i_round, n_blocks)
-    }
-}
-
 record! {
+    /// Push constants of `second_tensor.comp`.
     pub struct TensorPush {
         grid: GridRecord,
         eye: [f32; 3],
@@ -177,66 +64,267 @@ record! {
     }
 }
 
-/// T2: the second reflection by light, basis of the receiver and column of the emitters, for
-/// `contract` to sum (docs/model.md §11 "contract").
-pub struct SecondTensor {
-    /// For receivers without a lobe, and with.
-    gather: [Kernel; 2],
+bindings! {
+    /// The buffers that sources are made from.
+    pub struct SourceBuffers {
+        /// `FacetRecord` by facet.
+        facets,
+        /// `LightRecord` by light.
+        lights,
+        /// `f32` by facet and light.
+        transmittance,
+        /// `f32` by facet and light: transmittance of the clouds alone.
+        through,
+        /// `RegionRecord` by region.
+        regions,
+        /// `u32` facet by place.
+        order,
+        /// `u32` source by place.
+        leaves,
+        /// Output, `SourceRecord` by source.
+        sources,
+        /// Output, `[f32; 4]` by source and light.
+        fluxes,
+        /// Output, `PackedRecord` by source and light.
+        stencils,
+    }
 }
 
-impl SecondTensor {
-    /// `has_clouds`: light between facets is attenuated by the density grid. `n_bases`: N_b.
+bindings! {
+    /// The buffers of a gather.
+    pub struct GatherBuffers {
+        /// `BlockRecord`: blocks of receivers.
+        blocks,
+        /// `PairingRecord`: the regions that a block receives light from.
+        pairings,
+        /// `u32`: surfaces that may hide a region from another.
+        occluders,
+        /// `u32` facet by place.
+        order,
+        /// `FacetRecord` by facet.
+        facets,
+        /// `RegionRecord` by region.
+        regions,
+        /// `LightRecord` by light.
+        lights,
+        /// `SourceRecord` by source.
+        sources,
+        /// `[f32; 4]` by source and light.
+        fluxes,
+        /// `f32`: a row a lobe.
+        table,
+        /// `f32` by cell: extinction per length.
+        density,
+        /// `u32` by source: nodes of its subtree, or `LitRecord` where a tensor is gathered.
+        nodes,
+        /// Output: `LitRecord` by facet, or T2.
+        out,
+        /// `u32` by facet: the source that its gather has reached.
+        reached,
+        /// `PackedRecord` by source and light.
+        stencils,
+        /// `[u32; 3]` by round: its workgroups.
+        rounds,
+    }
+}
+
+/// The most iterations that the loops of a gather may take in one dispatch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct IterationBudget {
+    /// Iterations after which no cell is subdivided.
+    pub quarter: u32,
+    /// Iterations after which no further source is visited.
+    pub batch: u32,
+    /// Facets that are collected before their cells are visited.
+    pub aside: u32,
+    /// Lights that are kept in registers: all, or none.
+    pub kept: u32,
+}
+
+/// A kind of receivers, by whether they have a lobe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Receivers {
+    /// Receivers that reflect diffusely.
+    Diffuse,
+    /// Receivers with a specular lobe.
+    Glossy,
+}
+
+/// The properties of a scene that the gather is compiled for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GatherVariant {
+    /// The density grid attenuates light between facets.
+    pub has_clouds: bool,
+    /// Sources are the nodes of a tree.
+    pub has_tree: bool,
+    /// Some region has a specular lobe.
+    pub is_glossy: bool,
+    /// Bound of a dispatch.
+    pub budget: IterationBudget,
+}
+
+/// The gather kernels, for receivers without and with a lobe.
+struct Gather([Kernel; 2]);
+
+impl Gather {
+    fn new(
+        device: &Device,
+        compiler: &Compiler,
+        (name, fields): (&str, &[Field]),
+        variant: &GatherVariant,
+        macros: &[(&'static str, u32)],
+    ) -> Result<Gather> {
+        let budget = &variant.budget;
+        let kernel = |glossy: u32| {
+            let shared = [
+                ("WORKGROUP", block_len(device)),
+                ("MARCH", u32::from(variant.has_clouds)),
+                ("GLOSSY", glossy),
+                ("SPLIT_ITERATIONS", budget.quarter),
+                ("BATCH_ITERATIONS", budget.batch),
+                ("MAX_DEFERRED", budget.aside),
+                ("N_KEPT", budget.kept),
+                ("TOGETHER", u32::from(device.limits().has_subgroup_arithmetic)),
+            ];
+            let macros = [&shared[..], macros].concat();
+            Kernel::with_macros(device, compiler, name, fields, &[], &macros)
+        };
+        Ok(Gather([kernel(0)?, kernel(1)?]))
+    }
+
+    /// Records a round. The first one has a workgroup a block, every other one as many as the round
+    /// before it has counted.
+    fn record<P: Pod>(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: &GatherBuffers<'_>,
+        push: &P,
+        i_round: u32,
+        (receivers, n_blocks): (Receivers, u32),
+    ) -> Result<()> {
+        let (kernel, all) = (&self.0[receivers as usize], buffers.by_binding());
+        match i_round {
+            0 => rec.dispatch_groups(kernel, &all, push, n_blocks),
+            _ => rec.dispatch_indirect(kernel, &all, push, (buffers.rounds, 3 * i_round)),
+        }
+    }
+}
+
+/// The pipelines of the pass where light is gathered at once.
+pub struct Second {
+    sources: Kernel,
+    merge: Kernel,
+    gather: Gather,
+}
+
+impl Second {
+    /// Creates the pipelines; `sums` says how a receiver's sum over its sources is formed.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or a pipeline cannot be created.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
-        has_clouds: bool,
-        n_bases: u32,
-        turns: Turns,
-    ) -> Result<SecondTensor> {
-        let width = block_len(device);
-        let gather = |glossy: u32| {
-            let march = u32::from(has_clouds);
-            let macros =
-                [("WORKGROUP", width), ("MARCH", march), ("GLOSSY", glossy), ("N_BASES", n_bases)];
-            let macros = [&macros[..], &turns.macros(device)].concat();
-            Kernel::with_macros(device, compiler, "second.tensor", TensorPush::FIELDS, &[], &macros)
-        };
-        Ok(SecondTensor { gather: [gather(0)?, gather(1)?] })
+        variant: &GatherVariant,
+        sums: &SumMacros,
+    ) -> Result<Second> {
+        let macros =
+            [("TREE", u32::from(variant.has_tree)), ("SHINY", u32::from(variant.is_glossy))];
+        let macros = [&macros[..], sums.list()].concat();
+        let gather = ("second.gather", GatherPush::FIELDS);
+        Ok(Second {
+            sources: Kernel::new(device, compiler, "second.sources", SourcesPush::FIELDS, &[])?,
+            merge: Kernel::new(device, compiler, "second.merge", MergePush::FIELDS, &[])?,
+            gather: Gather::new(device, compiler, gather, variant, &macros)?,
+        })
     }
 
-    /// Buffers as [`Second::record`] has them; `table` with the vectors of the basis from row
-    /// `i_vectors` on; `t2`: f32 [light][row / 64][column][row % 64] (contract's TILE).
+    /// Writes the facets as sources.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
+    pub fn record_sources(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: &SourceBuffers<'_>,
+        push: &SourcesPush,
+    ) -> Result<()> {
+        rec.dispatch(&self.sources, &buffers.by_binding(), push, push.n_facets)
+    }
+
+    /// Writes the clusters of one height. `merges`: `u32`, nodes by height; `nodes`: `u32` by
+    /// source; `sources` and `fluxes` as in [`SourceBuffers`].
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
+    pub fn record_merge(
+        &self,
+        rec: &mut Recorder<'_>,
+        [merges, nodes, sources, fluxes]: [&Buffer; 4],
+        push: &MergePush,
+    ) -> Result<()> {
+        rec.dispatch(&self.merge, &[merges, nodes, sources, fluxes], push, push.n_merges)
+    }
+
+    /// Gathers light on `blocks`: their kind and number. A gather takes several dispatches, its
+    /// rounds.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 16],
-        push: &TensorPush,
-        receivers: Receivers,
-        n_blocks: u32,
+        buffers: &GatherBuffers<'_>,
+        push: &GatherPush,
+        blocks: (Receivers, u32),
     ) -> Result<()> {
-        of_round(rec, &self.gather[receivers as usize], &buffers, push, push.i_round, n_blocks)
+        self.gather.record(rec, buffers, push, push.i_round, blocks)
     }
 }
 
-/// A block has at least as many receivers, but for a region's last.
-pub const LEAST_BLOCK: u32 = 8;
-
-/// Most receivers of a block: a subgroup's width.
-fn block_len(device: &Device) -> u32 {
-    device.limits().subgroup_size.clamp(LEAST_BLOCK, 64)
+/// The pipelines that fill T2: the second reflection by light, basis function of the receiver and
+/// column of the emitters, for `contract` to sum (docs/model.md §11 "contract").
+pub struct SecondTensor {
+    gather: Gather,
 }
 
-/// The first round has a workgroup a block, and every other as many as the one before has counted.
-fn of_round<P: Pod>(
-    rec: &mut Recorder<'_>,
-    kernel: &Kernel,
-    buffers: &[&Buffer; 16],
-    push: &P,
-    i_round: u32,
-    n_blocks: u32,
-) -> Result<()> {
-    match i_round {
-        0 => rec.dispatch_groups(kernel, buffers, push, n_blocks),
-        _ => rec.dispatch_indirect(kernel, buffers, push, (buffers[15], 3 * i_round)),
+impl SecondTensor {
+    /// Creates the pipelines for `n_bases` basis functions.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or a pipeline cannot be created.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        variant: &GatherVariant,
+        n_bases: u32,
+    ) -> Result<SecondTensor> {
+        let (gather, macros) = (("second.tensor", TensorPush::FIELDS), [("N_BASES", n_bases)]);
+        Ok(SecondTensor { gather: Gather::new(device, compiler, gather, variant, &macros)? })
     }
+
+    /// Gathers the tensor on `blocks`: their kind and number.
+    ///
+    /// Of `buffers`, `table` has the vectors of the basis from row `i_vectors` on, and `out` is T2:
+    /// `f32` by light, row / 64, column and row % 64 (the TILE of `contract`).
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: &GatherBuffers<'_>,
+        push: &TensorPush,
+        blocks: (Receivers, u32),
+    ) -> Result<()> {
+        self.gather.record(rec, buffers, push, push.i_round, blocks)
+    }
+}
+
+/// The least capacity of a block of receivers.
+pub const MIN_BLOCK: u32 = 8;
+
+/// Returns the capacity of a block of receivers: the width of a subgroup.
+pub fn block_len(device: &Device) -> u32 {
+    device.limits().subgroup_size.clamp(MIN_BLOCK, 64)
 }

@@ -1,9 +1,9 @@
-//! surfaces: the scene's rectangles, opaque, with depth, under the sprites.
+//! surfaces: draws the scene's rectangles, opaque, with depth, before the blobs.
 //!
-//! In: regions, lit facets. Out: linear RGBA in the film's format, and depth near/z. Law: where the
-//! pixel's ray meets the rectangle, L1 + L2 interpolated between the facets' centres; the back is
-//! black. Source: docs/model.md §9, §11. Error: the place to 1e-6 of the rectangle's distance over
-//! the cosine, depth likewise, and the target's rounding.
+//! In: regions, lit facets. Out: linear RGBA in the target's format, and depth near/z. Law: L1 + L2
+//! where the pixel's ray meets the rectangle, interpolated between the facets' centers; the back is
+//! black. Source: docs/model.md §9, §11. Error: the position to 1e-6 of the rectangle's distance
+//! over the cosine, the depth likewise, and the target's rounding.
 
 use crate::error::Result;
 use crate::gpu::TargetFormat;
@@ -14,53 +14,49 @@ use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
 record! {
+    /// Push constants of `surfaces.vert` and `surfaces.frag`.
     pub struct Push { camera: CameraRecord, pixel: [f32; 2], unused: [f32; 2] }
 }
 
+/// The pipeline of the pass.
 pub struct Surfaces {
     pipeline: DrawPipeline,
 }
 
 impl Surfaces {
-    /// `depth_only`: of no colour and no alpha.
+    /// Creates the pipeline; with `depth_only`, color and alpha are 0.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or the pipeline cannot be created.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
         format: TargetFormat,
         depth_only: bool,
     ) -> Result<Surfaces> {
-        let constants = [(0, u32::from(depth_only))];
-        let pipeline = DrawPipeline::new(
-            device,
-            compiler,
-            "surfaces",
-            Push::FIELDS,
-            &constants,
-            (format, BlendMode::Opaque),
-        )?;
+        let (constants, blend) = ([(0, u32::from(depth_only))], (format, BlendMode::Opaque));
+        let pipeline =
+            DrawPipeline::new(device, compiler, "surfaces", Push::FIELDS, &constants, blend)?;
         Ok(Surfaces { pipeline })
     }
 
-    /// Clears `target`, which has depth, and draws the first `n_surfaces` regions. `regions`:
-    /// RegionRecord; `lit`: LitRecord by facet.
+    /// Clears `target`, which has depth, and draws the first `n_surfaces` of `regions`
+    /// (`RegionRecord`) with the light `lit` (`LitRecord` by facet).
+    ///
+    /// # Errors
+    /// Fails if `target` has no depth or another format than the pipeline.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 2],
+        [regions, lit]: [&Buffer; 2],
         target: Target<'_>,
         camera: &CameraRecord,
         n_surfaces: u32,
     ) -> Result<()> {
         let (width, height) = target.color.size();
-        let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
+        let pixel = camera.pixel_slopes(width, height);
         let push = Push { camera: *camera, pixel, unused: [0.0; 2] };
-        rec.draw(
-            &self.pipeline,
-            target,
-            LoadOp::Clear,
-            &buffers,
-            &push,
-            InstanceCount::Known(n_surfaces),
-        )
+        let instances = InstanceCount::Known(n_surfaces);
+        rec.draw(&self.pipeline, target, LoadOp::Clear, &[regions, lit], &push, instances)
     }
 }

@@ -1,19 +1,20 @@
-//! transmit: how much of each light arrives at each facet.
+//! transmit: computes how much of each light arrives at each facet.
 //!
-//! In: facets, lights, regions (rectangles), density grid. Out: transmittance [facet][light], and
-//! where it is asked for what clouds alone let through. Law: [nothing hides the way] e^{−(1−g)τ}, τ
-//! by the midpoint rule along the grid. Source: docs/model.md §8, §11. Error: against the same
-//! march in f64, (1−g)τ times the samples' relative rounding plus the sum's ("sums") and 3 + 2|x|
-//! ulp of exp; against the closed form, the grid's. What passes an edge by less than a few ulp may
-//! be hidden or not.
+//! In: facets, lights, regions (rectangles), density grid. Out: transmittance by facet and light,
+//! and on request that of the clouds alone. Law: [no surface hides the light] e^{−(1−g)τ}, τ by the
+//! midpoint rule along the grid. Source: docs/model.md §8, §11. Error: against the same march in
+//! f64, (1−g)τ times the samples' relative rounding, plus the sum's ("sums") and 3 + 2|x| ulp of
+//! exp; against the closed form, the grid's. A ray within a few ulp of an edge may count as hidden
+//! or not.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
+use crate::gpu::{Compiler, Device, Kernel, Recorder};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
 use crate::layout::sums::SumMacros;
 
 record! {
+    /// Push constants of `transmit.comp`.
     pub struct Push {
         grid: GridRecord,
         n_facets: u32,
@@ -25,60 +26,88 @@ record! {
     }
 }
 
-/// Most steps of one march. The model refuses a scene whose marches need more; here the bound keeps
-/// a wrong input from becoming an endless loop.
+/// The most steps of a march. The model refuses a scene whose marches need more; here the bound
+/// keeps a wrong input from becoming an endless loop.
 pub const MAX_STEPS: u32 = 4096;
 
+bindings! {
+    /// The buffers of the pass.
+    pub struct TransmitBuffers {
+        /// `FacetRecord` by facet.
+        facets,
+        /// `LightRecord` by light.
+        lights,
+        /// `RegionRecord` by region, surfaces first.
+        regions,
+        /// `f32` by cell: extinction per length.
+        density,
+        /// Output, `f32` by facet and light.
+        transmittance,
+        /// Output, `f32` by facet and light: e^{−(1−g)τ} whether or not a surface hides the light;
+        /// empty unless requested.
+        through,
+    }
+}
+
+/// The march toward the lights.
+#[derive(Debug, Clone, Copy)]
+pub struct MarchParams {
+    /// Number of facets.
+    pub n_facets: u32,
+    /// Number of lights.
+    pub n_lights: u32,
+    /// Number of surfaces that may hide a light.
+    pub n_surfaces: u32,
+    /// Step in cells.
+    pub step_cells: f64,
+    /// Forward-scattering share g; 1 marches nothing.
+    pub forward: f64,
+}
+
+/// The pipeline of the pass.
 pub struct Transmit {
     kernel: Kernel,
 }
 
 impl Transmit {
-    /// `apart`: what the clouds let through is written by itself, too. `sums`: how τ is summed.
+    /// Creates the pipeline. With `has_through`, the transmittance of the clouds alone is written
+    /// too; `sums` says how τ is summed.
+    ///
+    /// # Errors
+    /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
-        apart: bool,
+        has_through: bool,
         sums: &SumMacros,
     ) -> Result<Transmit> {
-        let constants = [(0, u32::from(apart))];
-        let fields = Push::FIELDS;
-        Ok(Transmit {
-            kernel: Kernel::with_macros(
-                device,
-                compiler,
-                "transmit",
-                fields,
-                &constants,
-                sums.list(),
-            )?,
-        })
+        let constants = [(0, u32::from(has_through))];
+        let (fields, macros) = (Push::FIELDS, sums.list());
+        let kernel = Kernel::with_macros(device, compiler, "transmit", fields, &constants, macros)?;
+        Ok(Transmit { kernel })
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `regions`: RegionRecord, the surfaces' first;
-    /// `density`: f32; `transmittance`: f32; `through`: f32, e^{−(1−g)τ} whether or not a surface
-    /// is in the way, empty where it was not asked for. `step_cells` is the step in cells,
-    /// `forward` is g: where it is 1, nothing is marched.
+    /// Writes the transmittance of every facet and light.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 6],
+        buffers: &TransmitBuffers<'_>,
         grid: &GridRecord,
-        [n_facets, n_lights, n_surfaces]: [u32; 3],
-        step_cells: f64,
-        forward: f64,
+        march: &MarchParams,
     ) -> Result<()> {
-        let step_length = (step_cells * f64::from(grid.cell)) as f32;
-        let backward = (1.0 - forward) as f32;
+        let MarchParams { n_facets, n_lights, n_surfaces, step_cells, forward } = *march;
         let push = Push {
             grid: *grid,
             n_facets,
             n_lights,
             n_surfaces,
-            step_length,
-            backward,
+            step_length: (step_cells * f64::from(grid.cell)) as f32,
+            backward: (1.0 - forward) as f32,
             max_steps: MAX_STEPS,
         };
-        rec.dispatch(&self.kernel, &buffers, &push, n_facets * n_lights)
+        rec.dispatch(&self.kernel, &buffers.by_binding(), &push, n_facets * n_lights)
     }
 }

@@ -1,10 +1,10 @@
-//! upsample: the blobs' smaller picture over the full one.
+//! upsample: resamples the smaller picture of the blobs over the full picture.
 //!
-//! In: the blobs alone in a smaller picture, and where there are surfaces their picture and the
-//! depth that both kinds of pixels see. Out: the picture in a buffer, rows from the top, in the
-//! film's format. Law: Lagrange's polynomials of degree five through 6 × 6 small pixels, of fewer
-//! beside edges of depth, premultiplied "over" (docs/model.md §11 "upsample"). Error: f32's, some
-//! forty roundings of what the weights' magnitudes sum to, and the format's once.
+//! In: the blobs alone in a smaller picture; the surfaces' full picture and the depth that the
+//! pixels of both pictures see. Out: the picture in a buffer, rows from the top, in the film's
+//! format. Law: Lagrange polynomials of degree five through 6 × 6 small pixels, fewer beside edges
+//! of depth, premultiplied "over" (docs/model.md §11 "upsample"). Error: about forty f32 roundings
+//! of the sum of the weights' magnitudes, and one rounding to the format.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
@@ -12,6 +12,7 @@ use crate::gpu::{TargetFormat, has_depth24};
 use crate::layout::record;
 
 record! {
+    /// Push constants of `upsample.comp`.
     pub struct Push {
         width: u32,
         height: u32,
@@ -25,33 +26,48 @@ record! {
     }
 }
 
-/// How the two pictures' pixels lie.
+/// How the pixels of the two pictures lie.
 #[derive(Debug, Clone, Copy)]
 pub struct Extents {
+    /// Columns and rows of the full picture.
     pub full: [u32; 2],
-    /// A multiple of four across.
+    /// Columns, a multiple of four, and rows of the smaller picture.
     pub small: [u32; 2],
-    /// Full pixel p lies at (offset + 2p)/2n small pixels from the centre of the first one.
+    /// Full pixel p lies (offset + 2p)/2n small pixels from the center of the first one.
     pub offsets: [u32; 2],
     /// Full pixels along a side of a small one.
     pub n: u32,
 }
 
+/// The buffers of the surfaces beneath the blobs.
+#[derive(Clone, Copy)]
+pub struct SolidBuffers<'a> {
+    /// Pixels of the surfaces' full picture.
+    pub under: &'a Buffer,
+    /// `f32` by small pixel: near/z.
+    pub small_depths: &'a Buffer,
+    /// `f32` by full pixel: near/z.
+    pub depths: &'a Buffer,
+}
+
+/// The pipeline of the pass.
 pub struct Upsample {
     kernel: Kernel,
     push: Push,
     n_invocations: u32,
-    behind: bool,
 }
 
 impl Upsample {
-    /// Between pictures of such `extents`. `behind`: there are surfaces.
+    /// Creates the pipeline; `over_solids` if surfaces lie beneath the blobs.
+    ///
+    /// # Errors
+    /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
         extents: &Extents,
         format: TargetFormat,
-        behind: bool,
+        over_solids: bool,
     ) -> Result<Upsample> {
         let Extents { full: [width, height], small: [small_width, small_height], offsets, n } =
             *extents;
@@ -61,19 +77,19 @@ impl Upsample {
         let macros = [
             ("N", n),
             ("OFFSET_X", offset_x % (2 * n)),
-            // Runs are 4 n pixels wide: four small ones.
+            // A run is 4 n pixels wide, which are four small pixels.
             ("SHIFT", (offset_x / (2 * n) - 2) % 4),
             ("PIXEL_WORDS", pixel_words),
             ("TOGETHER", if width.is_multiple_of(together) { together } else { 1 }),
-            // Beside edges of depth pixels are stored one by one.
-            ("WORDS_64", u32::from(!behind && device.limits().has_int64)),
-            ("BEHIND", if behind { 1 + u32::from(has_depth24(device)) } else { 0 }),
+            // Beside edges of depth, pixels are stored one by one.
+            ("WORDS_64", u32::from(!over_solids && device.limits().has_int64)),
+            ("BEHIND", if over_solids { 1 + u32::from(has_depth24(device)) } else { 0 }),
         ];
         let kernel = Kernel::with_macros(device, compiler, "upsample", Push::FIELDS, &[], &macros)?;
         let n_runs = width.div_ceil(4 * n);
         let n_small = u64::from(small_width) * u64::from(small_height);
         let last_texel = (n_small * format.bytes_per_pixel() / 16) as u32 - 1;
-        // Rows by twos that lie between the same small ones: o + 2 y from a multiple of four on.
+        // Pairs of rows between the same small rows: o + 2 y from a multiple of four on.
         let n_pairs =
             if height > 0 { (offset_y + 2 * (height - 1)) / 4 - offset_y / 4 + 1 } else { 0 };
         let push = Push {
@@ -87,19 +103,22 @@ impl Upsample {
             n_pairs,
             last_texel,
         };
-        Ok(Upsample { kernel, push, n_invocations: n_runs * n_pairs, behind })
+        Ok(Upsample { kernel, push, n_invocations: n_runs * n_pairs })
     }
 
-    /// `small`: the blobs; `picture`: what becomes of them; with surfaces `under`: theirs, [near/z
-    /// of the small pixels, of the full ones].
+    /// Writes `picture` from the blobs in `small`, and over `solids` where the pass was created so.
+    ///
+    /// # Errors
+    /// Fails if `solids` are given to a pass that was created without them, or the reverse.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
         [small, picture]: [&Buffer; 2],
-        surfaces: Option<[&Buffer; 3]>,
+        solids: Option<SolidBuffers<'_>>,
     ) -> Result<()> {
-        let mut buffers = vec![small, picture];
-        buffers.extend(surfaces.into_iter().flatten().take(if self.behind { 3 } else { 0 }));
+        let solids = solids.map(|s| [s.under, s.small_depths, s.depths]);
+        let buffers: Vec<_> =
+            [small, picture].into_iter().chain(solids.into_iter().flatten()).collect();
         rec.dispatch(&self.kernel, &buffers, &self.push, self.n_invocations)
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytemuck::Pod;
 
 use crate::error::{Error, Result};
-use crate::frame::stage::{Bed, DeviceChoice, Player};
+use crate::frame::{DeviceChoice, GpuContext, Player};
 use crate::gpu::{
     Buffer, Commands, Compiler, Device, Field, Kernel, MemoryUsage, Recorder, Sources,
 };
@@ -45,7 +45,7 @@ pub struct StressContext {
     commands: Commands,
     sources: Sources,
     choice: DeviceChoice,
-    gpu: Bed,
+    gpu: GpuContext,
 }
 
 /// The device's results for one frame of a scene.
@@ -87,7 +87,7 @@ impl StressContext {
     /// # Errors
     /// If the device cannot be opened.
     pub fn with_sources(choice: &DeviceChoice, sources: Sources) -> Result<StressContext> {
-        let gpu = Bed::with_sources(choice, sources.clone())?;
+        let gpu = GpuContext::with_sources(choice, sources.clone())?;
         let commands = Commands::new(&gpu.device, "stress")?;
         Ok(StressContext { commands, sources, choice: choice.clone(), gpu })
     }

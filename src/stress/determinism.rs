@@ -9,7 +9,7 @@ use super::case::{Case, Comparison};
 use super::context::StressContext;
 use super::scenes::{LIT, PATHS, blob_cluster, box_scene, centred_box, cloud_of};
 use crate::error::Result;
-use crate::frame::render::Renderer;
+use crate::frame::Renderer;
 use crate::frame::{FrameTimes, parallel, serial};
 use crate::model::cloud::CloudSource;
 use crate::model::gust::Gust;

@@ -5,7 +5,7 @@ use super::case::{Case, Comparison};
 use super::context::StressContext;
 use crate::error::Result;
 use crate::model::philox::philox4x32_10;
-use crate::passes::sort::Sort;
+use crate::passes::sort::{Count, Sort};
 use crate::reference::sort::{key16, key32, order};
 
 pub const CASES: &[Case] = &[
@@ -49,7 +49,7 @@ fn sorted(ctx: &mut StressContext, c: &mut Comparison, key: impl Fn(u32) -> u32)
         let entries: Vec<Entry> = (0..n).map(|i| [key(i), i]).collect();
         for (n_bits, mask) in [(16, 0xffff), (32, u32::MAX)] {
             let buffer = ctx.upload(&entries)?;
-            ctx.run(|rec| sort.record(rec, &buffer, n, n_bits))?;
+            ctx.run(|rec| sort.record(rec, &buffer, n_bits, Count::Known(n)).map(|_| ()))?;
             let found: Vec<Entry> = ctx.download(&buffer, n as usize)?;
             let keys: Vec<u32> = entries.iter().map(|[key, _]| key & mask).collect();
             let expected: Vec<Entry> =

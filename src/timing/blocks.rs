@@ -9,11 +9,11 @@ use sha2::{Digest, Sha256};
 use super::attachments::CasePicture;
 use super::cases::{Case, Loop};
 use crate::error::{Error, Result};
+use crate::frame::Counts;
 use crate::frame::FrameTimes;
-use crate::frame::counts::Counts;
-use crate::frame::light_notes::light_notes;
-use crate::frame::render::Renderer;
-use crate::frame::stage::Stage;
+use crate::frame::Renderer;
+use crate::frame::Stage;
+use crate::frame::light_notes;
 use crate::gpu::hex;
 use crate::io::image::display_bytes;
 use crate::model::scene::{Draw, Scene};
@@ -196,7 +196,7 @@ impl Bench<'_> {
         self.outcome.blocks.push(Block { i_case: block.i_case, of: block.of, image_hash });
         if block.is_last {
             self.outcome.notes.extend(light_notes(stage)?.iter().map(named));
-            let counts = Counts::of(&mut stage.renderer, &stage.device, &stage.scene)?;
+            let counts = Counts::new(&mut stage.renderer, &stage.device, &stage.scene)?;
             self.outcome.counts.insert(block.i_case, counts);
             if self.plan.pictures && !is_stopped() {
                 let film = case.scene.film;

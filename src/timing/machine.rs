@@ -7,7 +7,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::frame::render::Renderer;
+use crate::frame::Renderer;
 use crate::gpu::DeviceInfo;
 use crate::measure::clock::ClockQuality;
 

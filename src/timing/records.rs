@@ -8,7 +8,7 @@ use super::json::ResultFile;
 use super::machine::{Clocks, Cpu, Device};
 use super::names::{Setting, case_name, loop_name, sweep_text};
 use super::overlap::Overlap;
-use crate::frame::counts::Counts;
+use crate::frame::Counts;
 use crate::measure::lows::Lows;
 use crate::measure::stats::Summary;
 

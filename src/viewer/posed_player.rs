@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::sync::lock;
 use crate::error::Result;
-use crate::frame::stage::Player;
+use crate::frame::Player;
 use crate::model::camera::Pose;
 
 /// A scene on the device whose camera is set before each frame.
@@ -19,7 +19,7 @@ impl PosedPlayer {
     pub fn new(player: Player, pose: Pose) -> PosedPlayer {
         let pose = Arc::new(Mutex::new(pose));
         let shared = pose.clone();
-        let game = player.game.seen_from(Box::new(move || *lock(&shared)));
+        let game = player.game.with_viewpoint(Box::new(move || *lock(&shared)));
         PosedPlayer { player: Player { game, ..player }, pose }
     }
 

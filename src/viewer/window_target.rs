@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 
 use super::egui_layer::{WidgetFrame, take_widgets};
 use crate::error::Result;
-use crate::frame::render::Renderer;
-use crate::frame::stage::{Bed, DeviceChoice};
+use crate::frame::Renderer;
+use crate::frame::{DeviceChoice, GpuContext};
 use crate::gpu::{
     Buffer, Commands, Instance, MemoryUsage, Overlay, PresentMode, PresentOutcome, Recorder,
     Surface, Swapchain,
@@ -19,7 +19,7 @@ pub struct WindowTarget {
     swapchain: Option<Swapchain>,
     /// `None` until the first swapchain exists.
     overlay: Option<Overlay>,
-    pub bed: Bed,
+    pub bed: GpuContext,
     surface: Surface,
     modes: Vec<PresentMode>,
     i_mode: usize,
@@ -35,7 +35,7 @@ impl WindowTarget {
         choice: &DeviceChoice,
         mode: PresentMode,
     ) -> Result<WindowTarget> {
-        let bed = Bed::of_instance(instance, choice, choice.sources()?)?;
+        let bed = GpuContext::with_instance(instance, choice, choice.sources()?)?;
         surface.check(&bed.device)?;
         let modes = surface.modes(&bed.device)?;
         let i_mode = modes.iter().position(|m| *m == mode).unwrap_or(0);

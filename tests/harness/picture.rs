@@ -49,8 +49,8 @@ pub struct Tiled {
     pub invocations: u32,
     /// Without subgroup operations.
     pub portable: bool,
-    pub most_pairs: Option<u64>,
-    pub most_tiles: Option<u32>,
+    pub max_pairs: Option<u64>,
+    pub max_tiles: Option<u32>,
     pub saturated: f64,
 }
 

@@ -3,15 +3,17 @@
 use glam::DVec3;
 use half::f16;
 use nimbus::error::Result;
-use nimbus::frame::chunks::{self, Chunks};
-use nimbus::frame::tiling::Tiling;
+use nimbus::frame::{ChunkCount, ChunkedSprites, Tiling};
 use nimbus::gpu::TargetFormat;
-use nimbus::gpu::{Buffer, Compiler, Image, LoadOp, MemoryUsage, RecordCount, Recorder, Target};
+use nimbus::gpu::{
+    BlendMode, Buffer, Compiler, Image, LoadOp, MemoryUsage, RecordCount, Recorder, Target,
+};
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
+use nimbus::passes::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
 use nimbus::passes::sprites::Sprites;
 use nimbus::passes::surfaces::Surfaces;
-use nimbus::passes::tiles::{self, Division, Variant};
+use nimbus::passes::tiles::{Division, Variant};
 use nimbus::reference::Blob;
 
 use super::{Picture, Tiled, Way};
@@ -32,7 +34,7 @@ struct Uploaded {
 enum Made {
     Sprites(Sprites),
     Tiles(Box<Tiling>, f64),
-    Chunks(Box<Chunks>, f64),
+    Chunks(Box<ChunkedSprites>, f64),
 }
 
 impl Picture {
@@ -125,15 +127,13 @@ impl Picture {
     }
 
     fn make(&self, gpu: &Gpu, compiler: &Compiler, format: TargetFormat, way: Way) -> Made {
-        let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
-        let [grouped, weighted] = [self.i_facet.is_some(), self.drawn.is_some()];
-        let [textured, threshold] = [self.textured.is_some(), self.view.threshold > 0.0];
-        let ellipsoids = self.has_ellipsoids();
+        let variant = self.variant();
         match way {
             Way::Sprites => {
-                let variant = [behind, grouped, weighted, textured, threshold, ellipsoids];
+                let blend =
+                    if self.scenery.is_some() { BlendMode::OverTested } else { BlendMode::Over };
                 Made::Sprites(
-                    Sprites::new(&gpu.device, compiler, format, lit, variant).expect("sprites"),
+                    Sprites::new(&gpu.device, compiler, format, variant, blend).expect("sprites"),
                 )
             }
             Way::Tiles(tiled) => {
@@ -141,11 +141,10 @@ impl Picture {
             }
             Way::Chunks(n_chunks, saturated) => {
                 // Capacity for more particles than there are, as after culling.
-                let (size, n) =
-                    ([self.view.width, self.view.height], self.placed.len() as u32 + 37);
-                let variant = [lit, grouped, weighted, textured, threshold, ellipsoids];
+                let count = ChunkCount { n_max: self.placed.len() as u32 + 37, n_chunks };
+                let size = [self.view.width, self.view.height];
                 let chunks =
-                    Chunks::new(&gpu.device, compiler, size, format, [n, n_chunks], variant);
+                    ChunkedSprites::new(&gpu.device, compiler, size, format, count, variant);
                 Made::Chunks(Box::new(chunks.expect("chunks")), saturated)
             }
         }
@@ -196,22 +195,20 @@ impl Picture {
         target: Target<'_>,
         camera: &CameraRecord,
     ) -> Result<()> {
-        let from = uploaded.of_sprites.each_ref();
-        let n = (RecordCount::Known(uploaded.n_entries), uploaded.n_surface_facets);
+        let from = BlobBuffers::from_bindings(uploaded.of_sprites.each_ref());
+        let i_first_facet = uploaded.n_surface_facets;
+        let n = BlobCount { n: RecordCount::Known(uploaded.n_entries), i_first_facet };
         let (cutoff, threshold) = (self.view.cutoff, self.view.threshold);
+        let view = |saturated: f64| BlobView { camera, cutoff, threshold, saturated };
+        let start = if self.scenery.is_some() { LoadOp::Load } else { LoadOp::Clear };
         match made {
-            Made::Sprites(sprites) => {
-                sprites.record(rec, from, target, camera, [cutoff, threshold], n)
-            }
+            Made::Sprites(sprites) => sprites.record(rec, &from, (target, start), &view(0.0), n),
             Made::Tiles(tiling, saturated) => {
-                let view = tiles::View { camera, cutoff, threshold, saturated: *saturated };
-                tiling.record(rec, 0, self.scenery.is_some().then_some(target), from, &view, n)
+                let under = self.scenery.is_some().then_some(target);
+                tiling.record(rec, 0, under, &from, &view(*saturated), n)
             }
             Made::Chunks(chunks, saturated) => {
-                let start = if self.scenery.is_some() { LoadOp::Load } else { LoadOp::Clear };
-                let view =
-                    chunks::View { camera, cuts: [cutoff, threshold], saturated: *saturated };
-                chunks.record(rec, from, (target, start), &view, n)
+                chunks.record(rec, &from, (target, start), &view(*saturated), n)
             }
         }
     }
@@ -223,26 +220,32 @@ impl Picture {
         format: TargetFormat,
         tiled: &Tiled,
     ) -> Tiling {
-        let division =
-            Division::of(self.view.width, self.view.height, tiled.invocations).expect("a division");
+        let division = Division::new(self.view.width, self.view.height, tiled.invocations)
+            .expect("a division");
         let blobs = self.blobs();
-        let tau_most = blobs.iter().map(Blob::deepest).fold(0.0, f64::max);
+        let tau_max = blobs.iter().map(Blob::deepest).fold(0.0, f64::max);
         let variant = Variant {
-            ellipsoids: self.has_ellipsoids(),
+            blobs: self.variant(),
+            format,
+            has_under: self.scenery.is_some(),
+            // One rounding above the blobs' own numbers in f32.
+            tau_max: tau_max * (1.0 + 8.0 * U),
+            portable: tiled.portable,
+            max_pairs: tiled.max_pairs,
+            max_tiles: tiled.max_tiles,
+        };
+        Tiling::new(&gpu.device, compiler, division, blobs.len().max(1) as u32, 1, &variant)
+            .expect("tiles")
+    }
+
+    fn variant(&self) -> BlobVariant {
+        BlobVariant {
             lit: self.lit.is_some(),
             grouped: self.i_facet.is_some(),
+            weighted: self.drawn.is_some(),
             textured: self.textured.is_some(),
             threshold: self.view.threshold > 0.0,
-            weighted: self.drawn.is_some(),
-            format,
-            behind: self.scenery.is_some(),
-            // One rounding above the blobs' own numbers in f32.
-            tau_most: tau_most * (1.0 + 8.0 * U),
-            portable: tiled.portable,
-            most_pairs: tiled.most_pairs,
-            most_tiles: tiled.most_tiles,
-        };
-        Tiling::new(&gpu.device, compiler, division, blobs.len().max(1) as u32, &variant)
-            .expect("tiles")
+            ellipsoids: self.has_ellipsoids(),
+        }
     }
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use nimbus::error::{Error, Place, Result};
-use nimbus::frame::game::Game;
+use nimbus::frame::Game;
 use nimbus::io::scene_file::{LoadedScene, parse_beside};
 use nimbus::io::weather::{netcdf, wrf};
 use nimbus::io::{box_file, particle_file};

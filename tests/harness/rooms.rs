@@ -6,8 +6,8 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use glam::DVec3;
-use nimbus::frame::game::Game;
-use nimbus::frame::render::Renderer;
+use nimbus::frame::Game;
+use nimbus::frame::Renderer;
 use nimbus::gpu::Compiler;
 use nimbus::layout::facet::{FacetRecord, LitRecord};
 use nimbus::layout::frame::LightRecord;

@@ -6,7 +6,7 @@ use nimbus::layout::facet::{FacetRecord, RunRecord};
 use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::grid::GridSpec;
-use nimbus::passes::facets::Facets;
+use nimbus::passes::facets::{Facets, ParticleBuffers, RunBuffers};
 use nimbus::passes::grid::Grid;
 use nimbus::reference::Blob;
 use nimbus::reference::facets::{
@@ -147,14 +147,15 @@ impl Scene {
             grid.record(rec, [&placed, &particles, &density], &self.record, n as u32, heaviest)?;
             if runs.is_empty() {
                 let buffers = [&placed, &particles, &i_group, &groups, &density, &made];
-                return pass.record(rec, buffers, &self.record, n as u32, N_SURFACE_FACETS as u32);
+                let buffers = ParticleBuffers::from_bindings(buffers);
+                return pass.record(rec, &buffers, &self.record, n as u32, N_SURFACE_FACETS as u32);
             }
             let buffers = [
                 &placed, &particles, &i_group, &groups, &density, &order, &records, &made, &i_facet,
             ];
-            pass.record_groups(
+            pass.record_runs(
                 rec,
-                buffers,
+                &RunBuffers::from_bindings(buffers),
                 &self.record,
                 runs.len() as u32,
                 N_SURFACE_FACETS as u32,

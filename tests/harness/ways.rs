@@ -12,7 +12,7 @@ use nimbus::model::light::Light;
 use nimbus::model::material::Brdf;
 use nimbus::model::sums::Sums;
 use nimbus::model::surface::Surface;
-use nimbus::passes::transmit::Transmit;
+use nimbus::passes::transmit::{MarchParams, Transmit, TransmitBuffers};
 use nimbus::reference::{Blob, grid::deposit, occlude::Rectangle, transmit};
 
 use crate::bounded::{Bounded, Random};
@@ -167,16 +167,11 @@ impl Case {
         let n_total = self.facets.len() * self.lights.len();
         let out = gpu.buffer::<f32>(n_total);
         let grid = GridRecord::from(&self.spec);
-        gpu.run(|rec| {
-            pass.record(
-                rec,
-                [&facets, &lights, &regions, &density, &out, through],
-                &grid,
-                n,
-                step,
-                forward,
-            )
-        });
+        let buffers = [&facets, &lights, &regions, &density, &out, through];
+        let buffers = TransmitBuffers::from_bindings(buffers);
+        let [n_facets, n_lights, n_surfaces] = n;
+        let march = MarchParams { n_facets, n_lights, n_surfaces, step_cells: step, forward };
+        gpu.run(|rec| pass.record(rec, &buffers, &grid, &march));
         gpu.download::<f32>(&out, n_total).into_iter().map(f64::from).collect()
     }
 

@@ -4,8 +4,8 @@
 use std::path::Path;
 
 use glam::DVec3;
+use nimbus::frame::DeviceChoice;
 use nimbus::frame::serial;
-use nimbus::frame::stage::DeviceChoice;
 use nimbus::io::scene_file::parse;
 use nimbus::model::boxes::{BoxLaw, CloudBox, Form};
 use nimbus::model::cloud::{Cloud, CloudSource, Particle};

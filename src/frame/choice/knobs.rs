@@ -1,35 +1,38 @@
-//! The knobs that can be "auto", in the order in which they are settled.
+//! The table of knobs that can be "auto", in the order in which they are settled.
 
-use super::rule::Tried;
+use super::rule::Candidate;
 use crate::model::cutoff::Cutoff;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors};
 
-/// What a knob's values make other than the time.
+/// The effect of a knob's values besides the time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Changes {
-    /// Every value draws the same law and rounds otherwise: the picture of the one that is taken is
-    /// the exact one.
+    /// The rounding: every value computes the same picture, and the chosen one's becomes the exact
+    /// one.
     Rounding,
-    /// Nothing, but for what rounds of `tiles` and several chunks may round.
+    /// Nothing, except for the rounding of several chunks or rounds of `tiles`.
     Nothing,
-    /// The picture, by as much as `draw.error` allows.
+    /// The picture, within `draw.error`.
     Picture,
 }
 
+/// A knob that can be "auto".
 pub struct Knob {
-    /// As scene files have it.
+    /// Key in the scene file's `draw`.
     pub key: &'static str,
+    /// The effect of its values.
     pub changes: Changes,
+    /// Returns whether the knob is "auto".
     pub is_auto: fn(&Draw) -> bool,
-    /// What may be taken where the other knobs are as they are, to begin with what changes nothing,
-    /// then in order of what they may change.
+    /// Returns the candidates with the other knobs as they are: first the value that changes
+    /// nothing, then by increasing change.
     pub values: fn(&Draw) -> Vec<Draw>,
-    /// A value as scene files have it.
+    /// Returns a value as scene files write it.
     pub name: fn(&Draw) -> String,
 }
 
-/// Chunks; in more the pixels that are full are looked for more often.
+/// Numbers of chunks; with more chunks, opaque pixels are found earlier.
 const CHUNKS: [u32; 4] = [0, 4, 16, 64];
 /// Optical depths; a quarter of a step of 8 bits is 0.001.
 const THRESHOLDS: [f64; 4] = [0.0, 1e-5, 1e-4, 1e-3];
@@ -44,7 +47,7 @@ pub const KNOBS: [Knob; 6] = [
         values: |draw| {
             [DrawPath::Sprites, DrawPath::Tiles].map(|path| Draw { path, ..*draw }).to_vec()
         },
-        name: |draw| named(&DrawPath::NAMES, draw.path),
+        name: |draw| toml_name(&DrawPath::NAMES, draw.path),
     },
     Knob {
         key: "chunks",
@@ -61,12 +64,12 @@ pub const KNOBS: [Knob; 6] = [
     Knob {
         key: "cull",
         changes: Changes::Nothing,
-        // Who is in a shell must not depend on the view: none is left out.
+        // Impostor layers include every particle, so that they stay valid when the camera turns.
         is_auto: |draw| draw.cull == Cull::Auto && draw.impostors == Impostors::Off,
         values: |draw| [Cull::On, Cull::Off].map(|cull| Draw { cull, ..*draw }).to_vec(),
-        name: |draw| named(&Cull::NAMES, draw.cull),
+        name: |draw| toml_name(&Cull::NAMES, draw.cull),
     },
-    // Before what saves less by as much of the error.
+    // Before the knobs that save less time for the same error.
     Knob {
         key: "resolution",
         changes: Changes::Picture,
@@ -85,7 +88,7 @@ pub const KNOBS: [Knob; 6] = [
         key: "smallest",
         changes: Changes::Picture,
         is_auto: |draw| draw.smallest == Cutoff::Auto,
-        // Who culls leaves them out.
+        // Culling leaves small blobs out.
         values: |draw| {
             let cull = |pixels: f64| if pixels > 0.0 { Cull::On } else { draw.cull };
             SMALLEST.map(|w| Draw { smallest: Cutoff::At(w), cull: cull(w), ..*draw }).to_vec()
@@ -95,29 +98,29 @@ pub const KNOBS: [Knob; 6] = [
 ];
 
 impl Knob {
-    /// Whether what was tried is near enough to the exact picture. Without an error nothing is
-    /// taken that might change another frame.
-    pub fn allows(&self, tried: &Tried, error: f64) -> bool {
-        match (self.changes, tried.rmse) {
+    /// Returns whether a candidate is near enough to the exact picture. If the error is 0, no value
+    /// is allowed that might change another frame.
+    pub fn allows(&self, candidate: &Candidate, error: f64) -> bool {
+        match (self.changes, candidate.rmse) {
             (_, None) => false,
             (Changes::Rounding, Some(_)) => true,
             (Changes::Nothing, Some(rmse)) => rmse <= error,
-            (Changes::Picture, Some(rmse)) => rmse <= error && (error > 0.0 || tried.is_first),
+            (Changes::Picture, Some(rmse)) => rmse <= error && (error > 0.0 || candidate.is_first),
         }
     }
 
-    /// `value` as users are told, `first` being what changes nothing.
-    pub fn told(&self, value: &Draw, first: &Draw) -> String {
+    /// Returns `value` as users read it; `first` is the value that changes nothing.
+    pub fn label(&self, value: &Draw, first: &Draw) -> String {
         let name = (self.name)(value);
         match self.key != "cull" && value.cull != first.cull {
-            true => format!("{name} with draw.cull = {}", named(&Cull::NAMES, value.cull)),
+            true => format!("{name} with draw.cull = {}", toml_name(&Cull::NAMES, value.cull)),
             false => name,
         }
     }
 }
 
-/// The name of a value, as a string of TOML.
-pub fn named<T: PartialEq>(names: &[(&str, T)], value: T) -> String {
+/// Returns the name of a value as a TOML string.
+pub fn toml_name<T: PartialEq>(names: &[(&str, T)], value: T) -> String {
     let name = names.iter().find(|(_, of)| *of == value).map_or("", |(name, _)| name);
     format!("\"{name}\"")
 }
@@ -127,7 +130,7 @@ mod tests {
     use super::*;
     use crate::model::sort_bits::SortBits;
 
-    /// Everything that can be "auto" is.
+    /// A `draw` in which every knob is "auto".
     const ASKED: Draw = Draw {
         path: DrawPath::Auto,
         impostors: Impostors::Off,
@@ -146,13 +149,13 @@ mod tests {
     };
 
     #[test]
-    fn every_knob_begins_with_what_changes_nothing_and_names_its_values() {
+    fn the_first_value_of_a_knob_changes_nothing_and_all_have_names() {
         let exact = ASKED.exact();
         for knob in &KNOBS {
             assert!((knob.is_auto)(&ASKED) && !(knob.is_auto)(&exact), "{}", knob.key);
             let values = (knob.values)(&exact);
             assert_eq!(values[0], exact, "{}", knob.key);
-            let mut names: Vec<String> = values.iter().map(|v| knob.told(v, &exact)).collect();
+            let mut names: Vec<String> = values.iter().map(|v| knob.label(v, &exact)).collect();
             assert!(
                 names.iter().all(|name| !name.contains("auto") && !name.contains("with")),
                 "{names:?}"
@@ -164,34 +167,38 @@ mod tests {
     }
 
     #[test]
-    fn who_leaves_small_ones_out_culls_and_says_so() {
+    fn a_smallest_size_turns_culling_on_and_says_so() {
         let off = Draw { cull: Cull::Off, ..ASKED.exact() };
         let Some(knob) = KNOBS.iter().find(|k| k.key == "smallest") else { panic!("no such knob") };
         let values = (knob.values)(&off);
         assert_eq!([values[0].cull, values[1].cull], [Cull::Off, Cull::On]);
-        assert_eq!(knob.told(&values[1], &off), "0.25 with draw.cull = \"on\"");
+        assert_eq!(knob.label(&values[1], &off), "0.25 with draw.cull = \"on\"");
     }
 
     #[test]
-    fn without_an_error_nothing_is_allowed_that_may_change_a_picture() {
-        let tried =
-            |is_first, rmse| Tried { value: String::new(), is_first, times_ms: vec![1.0], rmse };
+    fn with_error_zero_no_value_is_allowed_that_may_change_a_picture() {
+        let candidate = |is_first, rmse| Candidate {
+            value: String::new(),
+            is_first,
+            times_ms: vec![1.0],
+            rmse,
+        };
         let of = |changes| KNOBS.iter().find(|k| k.changes == changes).expect("one");
         let [rounding, nothing, picture] =
             [Changes::Rounding, Changes::Nothing, Changes::Picture].map(of);
-        let equal = tried(false, Some(0.0));
+        let equal = candidate(false, Some(0.0));
         assert!(
             nothing.allows(&equal, 0.0)
                 && !picture.allows(&equal, 0.0)
                 && picture.allows(&equal, 1e-9)
         );
-        assert!(picture.allows(&tried(true, Some(0.0)), 0.0));
-        let off = tried(false, Some(0.1));
+        assert!(picture.allows(&candidate(true, Some(0.0)), 0.0));
+        let off = candidate(false, Some(0.1));
         assert!(
             rounding.allows(&off, 0.0)
                 && !nothing.allows(&off, 0.01)
                 && !picture.allows(&off, 0.01)
         );
-        assert!(!rounding.allows(&tried(false, None), 1.0));
+        assert!(!rounding.allows(&candidate(false, None), 1.0));
     }
 }

@@ -1,28 +1,35 @@
-//! What "auto" takes of the knobs of a drawing: the scene's first frame is drawn with each value
-//! that may be taken, timed, and compared with the exact picture. A further knob is a line in
-//! [`knobs`].
+//! The choice of "auto" knobs of a scene's `draw`: the scene's first frame is drawn with each
+//! candidate value, timed, and compared with the exact picture. A further knob is a row in
+//! [`knobs::KNOBS`].
 
-pub mod impostors;
+mod impostors;
 mod knobs;
-pub use knobs::named;
 mod rule;
 mod trial;
 
+pub use impostors::ImpostorChoice;
+pub use knobs::toml_name;
+pub use rule::{Candidate, Choice};
+
 use super::game::Game;
-use super::render::Renderer;
+use super::renderer::Renderer;
 use crate::error::Result;
 use crate::gpu::{Compiler, Device};
 use crate::model::scene::{Draw, Scene};
 use knobs::{Changes, KNOBS, Knob};
-pub use rule::{Choice, Tried};
 use trial::Trial;
 
 impl Renderer {
-    /// Settles every "auto" of `scene`, which `game` plays, one knob after the other, each with
-    /// what was taken before in force; all errors are by the one exact picture, so that those of
-    /// all knobs together stay within `draw.error`. What is drawn by from now on, and what was
-    /// tried. The next frame is like a first one.
-    pub fn choose(
+    /// Chooses a value for every "auto" knob of `scene`, which `game` plays, and returns the chosen
+    /// `draw` with the candidates.
+    ///
+    /// Knobs are settled one after the other, each with the values of those before. All errors are
+    /// measured against one exact picture, so that the error of all knobs together stays within
+    /// `draw.error`. The next frame is like a first one.
+    ///
+    /// # Errors
+    /// Fails if a frame cannot be drawn, other than by exceeding a limit of the device.
+    pub(super) fn choose(
         &mut self,
         device: &Device,
         compiler: &Compiler,
@@ -43,15 +50,15 @@ impl Renderer {
             if values.len() < 2 {
                 continue;
             }
-            let (tried, mut pictures) = trial.of(self, knob, &values, &mut exact)?;
-            let taken = rule::taken(&tried, |t| knob.allows(t, scene.draw.error));
+            let (candidates, mut pictures) = trial.run(self, knob, &values, &mut exact)?;
+            let taken = rule::fastest(&candidates, |c| knob.allows(c, scene.draw.error));
             if knob.changes == Changes::Rounding {
                 exact = Some(pictures.swap_remove(taken));
             }
             draw = values[taken];
             trial.take(self, draw)?;
             let error = (knob.changes == Changes::Picture).then_some(scene.draw.error);
-            choices.push(Choice { key: knob.key, taken, tried, error });
+            choices.push(Choice { key: knob.key, taken, candidates, error });
         }
         self.reset();
         Ok((draw, choices))

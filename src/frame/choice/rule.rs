@@ -1,41 +1,41 @@
-//! Which of the values that were tried is taken, and how users are told.
+//! The rule by which one of several timed candidates is chosen.
 
-/// What is not faster by more than this share is not faster: two runs of the same differ by as
-/// much.
+/// Share by which one candidate must be faster than another: two runs of the same candidate differ
+/// by as much.
 const NOISE: f64 = 0.03;
 
-/// And so in this share of the turns, in each of which both were timed: a device that is shared is
-/// now fast, now slow.
+/// Share of the turns, in each of which both were timed, that must agree: the speed of a shared
+/// device varies.
 const MOSTLY: f64 = 0.75;
 
-/// But what takes less than this share of the time, by the median and by the least, is faster
-/// whatever single turns say: the least is what a device takes that is left alone.
+/// Share of the time, by median and by minimum, below which a candidate is faster regardless of
+/// single turns: the minimum is the time on an idle device.
 const CLEARLY: f64 = 0.75;
 
-/// Values whose times are so far apart need not be timed again.
+/// Ratio of times beyond which a candidate is not timed again.
 const FAR_APART: f64 = 4.0;
 
-/// A value of a knob.
+/// A candidate value of a knob.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tried {
-    /// As scene files have it.
+pub struct Candidate {
+    /// The value, as scene files write it.
     pub value: String,
-    /// The first changes nothing.
+    /// It is the first candidate, which changes nothing.
     pub is_first: bool,
-    /// Of culling, sorting and drawing, ms of device time (of wall time without timestamps); none
-    /// where it does not fit the device.
+    /// Times of culling, sorting and drawing: device time in ms, or wall time without timestamps;
+    /// empty if the candidate does not fit the device.
     pub times_ms: Vec<f64>,
-    /// How far its picture is from the exact one, root mean square over all pixels of premultiplied
-    /// linear red, green, blue and alpha; none where there is none.
+    /// Root mean square difference from the exact picture over all pixels' premultiplied linear
+    /// red, green, blue and alpha; `None` if the candidate was not drawn.
     pub rmse: Option<f64>,
 }
 
-impl Tried {
+impl Candidate {
     fn least_ms(&self) -> Option<f64> {
         self.times_ms.iter().copied().min_by(f64::total_cmp)
     }
 
-    /// Median of its times.
+    /// Returns the median of its times.
     pub fn ms(&self) -> Option<f64> {
         let mut times = self.times_ms.clone();
         times.sort_by(f64::total_cmp);
@@ -43,42 +43,45 @@ impl Tried {
     }
 }
 
-/// What came of a knob that is "auto".
+/// The choice of a knob that is "auto".
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
+    /// Key in the scene file's `draw`.
     pub key: &'static str,
-    /// Which of `tried`.
+    /// Index of the chosen candidate.
     pub taken: usize,
-    pub tried: Vec<Tried>,
-    /// What was near enough, where the picture changes.
+    /// The candidates.
+    pub candidates: Vec<Candidate>,
+    /// The allowed error, if the knob changes the picture.
     pub error: Option<f64>,
 }
 
 impl Choice {
-    /// As users are told.
+    /// Returns the choice as a sentence for users.
     pub fn text(&self) -> String {
-        let of = |t: &Tried| match (t.ms(), t.rmse) {
+        let of = |t: &Candidate| match (t.ms(), t.rmse) {
             (Some(ms), Some(0.0)) => format!("{} takes {ms:.2} ms (RMSE 0)", t.value),
             (Some(ms), Some(rmse)) => format!("{} takes {ms:.2} ms (RMSE {rmse:.2e})", t.value),
             _ => format!("{} does not fit this device", t.value),
         };
-        let (key, value) = (self.key, &self.tried[self.taken].value);
+        let (key, value) = (self.key, &self.candidates[self.taken].value);
         let error = self.error.map_or(String::new(), |error| format!(" (draw.error {error:.2e})"));
-        let all: Vec<String> = self.tried.iter().map(of).collect();
+        let all: Vec<String> = self.candidates.iter().map(of).collect();
         format!("draw.{key} = \"auto\" took {value}{error}: at the first frame {}", all.join(", "))
     }
 }
 
-/// Of those that are allowed the fastest, and of those that are as fast, but for noise, the first;
-/// the first of all where none is.
-pub fn taken(tried: &[Tried], allows: impl Fn(&Tried) -> bool) -> usize {
-    let mut allowed = (0..tried.len()).filter(|i| allows(&tried[*i]));
+/// Returns the index of the fastest allowed candidate: the first of those that are equally fast
+/// within noise, or the first of all if none is allowed.
+pub fn fastest(candidates: &[Candidate], allows: impl Fn(&Candidate) -> bool) -> usize {
+    let mut allowed = (0..candidates.len()).filter(|i| allows(&candidates[*i]));
     let first = allowed.next().unwrap_or(0);
-    allowed.fold(first, |best, i| if is_faster(&tried[i], &tried[best]) { i } else { best })
+    allowed
+        .fold(first, |best, i| if is_faster(&candidates[i], &candidates[best]) { i } else { best })
 }
 
-/// Whether `a` is faster than `b` by more than noise.
-fn is_faster(a: &Tried, b: &Tried) -> bool {
+/// Returns whether `a` is faster than `b` by more than noise.
+fn is_faster(a: &Candidate, b: &Candidate) -> bool {
     let is_less = |a: f64, b: f64, by: f64| a < by * b;
     let by_medians = |by: f64| a.ms().zip(b.ms()).is_some_and(|(a, b)| is_less(a, b, by));
     let by_least = |by: f64| a.least_ms().zip(b.least_ms()).is_some_and(|(a, b)| is_less(a, b, by));
@@ -88,15 +91,19 @@ fn is_faster(a: &Tried, b: &Tried) -> bool {
     (by_medians(1.0 - NOISE) && mostly) || (by_medians(CLEARLY) && by_least(CLEARLY))
 }
 
-/// Those of `open`, all of which were timed last, that may still be taken.
-pub fn still_open(tried: &[Tried], open: &[usize], allows: impl Fn(&Tried) -> bool) -> Vec<usize> {
-    let last = |i: usize| tried[i].times_ms.last().copied().unwrap_or(f64::INFINITY);
-    let allowed: Vec<usize> = open.iter().copied().filter(|i| allows(&tried[*i])).collect();
+/// Returns the candidates of `open`, all of which were just timed, that may still be chosen.
+pub fn still_open(
+    candidates: &[Candidate],
+    open: &[usize],
+    allows: impl Fn(&Candidate) -> bool,
+) -> Vec<usize> {
+    let last = |i: usize| candidates[i].times_ms.last().copied().unwrap_or(f64::INFINITY);
+    let allowed: Vec<usize> = open.iter().copied().filter(|i| allows(&candidates[*i])).collect();
     let fastest = allowed.iter().map(|i| last(*i)).fold(f64::INFINITY, f64::min);
     allowed.into_iter().filter(|i| last(*i) <= FAR_APART * fastest).collect()
 }
 
-/// Infinite where a number is none.
+/// Returns the root mean square difference; infinite if a number is NaN.
 pub fn rmse(a: &[f32], b: &[f32]) -> f64 {
     let sum: f64 = a.iter().zip(b).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum();
     let rmse = (sum / a.len().max(1) as f64).sqrt();
@@ -107,9 +114,9 @@ pub fn rmse(a: &[f32], b: &[f32]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Values with the medians of their times, and their errors.
-    fn tried(of_all: &[(&str, f64, f64)]) -> Vec<Tried> {
-        let of = |(i, (value, ms, rmse)): (usize, &(&str, f64, f64))| Tried {
+    /// Returns candidates by value, median time and error.
+    fn candidates(of_all: &[(&str, f64, f64)]) -> Vec<Candidate> {
+        let of = |(i, (value, ms, rmse)): (usize, &(&str, f64, f64))| Candidate {
             value: (*value).to_owned(),
             is_first: i == 0,
             times_ms: vec![1.1 * ms, *ms, 0.99 * ms],
@@ -118,58 +125,62 @@ mod tests {
         of_all.iter().enumerate().map(of).collect()
     }
 
-    fn near(error: f64) -> impl Fn(&Tried) -> bool {
+    fn near(error: f64) -> impl Fn(&Candidate) -> bool {
         move |t| t.rmse.is_some_and(|rmse| rmse <= error)
     }
 
     #[test]
-    fn the_fastest_that_is_near_enough_is_taken() {
+    fn the_fastest_candidate_within_the_error_is_chosen() {
         let sizes =
-            |half_ms| tried(&[("1.0", 4.0, 0.0), ("0.5", half_ms, 1e-4), ("0.25", 0.5, 2e-3)]);
-        assert_eq!(taken(&sizes(1.0), near(1e-3)), 1);
-        assert_eq!(taken(&sizes(5.0), near(1e-3)), 0);
-        assert_eq!(taken(&sizes(1.0), near(1e-2)), 2);
-        assert_eq!(taken(&sizes(1.0), near(0.0)), 0);
-        // Nor where nothing is, as where the exact picture holds what is no number.
+            |half_ms| candidates(&[("1.0", 4.0, 0.0), ("0.5", half_ms, 1e-4), ("0.25", 0.5, 2e-3)]);
+        assert_eq!(fastest(&sizes(1.0), near(1e-3)), 1);
+        assert_eq!(fastest(&sizes(5.0), near(1e-3)), 0);
+        assert_eq!(fastest(&sizes(1.0), near(1e-2)), 2);
+        assert_eq!(fastest(&sizes(1.0), near(0.0)), 0);
+        // No candidate is within the error if the exact picture has NaN.
         assert_eq!(
-            taken(&tried(&[("1.0", 4.0, f64::INFINITY), ("0.5", 1.0, f64::INFINITY)]), near(0.5)),
+            fastest(
+                &candidates(&[("1.0", 4.0, f64::INFINITY), ("0.5", 1.0, f64::INFINITY)]),
+                near(0.5)
+            ),
             0
         );
     }
 
     #[test]
-    fn what_is_faster_by_noise_alone_is_not_taken() {
-        let two = |ms| tried(&[("0", 100.0, 0.0), ("0.1", ms, 0.0)]);
-        assert_eq!([97.5, 97.1, 96.9, 50.0].map(|ms| taken(&two(ms), near(1.0))), [0, 0, 1, 1]);
-        // Nor what was faster in two turns of three, but for clearly.
+    fn a_candidate_that_is_faster_by_noise_alone_is_not_chosen() {
+        let two = |ms| candidates(&[("0", 100.0, 0.0), ("0.1", ms, 0.0)]);
+        assert_eq!([97.5, 97.1, 96.9, 50.0].map(|ms| fastest(&two(ms), near(1.0))), [0, 0, 1, 1]);
+        // Faster in two turns of three is not enough, unless clearly so.
         let mut twice = two(80.0);
         twice[0].times_ms = vec![100.0; 3];
         for (ms, i) in [(80.0, 0), (70.0, 1)] {
             twice[1].times_ms = vec![101.0, ms, ms];
-            assert_eq!(taken(&twice, near(1.0)), i, "{ms}");
+            assert_eq!(fastest(&twice, near(1.0)), i, "{ms}");
         }
-        // Where the other is as fast in one turn it is a neighbour that slowed it down.
+        // If the other is as fast in one turn, the rest was slowed by other work.
         (twice[0].times_ms[2], twice[1].times_ms) = (70.0, vec![101.0, 60.0, 60.0]);
-        assert_eq!(taken(&twice, near(1.0)), 0);
-        // Nor the one that errs more where one that errs less is as fast.
-        let three = tried(&[("0", 100.0, 0.0), ("0.1", 51.0, 1e-5), ("0.2", 50.0, 1e-4)]);
-        assert_eq!(taken(&three, near(1.0)), 1);
+        assert_eq!(fastest(&twice, near(1.0)), 0);
+        // Of equally fast candidates, the one with the lower error is chosen.
+        let three = candidates(&[("0", 100.0, 0.0), ("0.1", 51.0, 1e-5), ("0.2", 50.0, 1e-4)]);
+        assert_eq!(fastest(&three, near(1.0)), 1);
     }
 
     #[test]
-    fn what_does_not_fit_is_not_taken() {
-        let mut two = tried(&[("a", 4.0, 0.0), ("b", 1.0, 0.0)]);
+    fn a_candidate_that_does_not_fit_is_not_chosen() {
+        let mut two = candidates(&[("a", 4.0, 0.0), ("b", 1.0, 0.0)]);
         (two[1].times_ms, two[1].rmse) = (vec![], None);
-        assert_eq!(taken(&two, near(1.0)), 0);
-        let choice = Choice { key: "path", taken: 0, tried: two, error: None };
+        assert_eq!(fastest(&two, near(1.0)), 0);
+        let choice = Choice { key: "path", taken: 0, candidates: two, error: None };
         let text = "draw.path = \"auto\" took a: at the first frame a takes 4.00 ms (RMSE 0), b \
             does not fit this device";
         assert_eq!(choice.text(), text);
     }
 
     #[test]
-    fn only_what_may_still_be_taken_is_timed_again() {
-        let open = |of: &[(&str, f64, f64)], error| still_open(&tried(of), &[0, 1, 2], near(error));
+    fn only_candidates_that_may_still_be_chosen_are_timed_again() {
+        let open =
+            |of: &[(&str, f64, f64)], error| still_open(&candidates(of), &[0, 1, 2], near(error));
         let far = [("1.0", 4.9, 0.0), ("0.5", 1.2, 1e-4), ("0.25", 0.2, 2e-3)];
         assert_eq!(open(&far, 1e-3), [1]);
         assert_eq!(open(&far, 1e-5), [0]);
@@ -180,9 +191,9 @@ mod tests {
     }
 
     #[test]
-    fn all_that_was_tried_is_told() {
-        let tried = tried(&[("0", 4.0, 0.0), ("0.001", 1.0, 1e-4)]);
-        let choice = Choice { key: "threshold", taken: 1, tried, error: Some(1e-3) };
+    fn the_text_lists_all_candidates() {
+        let candidates = candidates(&[("0", 4.0, 0.0), ("0.001", 1.0, 1e-4)]);
+        let choice = Choice { key: "threshold", taken: 1, candidates, error: Some(1e-3) };
         let text = "draw.threshold = \"auto\" took 0.001 (draw.error 1.00e-3): at the first frame \
             0 takes 4.00 ms (RMSE 0), \
                     0.001 takes 1.00 ms (RMSE 1.00e-4)";

@@ -1,43 +1,48 @@
-use super::*;
+use super::Plan;
+use super::{Pass, Skipping};
+use crate::frame::features::{SceneFeatures, Tensors};
+use crate::frame::packet::Packet;
+use crate::layout::facet::RegionRecord;
+use crate::layout::frame::LightRecord;
 use crate::layout::frame::{CameraRecord, GridRecord};
 use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord};
+use crate::model::scene::DrawPath;
 use std::sync::Arc;
 use std::time::Instant;
 
-const TRAITS: Traits = Traits {
+const FEATURES: SceneFeatures = SceneFeatures {
     has_boxes: true,
-    has_discs: false,
+    has_live: false,
     n_particles: 7,
     n_facets: 7,
-    lit: true,
-    two_reflections: false,
-    grouped: false,
-    textured: false,
+    is_lit: true,
+    has_second: false,
+    is_grouped: false,
+    is_textured: false,
     n_surfaces: 0,
     n_terrains: 0,
-    glossy: false,
+    is_glossy: false,
     tensors: Tensors::Needless,
-    impostors: false,
+    has_impostors: false,
     culls: false,
     path: DrawPath::Sprites,
-    shrunk: false,
-    skip: true,
-    keeps_made: false,
-    made: false,
+    is_low_res: false,
 };
-const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
-/// With every pass.
-const ALL_TRAITS: Traits = Traits {
-    has_discs: true,
-    grouped: true,
-    textured: true,
+const KEPT: SceneFeatures = SceneFeatures { has_second: true, tensors: Tensors::Kept, ..FEATURES };
+/// The features of a scene that needs every pass.
+const ALL_FEATURES: SceneFeatures = SceneFeatures {
+    has_live: true,
+    is_grouped: true,
+    is_textured: true,
     n_surfaces: 1,
     n_terrains: 1,
-    impostors: true,
+    has_impostors: true,
     culls: true,
-    shrunk: true,
+    is_low_res: true,
     ..KEPT
 };
+const ON: Skipping = Skipping { is_on: true, keeps_made: false, is_made: false };
+const OFF: Skipping = Skipping { is_on: false, ..ON };
 
 fn packet() -> Packet {
     Packet {
@@ -51,7 +56,7 @@ fn packet() -> Packet {
         n_drawn: 0,
         modes: vec![],
         discs: vec![],
-        lived: None,
+        live: None,
         placed: None,
         bounds: vec![Default::default()],
         regions: vec![RegionRecord::default()],
@@ -66,9 +71,22 @@ fn packet() -> Packet {
     }
 }
 
-fn running(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Vec<&'static str> {
-    let plan = plan(traits, last, next);
+fn plan(features: &SceneFeatures, last: Option<&Packet>, next: &Packet) -> Plan {
+    super::plan(features, ON, last, next)
+}
+
+fn running_with(
+    skipping: Skipping,
+    features: &SceneFeatures,
+    last: Option<&Packet>,
+    next: &Packet,
+) -> Vec<&'static str> {
+    let plan = super::plan(features, skipping, last, next);
     Pass::ALL.into_iter().filter(|p| plan.runs(*p)).map(Pass::name).collect()
+}
+
+fn running(features: &SceneFeatures, last: Option<&Packet>, next: &Packet) -> Vec<&'static str> {
+    running_with(ON, features, last, next)
 }
 
 #[test]
@@ -76,36 +94,35 @@ fn the_first_frame_runs_everything_and_a_still_one_nothing() {
     let p = packet();
     // Particles are drawn by one of two passes.
     let all = Pass::ALL.len() - 1;
-    assert_eq!(running(&ALL_TRAITS, None, &p).len(), all);
-    for traits in [TRAITS, KEPT, ALL_TRAITS] {
-        assert!(running(&traits, Some(&p), &p).is_empty());
+    assert_eq!(running(&ALL_FEATURES, None, &p).len(), all);
+    for features in [FEATURES, KEPT, ALL_FEATURES] {
+        assert!(running(&features, Some(&p), &p).is_empty());
     }
-    // Where nothing is skipped no picture is used again.
-    assert_eq!(running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p).len(), all - 1);
-    // What a run makes once is kept; all else is done as without skipping.
-    let moving = Traits { skip: false, keeps_made: true, ..ALL_TRAITS };
-    let (whole, kept) = (
-        running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p),
-        running(&moving, Some(&p), &p),
-    );
-    assert!(
-        whole.iter().filter(|pass| !kept.contains(pass)).eq(["generate", "texture"].iter()),
-        "{kept:?}"
-    );
+    // With skipping off, impostor layers are not used.
+    let whole = running_with(OFF, &ALL_FEATURES, Some(&p), &p);
+    assert_eq!(whole.len(), all - 1);
+    let reason = super::plan(&ALL_FEATURES, OFF, None, &p).decision(Pass::Impostors).reason;
+    assert_eq!(reason.to_string(), "nothing is used again with --no-skip");
+    // Particles of boxes and the pool of textures may be kept.
+    let moving = Skipping { keeps_made: true, ..OFF };
+    let kept = running_with(moving, &ALL_FEATURES, Some(&p), &p);
+    let left_out = whole.iter().filter(|pass| !kept.contains(pass));
+    assert!(left_out.eq(["generate", "texture"].iter()), "{kept:?}");
     assert_eq!(
-        running(&moving, None, &p),
-        running(&Traits { skip: false, ..ALL_TRAITS }, None, &p)
+        running_with(moving, &ALL_FEATURES, None, &p),
+        running_with(OFF, &ALL_FEATURES, None, &p)
     );
-    // What lies there from before the first frame is not made again, but where nothing is skipped.
-    let there = Traits { made: true, ..ALL_TRAITS };
-    let first = running(&there, None, &p);
+    // Particles and textures that exist before the first frame are made again only with skipping
+    // off.
+    let first = running_with(Skipping { is_made: true, ..ON }, &ALL_FEATURES, None, &p);
     assert_eq!(first.len(), all - 2);
     assert!(!first.contains(&"generate") && !first.contains(&"texture"));
-    assert!(running(&Traits { skip: false, ..there }, None, &p).contains(&"generate"));
-    // Without tensors it is all but `contract`.
-    let without = Traits { tensors: Tensors::Needless, ..ALL_TRAITS };
+    let made_off = Skipping { is_made: true, ..OFF };
+    assert!(running_with(made_off, &ALL_FEATURES, None, &p).contains(&"generate"));
+    // Without tensors, only `contract` does not run.
+    let without = SceneFeatures { tensors: Tensors::Needless, ..ALL_FEATURES };
     assert_eq!(running(&without, None, &p).len(), all - 1);
-    let tiled = Traits { path: DrawPath::Tiles, ..TRAITS };
+    let tiled = SceneFeatures { path: DrawPath::Tiles, ..FEATURES };
     assert_eq!(running(&tiled, None, &p).last(), Some(&"tiles"));
 }
 
@@ -115,7 +132,7 @@ fn each_change_runs_what_depends_on_it_and_no_more() {
     let after = |change: &dyn Fn(&mut Packet)| {
         let mut next = packet();
         change(&mut next);
-        running(&TRAITS, Some(&last), &next)
+        running(&FEATURES, Some(&last), &next)
     };
     assert_eq!(after(&|p| p.camera.eye[0] = 1.0), ["sprites"]);
     assert_eq!(after(&|p| p.camera.forward = [1.0, 0.0, 0.0]), ["sort", "sprites"]);
@@ -142,9 +159,9 @@ fn each_change_runs_what_depends_on_it_and_no_more() {
 }
 
 #[test]
-fn what_is_kept_is_kept_and_sorted_anew_where_the_camera_or_a_density_changes() {
+fn a_change_of_camera_or_density_culls_and_sorts_again() {
     let last = packet();
-    let culls = Traits { culls: true, ..TRAITS };
+    let culls = SceneFeatures { culls: true, ..FEATURES };
     let after = |change: &dyn Fn(&mut Packet)| {
         let mut next = packet();
         change(&mut next);
@@ -159,18 +176,21 @@ fn what_is_kept_is_kept_and_sorted_anew_where_the_camera_or_a_density_changes() 
         assert_eq!(after(change), ["cull", "sort", "sprites"]);
     }
     assert_eq!(after(&|p| p.lights[0].energy[1] = 2.0), ["first", "sprites"]);
-    assert_eq!(running(&Traits { n_particles: 0, n_facets: 0, ..culls }, None, &last), ["sprites"]);
-    let reason = plan(&TRAITS, None, &last).decision(Pass::Cull).reason.to_string();
+    assert_eq!(
+        running(&SceneFeatures { n_particles: 0, n_facets: 0, ..culls }, None, &last),
+        ["sprites"]
+    );
+    let reason = plan(&FEATURES, None, &last).decision(Pass::Cull).reason.to_string();
     assert_eq!(reason, "draw.cull is \"off\"");
 }
 
 #[test]
-fn with_tensors_an_edit_or_an_energy_is_a_contraction_and_nothing_else() {
+fn with_tensors_an_edit_or_an_energy_runs_contract_alone() {
     let last = packet();
-    let after = |traits: &Traits, change: &dyn Fn(&mut Packet)| {
+    let after = |features: &SceneFeatures, change: &dyn Fn(&mut Packet)| {
         let mut next = packet();
         change(&mut next);
-        running(traits, Some(&last), &next)
+        running(features, Some(&last), &next)
     };
     let contracted = ["contract", "sprites"];
     let edits: [&dyn Fn(&mut Packet); 4] = [
@@ -186,10 +206,10 @@ fn with_tensors_an_edit_or_an_energy_is_a_contraction_and_nothing_else() {
         after(&KEPT, &|p| p.lights[0].energy = [0.0; 3]),
         ["transmit", "contract", "sprites"]
     );
-    let both = Traits { tensors: Tensors::Needless, ..KEPT };
-    let too_large = Traits { tensors: Tensors::TooLarge { bytes: 9, most: 8 }, ..KEPT };
-    for traits in [both, too_large] {
-        assert_eq!(after(&traits, edits[0]), ["first", "second", "sprites"]);
+    let both = SceneFeatures { tensors: Tensors::Needless, ..KEPT };
+    let too_large = SceneFeatures { tensors: Tensors::TooLarge { bytes: 9, most: 8 }, ..KEPT };
+    for features in [both, too_large] {
+        assert_eq!(after(&features, edits[0]), ["first", "second", "sprites"]);
     }
     assert_eq!(
         plan(&too_large, Some(&last), &last).decision(Pass::Contract).reason.to_string(),
@@ -200,20 +220,20 @@ fn with_tensors_an_edit_or_an_energy_is_a_contraction_and_nothing_else() {
     assert_eq!(after(&KEPT, &|p| p.lights[0].radius = 2.0), anew);
     let facets_too = ["facets", "transmit", "first", "second", "contract", "sprites"];
     assert_eq!(after(&KEPT, &|p| p.regions[0].u[0] = 2.0), facets_too);
-    // A light that was dark has left no tensor behind.
+    // A dark light has left no tensor behind.
     let mut dark = packet();
     dark.lights[0].energy = [0.0; 3];
     assert_eq!(running(&KEPT, Some(&dark), &last), [&["transmit"], &anew[..]].concat());
-    // The eye matters to lobes alone.
+    // Only lobes depend on the eye.
     let eye = |p: &mut Packet| p.camera.eye[0] = 1.0;
     assert_eq!(after(&KEPT, &eye), ["sprites"]);
-    assert_eq!(after(&Traits { glossy: true, ..KEPT }, &eye), anew);
+    assert_eq!(after(&SceneFeatures { is_glossy: true, ..KEPT }, &eye), anew);
 }
 
 #[test]
-fn facets_of_several_particles_follow_their_order() {
+fn facets_of_several_particles_depend_on_the_morton_order() {
     let last = packet();
-    let grouped = Traits { grouped: true, ..TRAITS };
+    let grouped = SceneFeatures { is_grouped: true, ..FEATURES };
     let after = |change: &dyn Fn(&mut Packet)| {
         let mut next = packet();
         change(&mut next);
@@ -230,17 +250,20 @@ fn facets_of_several_particles_follow_their_order() {
 }
 
 #[test]
-fn unlit_empty_and_cpu_scenes_leave_out_what_they_do_not_need() {
+fn unlit_empty_and_cpu_scenes_skip_passes_that_they_do_not_need() {
     let p = packet();
     assert_eq!(
-        running(&Traits { lit: false, ..TRAITS }, None, &p),
+        running(&SceneFeatures { is_lit: false, ..FEATURES }, None, &p),
         ["generate", "place", "sort", "sprites"]
     );
-    assert_eq!(running(&Traits { n_particles: 0, n_facets: 0, ..TRAITS }, None, &p), ["sprites"]);
-    // Where the game thread places the particles, its places decide and not the groups' offsets.
+    assert_eq!(
+        running(&SceneFeatures { n_particles: 0, n_facets: 0, ..FEATURES }, None, &p),
+        ["sprites"]
+    );
+    // If the game thread places the particles, their places count instead of the groups' offsets.
     let (mut last, mut next) = (packet(), packet());
     (last.placed, next.placed) = (Some(vec![]), Some(vec![]));
-    assert!(running(&TRAITS, Some(&last), &next).is_empty());
+    assert!(running(&FEATURES, Some(&last), &next).is_empty());
     next.placed = Some(vec![Default::default()]);
-    assert!(running(&TRAITS, Some(&last), &next).contains(&"place"));
+    assert!(running(&FEATURES, Some(&last), &next).contains(&"place"));
 }

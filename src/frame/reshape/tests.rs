@@ -49,27 +49,27 @@ fn groups(clouds: &[Cloud]) -> Vec<Group> {
     groups
 }
 
-fn kept_of(old: &[Cloud], new: &[Cloud], touched: &[usize]) -> Vec<[u32; 3]> {
-    let kept = kept((old, &groups(old)), (new, &groups(new)), touched);
-    kept.iter().map(|k| [k.there, k.here, k.n]).collect()
+fn shared_of(old: &[Cloud], new: &[Cloud], touched: &[usize]) -> Vec<[u32; 3]> {
+    let shared = shared_ranges((old, &groups(old)), (new, &groups(new)), touched);
+    shared.iter().map(|s| [s.i_old, s.i_new, s.n]).collect()
 }
 
 #[test]
-fn neighbours_are_one_run_and_empty_boxes_none() {
+fn contiguous_groups_are_one_range_and_empty_boxes_none() {
     let groups = groups(&[of_boxes(&[3, 0, 4, 5, 2])]);
-    assert_eq!(runs(&groups, &[0, 1, 2, 4]), [[0, 7], [12, 2]]);
-    assert_eq!(runs(&groups, &[1, 3]), [[7, 5]]);
-    assert!(runs(&groups, &[1]).is_empty() && runs(&groups, &[]).is_empty());
+    assert_eq!(particle_ranges(&groups, &[0, 1, 2, 4]), [[0, 7], [12, 2]]);
+    assert_eq!(particle_ranges(&groups, &[1, 3]), [[7, 5]]);
+    assert!(particle_ranges(&groups, &[1]).is_empty() && particle_ranges(&groups, &[]).is_empty());
 }
 
 #[test]
-fn particles_are_found_by_cloud_and_box() {
+fn shared_particles_are_found_by_cloud_and_box() {
     let old = [of_boxes(&[3, 4, 5]), of_list(7), of_boxes(&[2, 2])];
-    // One box more in the first cloud: all that follows is elsewhere.
+    // One more box in the first cloud moves all that follows.
     let new = [of_boxes(&[3, 6, 5, 1]), of_list(7), of_boxes(&[2, 2])];
-    assert_eq!(kept_of(&old, &new, &[1, 3]), [[0, 0, 3], [7, 9, 5], [19, 22, 4]]);
-    // Fewer boxes; the last cloud's first one is touched.
+    assert_eq!(shared_of(&old, &new, &[1, 3]), [[0, 0, 3], [7, 9, 5], [19, 22, 4]]);
+    // Fewer boxes; the first box of the last cloud is touched.
     let new = [of_boxes(&[3, 4]), of_list(7), of_boxes(&[2, 2])];
-    assert_eq!(kept_of(&old, &new, &[3]), [[0, 0, 7], [21, 16, 2]]);
-    assert!(kept_of(&old, &new, &[0, 1, 2, 3, 4]).is_empty());
+    assert_eq!(shared_of(&old, &new, &[3]), [[0, 0, 7], [21, 16, 2]]);
+    assert!(shared_of(&old, &new, &[0, 1, 2, 3, 4]).is_empty());
 }

@@ -84,7 +84,7 @@ fn gathers(scene: &Scene) -> bool {
 }
 
 fn gathers_from_tree(scene: &Scene) -> bool {
-    gathers(scene) && crate::frame::exchange::gathers_from_tree(scene)
+    gathers(scene) && crate::frame::gathers_from_tree(scene)
 }
 
 fn is_lit_surface(scene: &Scene) -> bool {

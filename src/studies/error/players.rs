@@ -8,7 +8,7 @@ use super::run::Subject;
 use super::turns::Turn;
 use crate::error::{Error, Result};
 use crate::frame::limits;
-use crate::frame::stage::{Bed, Player};
+use crate::frame::{GpuContext, Player};
 use crate::layout::facet::LitRecord;
 use crate::model::scene::Scene;
 
@@ -38,7 +38,7 @@ pub fn frames_of_turns(n_rounds: u32, n_frames: u32) -> u32 {
 }
 
 pub struct Players<'a> {
-    bed: &'a Bed,
+    bed: &'a GpuContext,
     scenes: Vec<Arc<Scene>>,
     frames: Frames,
     kept: Vec<Kept>,
@@ -51,7 +51,7 @@ struct Kept {
 }
 
 impl<'a> Players<'a> {
-    pub fn new(bed: &'a Bed, frames: Frames) -> Players<'a> {
+    pub fn new(bed: &'a GpuContext, frames: Frames) -> Players<'a> {
         Players { bed, scenes: Vec::new(), frames, kept: Vec::new() }
     }
 

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::records::{Ledger, Row};
 use super::steps::{Step, steps, ungrouped};
 use crate::error::{Error, Result};
-use crate::frame::stage::Bed;
+use crate::frame::GpuContext;
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::stats::median;
 use crate::model::scene::{LightingMode, Scene};
@@ -25,7 +25,7 @@ use crate::studies::provenance::{Figure, Provenance};
 
 /// What a ledger is made of and how.
 pub struct Setup<'a> {
-    pub bed: &'a Bed,
+    pub bed: &'a GpuContext,
     /// Nothing in it is "auto".
     pub scene: &'a Scene,
     pub frames: Frames,

@@ -1,7 +1,7 @@
 //! The approximations that the device itself can leave out, one after the other: what each is in a
 //! scene, and what it stands for.
 
-use crate::frame::exchange::{gathers_from_tree, is_glossy};
+use crate::frame::{gathers_from_tree, is_glossy};
 use crate::model::basis::MAX_BASES;
 use crate::model::cutoff::Cutoff;
 use crate::model::film::FilmFormat;

@@ -21,7 +21,7 @@ use super::panel_state::PanelState;
 use super::panels;
 use super::render_thread::{DrawRequests, DrawState, EditRenderer, RenderEvent, RenderLinks};
 use crate::error::{Error, Result};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::io::box_file;
 use crate::model::camera::Pose;
 use crate::viewer::editor::{

@@ -24,7 +24,7 @@ use super::scene_source::SceneSource;
 use super::status::SharedStatus;
 use super::view_state::{Response, ViewState};
 use crate::error::{Error, Result};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::gpu::PresentMode;
 use crate::io::image;
 use crate::model::film::Film;

@@ -8,9 +8,9 @@ use super::comparison::{CameraQueue, compare_of};
 use super::render_links::{Readback, RenderEvent, RenderLinks};
 use super::view_state::ViewState;
 use crate::error::Result;
-use crate::frame::counts::Counts;
-use crate::frame::game::Game;
-use crate::frame::render::Renderer;
+use crate::frame::Counts;
+use crate::frame::Game;
+use crate::frame::Renderer;
 use crate::frame::{FrameTimes, parallel, serial};
 use crate::measure::stats::Summary;
 use crate::model::scene::{Scene, Threading};
@@ -113,7 +113,7 @@ impl FrameLoop<'_> {
     fn count(&self, game: &mut Game, renderer: &mut Renderer) -> Result<()> {
         let i_frame = lock(&self.links.state).playback.i_frame();
         renderer.step(game.step(i_frame)?)?;
-        let counts = Counts::of(renderer, &self.target.bed.device, self.scene)?;
+        let counts = Counts::new(renderer, &self.target.bed.device, self.scene)?;
         self.links.message(format!("frame {i_frame}: {}", counts.text()));
         lock(&self.links.status).counts = Some((i_frame, counts));
         Ok(())

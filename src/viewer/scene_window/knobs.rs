@@ -1,6 +1,6 @@
 //! Scene settings that change while the window runs: each knob cycles through a list of values.
 
-use crate::frame::choice::named;
+use crate::frame::toml_name;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{DrawPath, Gather, LightingMode, Scene, Simulate, Threading};
 
@@ -47,13 +47,13 @@ impl Knob {
     /// Returns the knob's value in `scene`, as a scene file writes it.
     pub fn value(self, scene: &Scene) -> String {
         match self {
-            Knob::Threading => named(&Threading::NAMES, scene.threads.mode),
-            Knob::Simulate => named(&Simulate::NAMES, scene.threads.simulate),
-            Knob::Lighting => named(&LightingMode::NAMES, scene.lighting.mode),
+            Knob::Threading => toml_name(&Threading::NAMES, scene.threads.mode),
+            Knob::Simulate => toml_name(&Simulate::NAMES, scene.threads.simulate),
+            Knob::Lighting => toml_name(&LightingMode::NAMES, scene.lighting.mode),
             Knob::Bases => scene.lighting.bases.to_string(),
-            Knob::Gather => named(&Gather::NAMES, scene.lighting.gather),
+            Knob::Gather => toml_name(&Gather::NAMES, scene.lighting.gather),
             Knob::Theta => scene.lighting.theta.to_string(),
-            Knob::Path => named(&DrawPath::NAMES, scene.draw.path),
+            Knob::Path => toml_name(&DrawPath::NAMES, scene.draw.path),
             Knob::Resolution => match scene.draw.resolution {
                 Resolution::Auto => "\"auto\"".to_owned(),
                 resolution => resolution.name().to_owned(),

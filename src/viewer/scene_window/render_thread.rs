@@ -9,7 +9,7 @@ use super::frame_loop::{FrameLoop, LoopSamples, LoopTimes};
 use super::render_links::{RenderEvent, RenderLinks};
 use super::view_state::{Variant, ViewState};
 use crate::error::{Error, Result};
-use crate::frame::stage::{DeviceChoice, Player};
+use crate::frame::{DeviceChoice, Player};
 use crate::gpu::{Compiler, Instance, PresentMode, Surface};
 use crate::model::film::Film;
 use crate::model::scene::Scene;
@@ -200,7 +200,7 @@ impl SceneRenderer {
         texts.for_each(|text| self.links.message(text));
         let (shared, cameras) = (self.links.state.clone(), CameraQueue::default());
         let queue = cameras.clone();
-        let mut game = game.seen_from(Box::new(move || queue.push(lock(&shared).camera)));
+        let mut game = game.with_viewpoint(Box::new(move || queue.push(lock(&shared).camera)));
         let mut frames = FrameLoop {
             target: &mut self.target,
             links: &self.links,

@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex};
 
 use super::timeline::Timeline;
+use crate::frame::Counts;
 use crate::frame::FrameTimes;
-use crate::frame::counts::Counts;
 use crate::frame::plan::Plan;
 use crate::gpu::PresentMode;
 use crate::model::scene::Threading;

@@ -2,9 +2,10 @@ use super::*;
 use std::sync::Arc;
 use std::time::Instant;
 
-const RULES: Rules = Rules { size: [160, 120], shell_size: [200, 150], cutoff: 3.0, error: 0.5 };
+const RULES: CacheRules =
+    CacheRules { size: [160, 120], layer_size: [200, 150], cutoff: 3.0, error: 0.5 };
 
-/// Some clouds before an eye at (x, 0, z) that looks along −z.
+/// Returns a packet of clouds in front of an eye at (x, 0, z) that looks along −z.
 fn packet(x: f64, z: f64) -> Packet {
     let extent = |k: i32| Extent {
         center: DVec3::new(f64::from(k % 5) - 2.0, f64::from(k % 3) - 1.0, -0.5 * f64::from(k)),
@@ -33,7 +34,7 @@ fn packet(x: f64, z: f64) -> Packet {
         n_drawn: 8000,
         modes: vec![],
         discs: vec![],
-        lived: None,
+        live: None,
         placed: None,
         bounds: vec![],
         regions: vec![],
@@ -48,31 +49,31 @@ fn packet(x: f64, z: f64) -> Packet {
     }
 }
 
-fn keeper() -> Keeper {
-    Keeper::new(RULES)
+fn cache() -> ImpostorCache {
+    ImpostorCache::new(RULES)
 }
 
 #[test]
-fn a_slow_eye_meets_the_same_shell_until_it_is_off_by_too_much() {
-    let mut keeper = keeper();
+fn a_slow_eye_reuses_a_layer_until_its_error_is_too_large() {
+    let mut cache = cache();
     assert_eq!(
-        keeper.step(&packet(0.0, 12.0), Some("there is no frame before")),
-        Step::Nothing("there is no frame before")
+        cache.step(&packet(0.0, 12.0), Some("there is no frame before")),
+        LayerUse::None("there is no frame before")
     );
     let (mut n_made, mut n_reused, mut most) = (0, 0, 0f64);
     for k in 1..60 {
         let at = packet(0.02 * f64::from(k), 12.0);
-        match keeper.step(&at, None) {
-            Step::Made { kept, .. } => {
+        match cache.step(&at, None) {
+            LayerUse::Made { layer, .. } => {
                 n_made += 1;
-                assert_eq!(keeper.off_by(&kept.shell, &view_of(&at.camera)), Ok(0.0));
+                assert_eq!(cache.off_by(&layer.shell, &view_of(&at.camera)), Ok(0.0));
             }
-            Step::Reused { kept, pixels } => {
+            LayerUse::Reused { layer, pixels } => {
                 n_reused += 1;
                 most = most.max(pixels);
-                assert_eq!(keeper.off_by(&kept.shell, &view_of(&at.camera)), Ok(pixels));
+                assert_eq!(cache.off_by(&layer.shell, &view_of(&at.camera)), Ok(pixels));
             }
-            Step::Nothing(why) => panic!("{why}"),
+            LayerUse::None(why) => panic!("{why}"),
         }
     }
     assert!(
@@ -82,60 +83,56 @@ fn a_slow_eye_meets_the_same_shell_until_it_is_off_by_too_much() {
 }
 
 #[test]
-fn nothing_is_made_where_it_would_not_live_or_not_pay() {
+fn no_layer_is_drawn_that_would_be_short_lived_or_slower() {
     let run = |step: f64, change: &dyn Fn(&mut Packet), n: i32| {
-        let mut keeper = keeper();
+        let mut cache = cache();
         let mut steps = vec![];
         for k in 0..n {
             let mut at = packet(step * f64::from(k), 12.0);
             change(&mut at);
-            steps.push(keeper.step(&at, (k == 0).then_some("there is no frame before")));
+            steps.push(cache.step(&at, (k == 0).then_some("there is no frame before")));
         }
         steps.pop().expect("a step")
     };
     // Three units a frame: a pixel is 0.1 at depth 10, and the clouds are 10 deep.
-    assert_eq!(run(3.0, &|_| {}, 3), Step::Nothing("none would save anything"));
+    assert_eq!(run(3.0, &|_| {}, 3), LayerUse::None("no layer would save anything"));
     // A few small blobs cost less than showing a picture.
     let few = |p: &mut Packet| p.extents.iter_mut().for_each(|e| e.n_particles = 1);
-    assert_eq!(run(0.02, &few, 3), Step::Nothing("none would save anything"));
-    assert!(matches!(run(0.02, &|_| {}, 3), Step::Reused { .. }));
+    assert_eq!(run(0.02, &few, 3), LayerUse::None("no layer would save anything"));
+    assert!(matches!(run(0.02, &|_| {}, 3), LayerUse::Reused { .. }));
 }
 
 #[test]
-fn what_changes_ends_a_shell() {
-    let mut keeper = keeper();
-    keeper.step(&packet(0.0, 12.0), Some("there is no frame before"));
+fn a_change_of_the_scene_discards_the_layer() {
+    let mut cache = cache();
+    cache.step(&packet(0.0, 12.0), Some("there is no frame before"));
     assert!(matches!(
-        keeper.step(&packet(0.02, 12.0), None),
-        Step::Made { why: "there is none", .. }
+        cache.step(&packet(0.02, 12.0), None),
+        LayerUse::Made { why: "there is no layer", .. }
     ));
-    assert!(matches!(keeper.step(&packet(0.04, 12.0), None), Step::Reused { .. }));
+    assert!(matches!(cache.step(&packet(0.04, 12.0), None), LayerUse::Reused { .. }));
     assert_eq!(
-        keeper.step(&packet(0.06, 12.0), Some("light changed")),
-        Step::Nothing("light changed")
+        cache.step(&packet(0.06, 12.0), Some("light changed")),
+        LayerUse::None("light changed")
     );
-    assert!(matches!(keeper.step(&packet(0.08, 12.0), None), Step::Made { .. }));
+    assert!(matches!(cache.step(&packet(0.08, 12.0), None), LayerUse::Made { .. }));
     // A jump, and a look elsewhere.
     let far = packet(3.0, 12.0);
-    assert_eq!(keeper.step(&far, None), Step::Nothing("none would save anything"));
-    assert!(matches!(keeper.step(&far, None), Step::Made { .. }));
+    assert_eq!(cache.step(&far, None), LayerUse::None("no layer would save anything"));
+    assert!(matches!(cache.step(&far, None), LayerUse::Made { .. }));
     let mut turned = packet(3.0, 12.0);
     (turned.camera.right, turned.camera.forward) = ([0.8, 0.0, 0.6], [0.6, 0.0, -0.8]);
-    assert!(!matches!(keeper.step(&turned, None), Step::Reused { .. }));
-    keeper.reset();
-    assert_eq!(
-        keeper.step(&turned, None),
-        Step::Nothing("how fast the eye moves is not known yet")
-    );
+    assert!(!matches!(cache.step(&turned, None), LayerUse::Reused { .. }));
+    cache.reset();
+    assert_eq!(cache.step(&turned, None), LayerUse::None("the motion of the eye is not known yet"));
 }
 
 #[test]
-fn a_surface_among_what_is_far_forbids_it() {
-    // At depths 3, 14 and 40 from an eye at z = 12: before, among and behind a cloud at depths from
-    // 12 on.
+fn a_surface_among_distant_blobs_forbids_a_layer() {
+    // Depths 3, 14 and 40 from an eye at z = 12: before, among and behind clouds from depth 12 on.
     for (z, forbids) in [(9.0, false), (-2.0, true), (-28.0, false)] {
-        let mut keeper = keeper();
-        let mut last = Step::Nothing("");
+        let mut cache = cache();
+        let mut last = LayerUse::None("");
         for k in 0..3 {
             let mut at = packet(0.02 * f64::from(k), 12.0);
             let (u, v) = ([5.0, 0.0, 0.0], [0.0, 5.0, 0.0]);
@@ -146,25 +143,27 @@ fn a_surface_among_what_is_far_forbids_it() {
                 v,
                 ..Default::default()
             });
-            last = keeper.step(&at, (k == 0).then_some("there is no frame before"));
+            last = cache.step(&at, (k == 0).then_some("there is no frame before"));
         }
-        let is_whole = |kept: &Kept| kept.shell.far.nearest < 11.6;
+        let is_whole = |layer: &CachedLayer| layer.shell.far.nearest < 11.6;
         match last {
-            Step::Reused { kept, .. } => assert!(!forbids || kept.depth > 14.0, "{z}: {kept:?}"),
+            LayerUse::Reused { layer, .. } => {
+                assert!(!forbids || layer.depth > 14.0, "{z}: {layer:?}")
+            }
             _ => assert!(forbids, "{z}"),
         }
-        if let (Step::Reused { kept, .. }, false) = (last, forbids) {
-            // What is before it hides it, what is behind does not.
+        if let (LayerUse::Reused { layer, .. }, false) = (last, forbids) {
+            // A surface in front hides the layer; a surface behind does not.
             let depth = f64::from(12.0 - z);
-            assert_eq!(kept.depth > depth, z > 0.0);
-            assert!(is_whole(&kept) || kept.shell.far.nearest > 11.0);
+            assert_eq!(layer.depth > depth, z > 0.0);
+            assert!(is_whole(&layer) || layer.shell.far.nearest > 11.0);
         }
     }
 }
 
 #[test]
-fn keys_part_where_depths_do() {
-    // The sort's law, for depths about a cut.
+fn sort_keys_separate_near_and_far_where_depths_do() {
+    // The sort's key of a depth.
     let key = |z: f32| {
         let bits = z.to_bits();
         !(if bits & 0x8000_0000 != 0 { !bits } else { bits | 0x8000_0000 })
@@ -178,7 +177,7 @@ fn keys_part_where_depths_do() {
         let (last, quantum) = last_key(cut, 12.0, 16).expect("a key");
         for z in [-11.9, cut - 2.0 * quantum, cut - 1e-9, cut, cut + 2.0 * quantum, 11.9] {
             let key = ((12.0 - z) * (65536.0 / 24.0)).clamp(0.0, 65535.0) as u32;
-            // All that is far enough is far, and nothing that is nearer than a quantum before it.
+            // Every depth beyond the cut is far, and no depth more than a quantum before it.
             assert!(key <= last || z < cut, "{cut} {z}");
             assert!(key > last || z >= cut - quantum, "{cut} {z}");
         }

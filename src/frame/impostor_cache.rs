@@ -1,5 +1,6 @@
-//! When a shell is made, when it is shown again, and where it is cut (docs/model.md §11
-//! "impostors"). What comes of it depends on the packets since the last reset alone.
+//! The cache of an impostor layer: when the layer is drawn, when it is shown again, and at which
+//! depth it begins (docs/model.md §11 "impostors"). Its decisions follow from the packets since the
+//! last reset alone.
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
@@ -9,135 +10,144 @@ use crate::layout::frame::CameraRecord;
 use crate::model::impostor::{FarField, Shell, View};
 use crate::model::scene::Scene;
 
-/// A shell is this share of the picture's side wider at each edge.
+/// Margin of a layer at each edge, as a share of the picture's side.
 const MARGIN: f64 = 0.125;
-/// Pixels that the cubic asks for beyond a place.
+/// Pixels around a position that the cubic reads.
 const FOOTPRINT: f64 = 2.0;
-/// Frames ahead that are looked at.
+/// Frames ahead for which a layer's use is predicted.
 const AHEAD: u32 = 64;
-/// A shell that lives no longer is not made.
-const LEAST_LIFE: u32 = 3;
-/// Parts of what all particles cost, between which a cut may lie.
+/// Frames that a layer must be usable in to be drawn.
+const MIN_LIFE: u32 = 3;
+/// Parts of equal drawing cost, between which a layer may begin.
 const N_CUTS: usize = 8;
-/// Layers of a pixel that showing a shell costs as much as.
+/// Cost of showing a layer, in blobs drawn over a pixel.
 const SHOW_LAYERS: f64 = 4.0;
-/// Pixels of σ, of every group's mean, below which the cubic would take too much of them: a blob of
-/// 2 pixels keeps 0.99 of its height between four texels.
-const LEAST_SIGMA: f64 = 2.0;
-/// A cut is at no less than this many radii of the sprites beyond it.
-const LEAST_RADII: f64 = 2.0;
-/// What f32 may make of a depth, over the lengths that it is made of: as for visibility.
+/// Mean σ of a group, in pixels, below which the cubic would blur its blobs: a blob of 2 pixels
+/// keeps 0.99 of its height between four texels.
+const MIN_SIGMA: f64 = 2.0;
+/// Depth at which a layer may begin, in radii of the sprites beyond.
+const MIN_RADII: f64 = 2.0;
+/// Bound of the f32 rounding of a depth, relative to the lengths it is computed from, as for
+/// visibility.
 const ROUNDING: f64 = 1.0 / 65536.0;
 
-/// What of the scene the rules ask for.
+/// The parameters of the cache.
 #[derive(Debug, Clone, Copy)]
-pub struct Rules {
+pub struct CacheRules {
+    /// Pixels of the picture.
     size: [u32; 2],
-    /// Of the shell's picture.
-    pub shell_size: [u32; 2],
+    /// Pixels of the layer's picture.
+    pub layer_size: [u32; 2],
     cutoff: f64,
-    /// Pixels.
+    /// Bound of the error, in pixels.
     error: f64,
 }
 
-impl Rules {
-    pub fn of(scene: &Scene) -> Rules {
+impl CacheRules {
+    pub fn new(scene: &Scene) -> CacheRules {
         let size = [scene.film.width, scene.film.height];
-        Rules {
+        CacheRules {
             size,
-            shell_size: shell_size(size),
+            layer_size: layer_size(size),
             cutoff: scene.draw.cutoff,
             error: scene.draw.impostor_error,
         }
     }
 }
 
-/// Pixels of a shell's picture for pictures of `size`.
-pub fn shell_size(size: [u32; 2]) -> [u32; 2] {
+/// Returns the pixels of a layer for pictures of `size`.
+pub fn layer_size(size: [u32; 2]) -> [u32; 2] {
     size.map(|n| n + 2 * (MARGIN * f64::from(n)).ceil() as u32)
 }
 
-/// What is shown of what is far.
+/// The layer that a frame shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Step {
-    /// Nothing: all is drawn.
-    Nothing(&'static str),
-    /// A shell that is made for this frame.
-    Made { kept: Kept, why: &'static str },
-    /// The shell that there is, off by so many pixels at most.
-    Reused { kept: Kept, pixels: f64 },
+pub enum LayerUse {
+    /// No layer, for this reason: all blobs are drawn.
+    None(&'static str),
+    /// A layer that is drawn for this frame.
+    Made { layer: CachedLayer, why: &'static str },
+    /// The cached layer, whose error is at most `pixels`.
+    Reused { layer: CachedLayer, pixels: f64 },
 }
 
-/// A shell that there is.
+/// A cached layer.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Kept {
+pub struct CachedLayer {
     pub shell: Shell,
-    /// What its picture is taken with.
+    /// The camera of its picture.
     pub camera: CameraRecord,
     /// The last sort key of its particles.
     pub last_key: u32,
-    /// Nearer than this are no centres of it that the view shows.
+    /// Least depth of its particles in the current view.
     pub depth: f64,
-    /// Slopes of the view that it shows anything at, least and greatest.
+    /// Least and greatest slopes of the view at which it shows anything.
     pub bounds: [DVec2; 2],
 }
 
+/// The cache of one layer.
 #[derive(Debug)]
-pub struct Keeper {
-    pub rules: Rules,
+pub struct ImpostorCache {
+    pub rules: CacheRules,
     last: Option<View>,
-    kept: Option<Kept>,
+    layer: Option<CachedLayer>,
 }
 
-impl Keeper {
-    pub fn new(rules: Rules) -> Keeper {
-        Keeper { rules, last: None, kept: None }
+impl ImpostorCache {
+    pub fn new(rules: CacheRules) -> ImpostorCache {
+        ImpostorCache { rules, last: None, layer: None }
     }
 
-    /// The next frame is like a first one.
+    /// Forgets the layer, as before a first frame.
     pub fn reset(&mut self) {
-        (self.last, self.kept) = (None, None);
+        (self.last, self.layer) = (None, None);
     }
 
-    /// What `packet`'s frame shows. `changed`: what is other than in the last frame, but for the
-    /// view.
-    pub fn step(&mut self, packet: &Packet, changed: Option<&'static str>) -> Step {
+    /// Returns the layer that `packet`'s frame shows. `changed` names a change since the last frame
+    /// other than the view.
+    pub fn step(&mut self, packet: &Packet, changed: Option<&'static str>) -> LayerUse {
         let now = view_of(&packet.camera);
         let last = self.last.replace(now);
-        let kept = self.kept.take();
+        let layer = self.layer.take();
         if let Some(changed) = changed {
-            return Step::Nothing(changed);
+            return LayerUse::None(changed);
         }
-        let why = match kept.map(|kept| (kept, self.usable(&kept, &now, packet))) {
-            Some((kept, Ok((pixels, depth)))) => {
-                let kept = Kept { depth, bounds: self.bounds(&kept, &now, packet), ..kept };
-                self.kept = Some(kept);
-                return Step::Reused { kept, pixels };
+        let why = match layer.map(|layer| (layer, self.usable(&layer, &now, packet))) {
+            Some((layer, Ok((pixels, depth)))) => {
+                let layer =
+                    CachedLayer { depth, bounds: self.bounds(&layer, &now, packet), ..layer };
+                self.layer = Some(layer);
+                return LayerUse::Reused { layer, pixels };
             }
             Some((_, Err(why))) => why,
-            None => "there is none",
+            None => "there is no layer",
         };
         let Some(last) = last else {
-            return Step::Nothing("how fast the eye moves is not known yet");
+            return LayerUse::None("the motion of the eye is not known yet");
         };
-        self.kept = self.best(packet, &last, &now);
-        match self.kept {
-            Some(kept) => Step::Made { kept, why },
-            None => Step::Nothing("none would save anything"),
+        self.layer = self.best(packet, &last, &now);
+        match self.layer {
+            Some(layer) => LayerUse::Made { layer, why },
+            None => LayerUse::None("no layer would save anything"),
         }
     }
 
-    /// Slopes of a pixel.
+    /// Returns the width of a pixel, as a slope.
     fn pixel(&self, view: &View) -> f64 {
         2.0 * view.tangents.x / f64::from(self.rules.size[0])
     }
 
-    /// Pixels that a shell is off by in `now`'s view and the least depth of its centres, or why it
-    /// is not to be shown.
-    fn usable(&self, kept: &Kept, now: &View, packet: &Packet) -> Result<(f64, f64), &'static str> {
-        let pixels = self.off_by(&kept.shell, now)?;
-        let far = &kept.shell.far;
-        let ratio = kept.shell.predict(now).map_or(0.0, |p| p.depth_ratio);
+    /// Returns the layer's error in the view `now`, in pixels, and the least depth of its
+    /// particles; or why it cannot be shown.
+    fn usable(
+        &self,
+        layer: &CachedLayer,
+        now: &View,
+        packet: &Packet,
+    ) -> Result<(f64, f64), &'static str> {
+        let pixels = self.off_by(&layer.shell, now)?;
+        let far = &layer.shell.far;
+        let ratio = layer.shell.predict(now).map_or(0.0, |p| p.depth_ratio);
         let nearest = ratio * far.nearest;
         let mut surfaces = packet
             .regions
@@ -147,18 +157,18 @@ impl Keeper {
         if surfaces.peek().is_some() {
             let farthest = packet.extents.iter().map(|e| depths(e, now)[1]).fold(0.0, f64::max);
             if surfaces.any(|r| is_among(r, now, [nearest, farthest])) {
-                return Err("a surface is among what is far");
+                return Err("a surface is among the distant blobs");
             }
         }
         Ok((pixels, nearest))
     }
 
-    /// Pixels that a shell is off by in `now`'s view, or why it is not to be shown.
+    /// Returns the layer's error in the view `now`, in pixels, or why it cannot be shown.
     fn off_by(&self, shell: &Shell, now: &View) -> Result<f64, &'static str> {
         let pixel = self.pixel(now);
         let Some(predicted) = shell.predict(now) else { return Err("the eye came too near") };
         let pixels = predicted.slopes() / pixel;
-        // Written so that NaN is none.
+        // The comparison is false for NaN.
         if !matches!(pixels, p if p <= self.rules.error) {
             return Err("it would be off by more than draw.impostor_error");
         }
@@ -169,32 +179,32 @@ impl Keeper {
         }
     }
 
-    /// The shell that saves the most if the eye goes on as it came from `last` to `now`.
-    fn best(&self, packet: &Packet, last: &View, now: &View) -> Option<Kept> {
+    /// Returns the layer that saves the most if the eye keeps moving as from `last` to `now`.
+    fn best(&self, packet: &Packet, last: &View, now: &View) -> Option<CachedLayer> {
         let pixel = self.pixel(now);
         let costs: Vec<f64> = packet.extents.iter().map(|e| self.cost(e, now, pixel)).collect();
         let sum = |costs: &[f64], cut: f64| -> f64 {
             packet.extents.iter().zip(costs).map(|(e, c)| c * share_beyond(e, now, cut)).sum()
         };
-        let mut best: Option<(f64, Kept)> = None;
+        let mut best: Option<(f64, CachedLayer)> = None;
         for cut in cuts(&packet.extents, &costs, now) {
-            let Some(kept) = self.shell(packet, now, cut) else { continue };
-            let wide = View { tangents: kept.shell.view.tangents, ..*now };
-            let in_shell: Vec<f64> =
+            let Some(layer) = self.layer_beyond(packet, now, cut) else { continue };
+            let wide = View { tangents: layer.shell.view.tangents, ..*now };
+            let in_layer: Vec<f64> =
                 packet.extents.iter().map(|e| self.cost(e, &wide, pixel)).collect();
-            let shown = (kept.bounds[1] - kept.bounds[0]) / pixel;
-            let n = self.life(&kept, packet, last, now);
-            let anew = sum(&in_shell, cut) / f64::from(n);
+            let shown = (layer.bounds[1] - layer.bounds[0]) / pixel;
+            let n = self.life(&layer, packet, last, now);
+            let anew = sum(&in_layer, cut) / f64::from(n);
             let saved = sum(&costs, cut) - anew - SHOW_LAYERS * shown.x * shown.y;
-            if n >= LEAST_LIFE && saved > best.as_ref().map_or(0.0, |(s, _)| *s) {
-                best = Some((saved, kept));
+            if n >= MIN_LIFE && saved > best.as_ref().map_or(0.0, |(s, _)| *s) {
+                best = Some((saved, layer));
             }
         }
-        best.map(|(_, kept)| kept)
+        best.map(|(_, layer)| layer)
     }
 
-    /// Frames that a shell would be shown in.
-    fn life(&self, kept: &Kept, packet: &Packet, last: &View, now: &View) -> u32 {
+    /// Returns the number of frames in which a layer would be usable.
+    fn life(&self, layer: &CachedLayer, packet: &Packet, last: &View, now: &View) -> u32 {
         let axes = |v: &View| DMat3::from_cols(v.right, v.up, v.forward);
         let (moved, turn) = (now.eye - last.eye, axes(now) * axes(last).transpose());
         let mut view = *now;
@@ -202,17 +212,17 @@ impl Keeper {
             let turned = turn * axes(&view);
             let (right, up, forward) = (turned.x_axis, turned.y_axis, turned.z_axis);
             view = View { eye: view.eye + moved, right, up, forward, ..view };
-            if self.usable(kept, &view, packet).is_err() {
+            if self.usable(layer, &view, packet).is_err() {
                 return n;
             }
         }
         AHEAD
     }
 
-    /// The shell of all that is farther than `cut`; none where that is too near, or a surface is
-    /// among it.
-    fn shell(&self, packet: &Packet, now: &View, cut: f64) -> Option<Kept> {
-        let Rules { size, shell_size, cutoff, .. } = self.rules;
+    /// Returns the layer of all blobs beyond `cut`; `None` if they are too near or surround a
+    /// surface.
+    fn layer_beyond(&self, packet: &Packet, now: &View, cut: f64) -> Option<CachedLayer> {
+        let CacheRules { size, layer_size, cutoff, .. } = self.rules;
         let beyond: Vec<(&Extent, [f64; 2])> = packet
             .extents
             .iter()
@@ -227,35 +237,35 @@ impl Keeper {
         let farthest =
             beyond.iter().map(|(_, d)| d[1]).fold(nearest, f64::max) + ROUNDING * lengths;
         let least = beyond.iter().map(|(e, d)| e.sigma_mean / d[1]).fold(f64::INFINITY, f64::min);
-        if least < LEAST_SIGMA * self.pixel(now) {
+        if least < MIN_SIGMA * self.pixel(now) {
             return None;
         }
         let far = FarField { nearest, farthest, sigma, radius: cutoff * sigma };
-        // The far set's sprites must be drawn whole, and stay so.
+        // The sprites of the layer must lie wholly in front of the eye, and stay so.
         if nearest.is_nan()
-            || nearest <= (LEAST_RADII * far.radius).max(2.0 * f64::from(packet.camera.near))
+            || nearest <= (MIN_RADII * far.radius).max(2.0 * f64::from(packet.camera.near))
         {
             return None;
         }
-        let wider = |k: usize| f64::from(shell_size[k]) / f64::from(size[k]);
+        let wider = |k: usize| f64::from(layer_size[k]) / f64::from(size[k]);
         let tangents = now.tangents * DVec2::new(wider(0), wider(1));
         let camera =
             CameraRecord { tan_x: tangents.x as f32, tan_y: tangents.y as f32, ..packet.camera };
-        let kept = Kept {
+        let layer = CachedLayer {
             shell: Shell { view: view_of(&camera), far },
             camera,
             last_key,
             depth: nearest,
             bounds: [-now.tangents, now.tangents],
         };
-        let kept = Kept { bounds: self.bounds(&kept, now, packet), ..kept };
-        self.usable(&kept, now, packet).is_ok().then_some(kept)
+        let layer = CachedLayer { bounds: self.bounds(&layer, now, packet), ..layer };
+        self.usable(&layer, now, packet).is_ok().then_some(layer)
     }
 
-    /// Slopes of `now`'s view that a shell shows anything at, least and greatest.
-    fn bounds(&self, kept: &Kept, now: &View, packet: &Packet) -> [DVec2; 2] {
-        let then = &kept.shell.view;
-        let far = packet.extents.iter().filter(|e| depths(e, then)[1] >= kept.shell.far.nearest);
+    /// Returns the least and greatest slopes of the view `now` at which a layer shows anything.
+    fn bounds(&self, layer: &CachedLayer, now: &View, packet: &Packet) -> [DVec2; 2] {
+        let then = &layer.shell.view;
+        let far = packet.extents.iter().filter(|e| depths(e, then)[1] >= layer.shell.far.nearest);
         let (mut low, mut high) = (now.tangents, -now.tangents);
         for extent in far {
             let c = extent.center - now.eye;
@@ -272,13 +282,14 @@ impl Keeper {
                 high[k] = high[k].max(slope(x + wide, z - deep)).max(slope(x + wide, z + deep));
             }
         }
-        // Off by the error, the cubic's footprint, and a pixel for the rounding of both.
+        // The error, the cubic's footprint, and a pixel for the rounding of both.
         let slack = (self.rules.error + FOOTPRINT + 1.0) * self.pixel(now);
         let (low, high) = ((low - slack).max(-now.tangents), (high + slack).min(now.tangents));
         [low.min(high), high]
     }
 
-    /// Pixels, `pixel` slopes wide, of the layers that a group's particles make in a view.
+    /// Returns the pixels that a group's particles cover in a view, with `pixel` as a pixel's
+    /// slope.
     fn cost(&self, extent: &Extent, now: &View, pixel: f64) -> f64 {
         let c = extent.center - now.eye;
         let z = c.dot(now.forward).max(1e-3 * self.rules.cutoff * extent.sigma_mean);
@@ -297,7 +308,7 @@ impl Keeper {
     }
 }
 
-/// The camera in f64, exactly as shaders have it.
+/// Returns the camera in f64, exactly as shaders have it.
 pub fn view_of(camera: &CameraRecord) -> View {
     let f64s = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     View {
@@ -309,14 +320,14 @@ pub fn view_of(camera: &CameraRecord) -> View {
     }
 }
 
-/// Least and greatest view depth of a group's centres.
+/// Returns the least and greatest view depth of a group's particles.
 fn depths(extent: &Extent, view: &View) -> [f64; 2] {
     let (z, half) =
         ((extent.center - view.eye).dot(view.forward), view.forward.abs().dot(extent.half));
     [z - half, z + half]
 }
 
-/// The share of a group that is farther than `cut`, as if it were spread evenly over its depths.
+/// Returns the share of a group beyond `cut`, as if it were spread evenly over its depths.
 fn share_beyond(extent: &Extent, view: &View, cut: f64) -> f64 {
     let [low, high] = depths(extent, view);
     if high > low {
@@ -326,7 +337,7 @@ fn share_beyond(extent: &Extent, view: &View, cut: f64) -> f64 {
     }
 }
 
-/// Depths that part the groups into equal parts of their costs, and one before all of them.
+/// Returns depths that divide the groups into parts of equal cost, and one before all of them.
 fn cuts(extents: &[Extent], costs: &[f64], view: &View) -> Vec<f64> {
     let of = |(e, cost): (&Extent, &f64)| ((e.center - view.eye).dot(view.forward), *cost);
     let mut sorted: Vec<(f64, f64)> =
@@ -345,8 +356,8 @@ fn cuts(extents: &[Extent], costs: &[f64], view: &View) -> Vec<f64> {
     cuts
 }
 
-/// The last sort key of depths of at least `z` relative to the lighting origin, and how much less a
-/// depth of that key may be; none where no depth has one.
+/// Returns the last sort key of depths of at least `z`, relative to the lighting origin. The second
+/// number is how much less a depth of that key may be. `None` if no depth has a key.
 fn last_key(z: f64, radius: f64, sort_bits: u32) -> Option<(u32, f64)> {
     if sort_bits == 32 {
         let z = z as f32;
@@ -356,11 +367,12 @@ fn last_key(z: f64, radius: f64, sort_bits: u32) -> Option<(u32, f64)> {
     }
     let quantum = 2.0 * radius / 65536.0;
     let key = ((radius - z) / quantum).floor();
-    // Written so that NaN is none.
+    // The comparison is false for NaN.
     if matches!(key, k if k >= 0.0) { Some((key.min(65535.0) as u32, quantum)) } else { None }
 }
 
-/// Whether a surface or ground is neither nearer nor farther than all of some depths.
+/// Returns whether a surface or terrain is neither nearer nor farther than all of a range of
+/// depths.
 fn is_among(region: &RegionRecord, view: &View, [nearest, farthest]: [f64; 2]) -> bool {
     let f64s = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let z = (f64s(region.center) - view.eye).dot(view.forward);

@@ -1,5 +1,5 @@
-//! What of each group is drawn this frame: none where it cannot be in the picture, else as many as
-//! its distance and size ask for. Light knows nothing of it.
+//! The part of each group that a frame draws: nothing if the group cannot be in the picture, else
+//! as many particles as its distance and size ask for. Lighting does not depend on it.
 
 use glam::DVec3;
 
@@ -10,9 +10,9 @@ use crate::model::frame_state::FrameState;
 use crate::model::scene::Scene;
 use crate::model::visibility::Frustum;
 
-/// A record for each of `groups`, as they have grown, and how many particles they name together.
-/// `culls`: leave out groups that cannot be in the picture.
-pub fn drawn(
+/// Returns the drawn part of each of `groups`, as they have grown, and the number of drawn
+/// particles. With `culls`, groups that cannot be in the picture are left out.
+pub(super) fn drawn_groups(
     scene: &Scene,
     groups: &[Group],
     setting: &FrameState,
@@ -20,13 +20,12 @@ pub fn drawn(
 ) -> (Vec<DrawnRecord>, u32) {
     let frustum = Frustum::of(&scene.camera, &setting.pose, &scene.film, scene.widening());
     let eye = setting.pose.position;
-    // Coordinates are relative to the lighting origin, the eye's too.
+    // Coordinates, also the eye's, are relative to the lighting origin.
     let lengths = (eye - setting.light_origin).abs().element_sum() + setting.radius;
     let mut n_drawn = 0;
     let of = |group: &Group| {
         let origin = scene.clouds[group.i_cloud].origin_at(setting.time_s) - eye;
-        // Of an ellipsoid what it reaches farther along some axis than along its shortest is added
-        // to the box.
+        // The reach of an ellipsoid beyond that of its shortest axis is added to the box.
         let reach = scene.draw.cutoff * group.sigma_bounds();
         let radius = reach.min_element();
         let half =

@@ -1,0 +1,65 @@
+//! The numbers of a scene that passes take as arguments. They are constant over a run.
+
+use super::features::{saturation_bound, target_format};
+use crate::gpu::TargetFormat;
+use crate::layout::frame::CameraRecord;
+use crate::model::scene::Scene;
+use crate::passes::blobs::BlobView;
+use crate::passes::transmit::MarchParams;
+
+/// Counts of records, and parameters of the passes.
+pub(super) struct FrameConstants {
+    pub n_particles: u32,
+    pub n_surface_facets: u32,
+    /// Facets of surfaces and terrains.
+    pub n_solid_facets: u32,
+    pub n_regions: u32,
+    pub march: MarchParams,
+    pub texture_seed: u32,
+    pub cutoff: f64,
+    pub threshold: f64,
+    /// σ below which a blob is left out, in pixels of the film.
+    pub smallest: f64,
+    pub saturated: f64,
+    pub format: TargetFormat,
+    /// Columns and rows of the film.
+    pub size: [u32; 2],
+}
+
+impl FrameConstants {
+    pub fn new(scene: &Scene) -> FrameConstants {
+        let n_particles = scene.n_particles() as u32;
+        FrameConstants {
+            n_particles,
+            n_surface_facets: scene.n_surface_facets() as u32,
+            n_solid_facets: scene.n_solid_facets() as u32,
+            n_regions: scene.n_regions() as u32,
+            march: MarchParams {
+                n_facets: scene.n_facets() as u32,
+                n_lights: scene.lights.len() as u32,
+                n_surfaces: scene.surfaces.len() as u32,
+                step_cells: scene.lighting.step,
+                // Without particles there is nothing to march through.
+                forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
+            },
+            texture_seed: scene.draw.texture_seed,
+            cutoff: scene.draw.cutoff,
+            threshold: scene.draw.threshold.bound(),
+            smallest: scene.draw.smallest.bound(),
+            saturated: saturation_bound(scene.film.format),
+            format: target_format(scene.film.format),
+            size: [scene.film.width, scene.film.height],
+        }
+    }
+
+    /// Returns the bytes of a picture.
+    pub fn n_bytes(&self) -> u64 {
+        u64::from(self.size[0]) * u64::from(self.size[1]) * self.format.bytes_per_pixel()
+    }
+
+    /// Returns `camera`'s view of the blobs.
+    pub fn view<'a>(&self, camera: &'a CameraRecord) -> BlobView<'a> {
+        let FrameConstants { cutoff, threshold, saturated, .. } = *self;
+        BlobView { camera, cutoff, threshold, saturated }
+    }
+}

@@ -1,0 +1,209 @@
+//! Properties of a scene that decide which passes, pipelines and buffers it needs. They are
+//! constant over a run.
+
+use crate::gpu::TargetFormat;
+use crate::model::cloud::{Cloud, CloudSource, Group, SQRT_TAU};
+use crate::model::disc::Disc;
+use crate::model::film::FilmFormat;
+use crate::model::resolution::Resolution;
+use crate::model::scene::{Cull, DrawPath, Gather, Impostors, LightingMode, Scene, Simulate};
+use crate::passes::blobs::BlobVariant;
+use crate::passes::tiles::THIN;
+
+/// Properties of a scene in which no knob is "auto".
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SceneFeatures {
+    /// Some particles come from boxes.
+    pub has_boxes: bool,
+    /// Some particles are recomputed in every frame.
+    pub has_live: bool,
+    /// Number of particles.
+    pub n_particles: u32,
+    /// Number of facets.
+    pub n_facets: u32,
+    /// `lighting.mode` is not "none".
+    pub is_lit: bool,
+    /// `lighting.mode` is "two-reflection".
+    pub has_second: bool,
+    /// Facets stand for several particles.
+    pub is_grouped: bool,
+    /// Some cloud has a texture.
+    pub is_textured: bool,
+    /// Number of surfaces.
+    pub n_surfaces: u32,
+    /// Number of terrains.
+    pub n_terrains: u32,
+    /// Some region has a specular lobe, so that its radiance depends on the eye.
+    pub is_glossy: bool,
+    /// Whether light tensors are kept.
+    pub tensors: Tensors,
+    /// Distant blobs may be shown from a picture of them.
+    pub has_impostors: bool,
+    /// Particles that show in no pixel are left out.
+    pub culls: bool,
+    /// The pass that draws blobs.
+    pub path: DrawPath,
+    /// Blobs are drawn into a smaller picture.
+    pub is_low_res: bool,
+}
+
+/// Whether a scene keeps the tensors that let `contract` alone follow the edit of a material.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tensors {
+    /// The tensors are kept.
+    Kept,
+    /// No material is edited.
+    Needless,
+    /// T2 does not fit the device.
+    TooLarge {
+        /// Bytes of T2.
+        bytes: u64,
+        /// Bytes that the device has for it.
+        most: u64,
+    },
+}
+
+impl SceneFeatures {
+    /// Returns the properties of `scene`, in which no knob is "auto".
+    pub fn new(scene: &Scene, tensors: Tensors) -> SceneFeatures {
+        let is_box = |c: &Cloud| matches!(c.source, CloudSource::Boxes { .. });
+        SceneFeatures {
+            has_boxes: scene.clouds.iter().any(is_box),
+            has_live: has_live(scene),
+            n_particles: scene.n_particles() as u32,
+            n_facets: scene.n_facets() as u32,
+            is_lit: is_lit(scene),
+            has_second: has_second(scene),
+            is_grouped: is_grouped(scene),
+            is_textured: scene.is_textured(),
+            n_surfaces: scene.surfaces.len() as u32,
+            n_terrains: scene.terrains.len() as u32,
+            is_glossy: has_glossy(scene),
+            tensors,
+            has_impostors: has_impostors(scene),
+            culls: culls(scene),
+            path: scene.draw.path,
+            is_low_res: scene.draw.resolution != Resolution::Full,
+        }
+    }
+}
+
+/// Returns whether `lighting.mode` is not "none".
+pub fn is_lit(scene: &Scene) -> bool {
+    scene.lighting.mode != LightingMode::None
+}
+
+/// Returns whether the scene has a second reflection.
+pub fn has_second(scene: &Scene) -> bool {
+    scene.lighting.mode == LightingMode::TwoReflection
+}
+
+/// Returns whether lit facets stand for several particles.
+pub fn is_grouped(scene: &Scene) -> bool {
+    is_lit(scene) && scene.groups_facets()
+}
+
+/// Returns whether distant blobs may be shown from a picture of them.
+pub fn has_impostors(scene: &Scene) -> bool {
+    scene.draw.impostors != Impostors::Off
+}
+
+/// Returns whether the device leaves out particles that show in no pixel. Impostor layers include
+/// every particle, so that they stay valid when the camera turns.
+pub fn culls(scene: &Scene) -> bool {
+    scene.draw.cull != Cull::Off && !has_impostors(scene) && scene.n_particles() > 0
+}
+
+/// Returns the scene's discs in order, with their clouds and the indices of these.
+pub fn discs(scene: &Scene) -> impl Iterator<Item = (usize, &Cloud, &Disc)> {
+    scene.clouds.iter().enumerate().filter_map(|(i, cloud)| match &cloud.source {
+        CloudSource::Disc(disc) => Some((i, cloud, disc)),
+        _ => None,
+    })
+}
+
+/// Returns whether some particles are recomputed in every frame.
+pub fn has_live(scene: &Scene) -> bool {
+    discs(scene).next().is_some() || scene.is_animated()
+}
+
+/// Returns whether the game thread recomputes particles in every frame.
+pub fn has_live_on_host(scene: &Scene) -> bool {
+    scene.threads.simulate == Simulate::Cpu && has_live(scene)
+}
+
+/// Returns whether the specular lobe of a region is computed.
+pub fn is_glossy(scene: &Scene, i_region: usize) -> bool {
+    scene.lighting.bases > 1 && scene.region_material(i_region).is_glossy()
+}
+
+/// Returns whether the specular lobe of some region is computed.
+pub fn has_glossy(scene: &Scene) -> bool {
+    (0..scene.n_regions()).any(|i| is_glossy(scene, i))
+}
+
+/// Returns whether the second reflection is gathered from a tree of clusters.
+pub fn gathers_from_tree(scene: &Scene) -> bool {
+    /// The number of facets from which on the tree is faster (docs/measured.md).
+    const MIN_FACETS: u64 = 1024;
+    match scene.lighting.gather {
+        Gather::Exact => false,
+        Gather::Tree => true,
+        Gather::Auto => scene.n_facets() >= MIN_FACETS,
+    }
+}
+
+/// Returns the number of facets of each region.
+pub(super) fn region_sizes(scene: &Scene) -> Vec<u32> {
+    let of_surfaces = scene.surfaces.iter().map(|s| s.n_facets());
+    let of_terrains = scene.terrains.iter().map(|t| t.n_facets());
+    let of_clouds = scene.clouds.iter().map(|c| scene.n_cloud_facets(c));
+    of_surfaces.chain(of_terrains).chain(of_clouds).map(|n| n as u32).collect()
+}
+
+/// Returns the properties of the scene's blobs.
+pub(super) fn blob_variant(scene: &Scene) -> BlobVariant {
+    BlobVariant {
+        lit: is_lit(scene),
+        grouped: is_grouped(scene),
+        weighted: scene.draw.count.is_some(),
+        textured: scene.is_textured(),
+        threshold: scene.draw.threshold.is_active(),
+        ellipsoids: scene.has_ellipsoids(),
+    }
+}
+
+/// Returns the film's format as a render target's.
+pub fn target_format(format: FilmFormat) -> TargetFormat {
+    match format {
+        FilmFormat::Rgba8 => TargetFormat::Rgba8,
+        FilmFormat::Rgba16f => TargetFormat::Rgba16f,
+        FilmFormat::Rgba32f => TargetFormat::Rgba32f,
+    }
+}
+
+/// Returns the transmittance below which a pixel of `format` hides everything behind it: half a
+/// step of the format below 1.
+pub fn saturation_bound(format: FilmFormat) -> f64 {
+    0.5 * format.unit_roundoff()
+}
+
+/// Returns whether the tile shaders for thin blobs draw the scene.
+pub(super) fn is_thin(scene: &Scene) -> bool {
+    tau_max(scene) <= THIN
+}
+
+/// Returns a bound of the optical depth of every blob at any time.
+pub(super) fn tau_max(scene: &Scene) -> f64 {
+    if scene.is_animated() {
+        return f64::INFINITY;
+    }
+    let conserves = scene.draw.count.is_some_and(|c| c.conserve);
+    let of = |g: &Group| {
+        let growth = scene.clouds[g.i_cloud].growth.to.max(1.0);
+        // At most, one particle stands for all of its group.
+        let denser = if conserves { f64::from(g.n_particles) } else { 1.0 };
+        SQRT_TAU * g.kappa_max * g.sigma_widest() * growth * denser
+    };
+    scene.groups().iter().map(of).fold(0.0, f64::max)
+}

@@ -1,0 +1,116 @@
+//! The passes of a scene's frames and the buffers that they share.
+
+use super::buffers::{SceneBuffers, n_cells};
+use super::constants::FrameConstants;
+use super::culling::Culling;
+use super::features::{SceneFeatures, has_second, is_grouped};
+use super::gather::IndirectGather;
+use super::live::{LiveParticles, PlacedUploads};
+use super::morton_sort::FacetRuns;
+use super::packet::Packet;
+use super::picture::Picture;
+use super::records;
+use super::tensors::LightTensors;
+use crate::error::Result;
+use crate::gpu::{Commands, Compiler, Device};
+use crate::model::scene::{Scene, Simulate};
+use crate::passes::facets::Facets;
+use crate::passes::first::First;
+use crate::passes::generate::Generate;
+use crate::passes::grid::Grid;
+use crate::passes::place::Place;
+use crate::passes::sort::Sort;
+use crate::passes::texture::Texture;
+use crate::passes::transmit::Transmit;
+
+/// The pipelines and buffers of a scene's frames. A pass that the scene does not need is `None`.
+pub(super) struct FramePasses {
+    pub generate: Generate,
+    pub live: Option<LiveParticles>,
+    pub place: Place,
+    /// Places of particles that the game thread moves.
+    pub placed_uploads: Option<PlacedUploads>,
+    pub grid: Grid,
+    pub runs: Option<FacetRuns>,
+    pub facets: Facets,
+    pub transmit: Transmit,
+    pub first: First,
+    pub gather: Option<IndirectGather>,
+    pub tensors: Option<LightTensors>,
+    pub culling: Option<Culling>,
+    pub sort: Sort,
+    pub texture: Option<Texture>,
+    pub buffers: SceneBuffers,
+    pub picture: Picture,
+    pub constants: FrameConstants,
+    pub features: SceneFeatures,
+}
+
+impl FramePasses {
+    /// Creates the passes of `scene`, in which no knob is "auto". Light tensors may take
+    /// `free_bytes` of the device's memory.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        commands: &mut Commands,
+        scene: &Scene,
+        free_bytes: u64,
+    ) -> Result<FramePasses> {
+        let n_particles = scene.n_particles() as u32;
+        let (fit, tensors) = LightTensors::new(device, compiler, commands, scene, free_bytes)?;
+        let has_tensors = tensors.is_some();
+        let gather = has_second(scene)
+            .then(|| IndirectGather::new(device, compiler, commands, scene, has_tensors))
+            .transpose()?;
+        let runs = is_grouped(scene)
+            .then(|| FacetRuns::new(device, compiler, commands, scene))
+            .transpose()?;
+        let is_moved_by_host = scene.threads.simulate == Simulate::Cpu;
+        let sums = scene.lighting.sums.into();
+        let passes = FramePasses {
+            generate: Generate::new(device, compiler)?,
+            live: LiveParticles::new(device, compiler, scene)?,
+            place: Place::new(device, compiler)?,
+            placed_uploads: is_moved_by_host
+                .then(|| PlacedUploads::new(device, scene))
+                .transpose()?,
+            grid: Grid::new(device, compiler, n_cells(scene))?,
+            runs,
+            facets: Facets::new(device, compiler, scene.has_ellipsoids())?,
+            transmit: Transmit::new(device, compiler, has_second(scene), &sums)?,
+            first: First::new(device, compiler)?,
+            gather,
+            tensors,
+            culling: Culling::new(device, compiler, scene)?,
+            sort: Sort::new(device, compiler, n_particles)?,
+            texture: scene.is_textured().then(|| Texture::new(device, compiler)).transpose()?,
+            buffers: SceneBuffers::new(device, scene)?,
+            picture: Picture::new(device, compiler, scene)?,
+            constants: FrameConstants::new(scene),
+            features: SceneFeatures::new(scene, fit),
+        };
+        records::fill(device, commands, scene, &scene.groups(), &passes.buffers)?;
+        Ok(passes)
+    }
+
+    /// Writes the data of `packet` into the staging buffers of `slot`.
+    pub fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
+        self.buffers.write(slot, packet)?;
+        if let Some(live) = &mut self.live {
+            live.write(slot, packet)?;
+        }
+        if let (Some(uploads), Some(placed)) = (&mut self.placed_uploads, &packet.placed) {
+            uploads.placed.write(slot, placed)?;
+        }
+        if let Some(runs) = &mut self.runs {
+            runs.sort.write(slot, packet)?;
+        }
+        if let Some(order) = self.gather.as_mut().and_then(|gather| gather.order.as_mut()) {
+            order.write(slot, packet)?;
+        }
+        match &mut self.tensors {
+            Some(tensors) => tensors.write(slot, packet),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Records that never change during a run, and their upload.
+
+use super::buffers::SceneBuffers;
+use super::features::is_lit;
+use super::staging::upload;
+use crate::error::Result;
+use crate::gpu::{Commands, Device};
+use crate::layout::facet::{FacetRecord, LitRecord};
+use crate::layout::particle::{BoxLaw, BoxRecord, ParticleRecord, TexturedRecord};
+use crate::model::cloud::{CloudSource, Group};
+use crate::model::scene::Scene;
+
+/// Fills the buffers whose content never changes: boxes, each particle's group, listed particles,
+/// regions of facets, terrain, textures, and the light of unlit scenes.
+pub(super) fn fill(
+    device: &Device,
+    commands: &mut Commands,
+    scene: &Scene,
+    groups: &[Group],
+    b: &SceneBuffers,
+) -> Result<()> {
+    let i_group = repeated(groups.iter().map(|g| u64::from(g.n_particles)));
+    let i_region = repeated(scene.surfaces.iter().map(|s| s.n_facets()));
+    upload(device, commands, &i_region, &b.i_region)?;
+    upload(device, commands, &ground_records(scene), &b.ground)?;
+    upload(device, commands, &i_group, &b.i_group)?;
+    upload_groups(device, commands, scene, groups, b)?;
+    commands.run(|rec| {
+        rec.fill(&b.status, 0);
+        // L2 of scenes with a first reflection alone.
+        rec.fill(&b.lit, 0);
+        Ok(())
+    })?;
+    if !is_lit(scene) {
+        upload(device, commands, &unlit_records(scene), &b.lit)?;
+    }
+    upload(device, commands, &listed_particles(scene, groups), &b.particles)
+}
+
+/// Uploads the boxes and textures of `groups`.
+pub(super) fn upload_groups(
+    device: &Device,
+    commands: &mut Commands,
+    scene: &Scene,
+    groups: &[Group],
+    b: &SceneBuffers,
+) -> Result<()> {
+    upload(device, commands, &box_records(scene, groups), &b.boxes)?;
+    if scene.is_textured() {
+        upload(device, commands, &textured_records(scene, groups), &b.textured)?;
+    }
+    Ok(())
+}
+
+/// Returns each index of `counts` as often as its count says.
+fn repeated(counts: impl Iterator<Item = u64>) -> Vec<u32> {
+    (0..).zip(counts).flat_map(|(i, n)| std::iter::repeat_n(i, n as usize)).collect()
+}
+
+/// Returns the light of an unlit scene: surfaces and terrain show the K_d of their materials, as
+/// particles show their colors.
+fn unlit_records(scene: &Scene) -> Vec<LitRecord> {
+    let of_surfaces = scene.surfaces.iter().map(|s| (s.i_material, s.n_facets()));
+    let of_terrains = scene.terrains.iter().map(|t| (t.i_material, t.n_facets()));
+    let light = |(i_material, n_facets): (usize, u64)| {
+        let first = scene.materials[i_material].at(scene.time.start_s).kd.as_vec3().to_array();
+        std::iter::repeat_n(LitRecord { first, ..LitRecord::default() }, n_facets as usize)
+    };
+    of_surfaces.chain(of_terrains).flat_map(light).collect()
+}
+
+/// Returns the facets of all terrains.
+fn ground_records(scene: &Scene) -> Vec<FacetRecord> {
+    let terrains = scene.terrains.iter().zip(scene.surfaces.len() as u32..);
+    terrains
+        .flat_map(|(t, i_region)| t.facets().map(move |f| FacetRecord::terrain(&f, i_region)))
+        .collect()
+}
+
+/// Returns the box of each group.
+fn box_records(scene: &Scene, groups: &[Group]) -> Vec<BoxRecord> {
+    let mut records = Vec::with_capacity(groups.len());
+    for cloud in &scene.clouds {
+        match &cloud.source {
+            CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => {
+                let (form, optical_depth, radius_scale) = (*form, *optical_depth, *radius_scale);
+                let law = BoxLaw { form, optical_depth, radius_scale, seed: cloud.seed };
+                for (b, i_box) in boxes.iter().zip(0u32..) {
+                    records.push(BoxRecord::new(b, &law, i_box, groups[records.len()].i_first));
+                }
+            }
+            CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Animated(_) => {
+                records.push(BoxRecord::given())
+            }
+        }
+    }
+    records
+}
+
+/// Returns the texture of each group.
+fn textured_records(scene: &Scene, groups: &[Group]) -> Vec<TexturedRecord> {
+    let record = |(g, i_box): (&Group, u32)| {
+        let cloud = &scene.clouds[g.i_cloud];
+        TexturedRecord::new(&cloud.texture, cloud.seed, i_box, g.i_first)
+    };
+    let clouds = groups.chunk_by(|a, b| a.i_cloud == b.i_cloud);
+    clouds.flat_map(|boxes| boxes.iter().zip(0u32..).map(record)).collect()
+}
+
+/// Returns the particles that come from lists at their places, and zeros for generated ones; empty
+/// without lists.
+fn listed_particles(scene: &Scene, groups: &[Group]) -> Vec<ParticleRecord> {
+    let mut records = Vec::new();
+    for group in groups {
+        if let CloudSource::Particles(list) = &scene.clouds[group.i_cloud].source {
+            records.resize(group.i_first as usize, ParticleRecord::default());
+            records.extend(list.iter().map(|p| ParticleRecord::new(p, group)));
+        }
+    }
+    records
+}

@@ -1,5 +1,5 @@
-//! Ellipsoidal blobs (docs/model.md §14) drawn by every path, compared with the f64 reference
-//! within bounds that follow the shaders' evaluation of conics.
+//! Ellipsoidal blobs (docs/explanation/model.md §14) drawn by every path, compared with the f64
+//! reference within bounds that follow the shaders' evaluation of conics.
 
 #[path = "harness/bounded.rs"]
 mod bounded;

@@ -149,8 +149,8 @@ fn rgba8_drops_layers_below_half_a_step() {
     assert!(layers(4, 3e-3).draw(&mut gpu, None, TargetFormat::Rgba8).iter().any(|v| *v > 0.0));
 }
 
-/// Prints the table of docs/performance.md: `cargo test --release --test formats table --
-/// --nocapture`.
+/// Prints the table of docs/explanation/performance.md: `cargo test --release --test formats table
+/// -- --nocapture`.
 #[test]
 fn table_of_formats() {
     let mut gpu = Gpu::new();

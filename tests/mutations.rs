@@ -1,5 +1,5 @@
 //! Faults injected into the shaders, each of which must fail a case of the stress suite
-//! (docs/stability.md, "Faults that are found").
+//! (docs/explanation/stability.md, "Faults that are found").
 
 use nimbus::frame::stage::DeviceChoice;
 use nimbus::passes;

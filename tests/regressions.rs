@@ -1,8 +1,8 @@
 //! Inputs that once made a parser crash, hang or use too much memory, and inputs made by hand to do
 //! so. Each must be parsed, or refused with one message.
 //!
-//! tests/data/found/<target>/ holds the inputs, <target>.txt the expected messages; docs/fuzzing.md
-//! describes the search for them.
+//! tests/data/found/<target>/ holds the inputs, <target>.txt the expected messages;
+//! docs/how-to/fuzz.md describes the search for them.
 
 #[path = "harness/readers.rs"]
 mod readers;

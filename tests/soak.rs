@@ -1,8 +1,8 @@
 //! Long runs: the serial and the parallel loop produce the same frames, and memory does not grow.
 //! All frames are hashed, validation layers are on, and resident memory is sampled.
 //!
-//! The long run (docs/measured.md) is `NIMBUS_SOAK_FRAMES=100000 cargo test --release --test soak
-//! -- --nocapture`.
+//! The long run (docs/reference/measured.md) is `NIMBUS_SOAK_FRAMES=100000 cargo test --release
+//! --test soak -- --nocapture`.
 
 use std::fs;
 use std::path::Path;

@@ -137,8 +137,8 @@ fn direction(angle: f64) -> [f32; 2] {
     [angle.sin() as f32, angle.cos() as f32]
 }
 
-/// Evaluates the half vector's gap of docs/model.md §6 for pairs of directions (ax, az, bx, bz)
-/// about the normal z, and with the directions exchanged.
+/// Evaluates the half vector's gap of docs/explanation/model.md §6 for pairs of directions (ax, az,
+/// bx, bz) about the normal z, and with the directions exchanged.
 fn gaps(
     ctx: &mut StressContext,
     directions: impl Iterator<Item = [f32; 4]>,

@@ -15,7 +15,7 @@ pub struct Case {
     pub name: &'static str,
     /// One-line description of the input.
     pub what: &'static str,
-    /// The error bound in short; docs/stability.md derives it.
+    /// The error bound in short; docs/explanation/stability.md derives it.
     pub bound: &'static str,
     /// Adds the device's values, with their reference values and bounds, to a comparison.
     pub check: fn(&mut StressContext, &mut Comparison) -> Result<()>,

@@ -35,8 +35,9 @@ void main() {
 }
 ";
 
-/// Number of shaders at least whose workgroup size is free: those that treat single records.
-const MIN_SHADERS_RESIZED: u32 = 15;
+/// Shader files that declare workgroups of 64 invocations, one per record: the loop over records
+/// that most shaders include, and shaders with a declaration of their own.
+const PER_RECORD: [&str; 3] = ["include/each.glsl", "generate.comp", "tiles_ranges.comp"];
 
 /// A device with a set of shaders.
 pub struct StressContext {
@@ -91,21 +92,15 @@ impl StressContext {
         Ok(StressContext { commands, sources, choice: choice.clone(), gpu })
     }
 
-    /// Opens the device again with workgroups of `n` in every shader whose workgroups have 64
-    /// invocations. Other workgroup sizes follow from subgroups or shared memory.
+    /// Opens the device again with workgroups of `n` in the shaders that treat single records.
+    /// Other workgroup sizes follow from subgroups or shared memory.
     pub(super) fn with_workgroup_size(&self, n: u32) -> Result<StressContext> {
-        let names: Vec<String> = self.sources.names().map(str::to_owned).collect();
         let mut sources = self.sources.clone();
-        let size = format!("local_size_x = {n}");
-        let is_resized = |name: &&String| {
-            name.ends_with(".comp") && sources.replace(name, "local_size_x = 64", &size)
-        };
-        let n_resized = names.iter().filter(is_resized).count();
-        if n_resized < MIN_SHADERS_RESIZED as usize {
-            return Err(Error::usage(format!(
-                "{n_resized} shaders have workgroups of 64; expected at least \
-                 {MIN_SHADERS_RESIZED}"
-            )));
+        for name in PER_RECORD {
+            if !sources.replace(name, "local_size_x = 64", &format!("local_size_x = {n}")) {
+                let what = format!("{name} declares no workgroups of 64 invocations");
+                return Err(Error::Fault { what });
+            }
         }
         StressContext::with_sources(&self.choice, sources)
     }

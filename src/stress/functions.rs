@@ -264,8 +264,8 @@ fn unit_vectors(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     Ok(())
 }
 
-/// Returns |n - h|²/2 of the half vector h of two directions (ax, az, bx, bz), with the bound of the
-/// device's value. The normal n is the z axis.
+/// Returns |n - h|²/2 of the half vector h of two directions (ax, az, bx, bz), with the bound of
+/// the device's value. The normal n is the z axis.
 pub(super) fn half_vector_gap(directions: [f32; 4]) -> (f64, f64) {
     let [ax, az, bx, bz] = directions.map(f64::from);
     let (hx, hz) = (ax + bx, az + bz);

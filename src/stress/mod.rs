@@ -2,7 +2,8 @@
 //! accepted input, compared with `f64` references.
 //!
 //! Every case has an error bound derived from the precision that Vulkan guarantees; see
-//! docs/stability.md. [`cases`] lists the cases, [`Case::run`] runs one on a [`StressContext`].
+//! docs/explanation/stability.md. [`cases`] lists the cases; [`Case::run`] runs one on a
+//! [`StressContext`].
 
 mod brdf;
 mod case;

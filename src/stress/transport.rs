@@ -44,7 +44,7 @@ pub const CASES: &[Case] = &[
     Case {
         name: "transport/touching",
         what: "a floor and a wall with a common edge, against the integral over their areas",
-        bound: "1 % of the greatest L2 (docs/measured.md), and the reported unresolved part",
+        bound: "1 % of the greatest L2 (docs/reference/measured.md), and the unresolved part",
         check: touching,
     },
     Case {
@@ -89,7 +89,7 @@ pub const CASES: &[Case] = &[
     Case {
         name: "transport/closed-box",
         what: "a closed box of six white walls with a lamp: as much light arrives as is emitted",
-        bound: "1 % of pairs (docs/measured.md); of the lamp 64 u of its facets' sum",
+        bound: "1 % of pairs (docs/reference/measured.md); of the lamp 64 u of its facets' sum",
         check: closed_box,
     },
 ];

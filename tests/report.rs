@@ -235,7 +235,7 @@ fn bad_input_gives_one_message_and_no_page() {
         ),
         ("nowhere", "nowhere: no such file or folder"),
         (&picture, "expected a results folder, or in one run.json, study.json, ledger.json"),
-        (&later, "a study of schema 99; this nimbus reads 1"),
+        (&later, "study.json of schema 99; this nimbus reads 1"),
         (&lacking, "missing field `reference`"),
         (&none, "not a study.json of nimbus: it names no schema version"),
         (&cut, "not JSON, or not all of it"),

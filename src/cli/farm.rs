@@ -11,7 +11,7 @@ use crate::farm::{
     self, Ended, GcOptions, MergeOptions, Outcome, Plan, Pool, RunOptions, ShardStatus, State,
     Status, process,
 };
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 
 /// Runs a command of `nimbus farm`. `stop` is set by Ctrl-C, and by the signal with which Slurm
 /// takes a node back, while `graceful` says that the command keeps what it has finished.

@@ -10,7 +10,7 @@ use crate::farm::{
     ReferenceDivision, RunOptions, ShardSize, calibrate, calibrate_by_farms, frames_workload,
     n_frames,
 };
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::io::atomic;
 use crate::io::scene_file::{self, LoadedScene};
 

@@ -13,8 +13,8 @@ use super::render_reference::Shown;
 use super::{device_choice, load, output, say_sizes, tradeoff_table};
 use crate::error::{Error, Result};
 use crate::farm::{StudyTurns, Workload, study_workload};
+use crate::frame::GpuContext;
 use crate::frame::limits;
-use crate::frame::stage::Bed;
 use crate::io::image;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;
@@ -55,21 +55,21 @@ pub fn run(
     let film = scene.film;
     let axes = axes(args, scene)?;
     check_values(args, &options, &axes, &film)?;
-    let bed = Bed::open(&device_choice(&args.options))?;
-    limits::check(scene, bed.device.limits())?;
+    let gpu = GpuContext::open(&device_choice(&args.options))?;
+    limits::check(scene, gpu.device.limits())?;
     let clocks =
-        machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;
+        machine::clocks_record(gpu.device.info(), &mut gpu.player(scene.clone(), true)?.renderer)?;
     if args.options.verbose {
         say_sizes(scene, None);
     }
-    let time = time(args, bed.device.limits().timestamp_valid_bits > 0)?;
+    let time = time(args, gpu.device.limits().timestamp_valid_bits > 0)?;
     let metric = metric(args.metric);
     let pixels = Pixels::sample(film.width, film.height, args.pixels);
     let kept = reference(args, scene, time_s, &pixels)?;
     let design = if args.grid { Design::Grid } else { Design::Alone };
     let part = args.part.map(|part| part.first as usize..part.end as usize);
     let plan = StudyPlan { axes, design, metric, time, n_rounds: args.rounds as usize, part };
-    let made = Provenance::now(Study::SCHEMA, &args.scene, &base, bed.device.info(), clocks);
+    let made = Provenance::now(Study::SCHEMA, &args.scene, &base, gpu.device.info(), clocks);
     let reference = ReferenceRecord::of(&kept, args.against, &pixels, args.frame, time_s);
     let mut study = begun(args, made, reference, &plan);
     let mut found = earlier(args, &study)?;
@@ -87,7 +87,7 @@ pub fn run(
     graceful.store(true, Ordering::Relaxed);
     let frames =
         Frames { i_frame: args.frame, time_s, n_frames: args.frames, as_played: args.as_played };
-    let mut players = Players::new(&bed, frames);
+    let mut players = Players::new(&gpu, frames);
     let loader = |settings: &[Setting]| load_with(args, &options, settings);
     let setup =
         Setup { plan: &plan, load: &loader, reference: &kept.reference, pixels: &pixels, stop };
@@ -113,7 +113,7 @@ pub fn run(
     }
     done?;
     print(args, color, &study)?;
-    bed.close()?;
+    gpu.close()?;
     if study.interrupted { Err(Error::Interrupted) } else { Ok(()) }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::io::scene_file::{self, LoadedScene};
 
 /// A scene file with its settings and shaders, and digests of all that they contain.

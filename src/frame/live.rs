@@ -83,7 +83,7 @@ pub(super) enum LiveParticles {
     /// The pass `live`, with the number of particles of each disc.
     Device { live: Live, buffers: Box<DiscBuffers>, counts: Vec<u32> },
     /// The game thread.
-    Host(LiveUploads),
+    Host(Box<LiveUploads>),
 }
 
 impl LiveParticles {
@@ -96,7 +96,7 @@ impl LiveParticles {
         Ok(match has_live(scene) {
             false => None,
             true if has_live_on_host(scene) => {
-                Some(LiveParticles::Host(LiveUploads::new(device, scene)?))
+                Some(LiveParticles::Host(Box::new(LiveUploads::new(device, scene)?)))
             }
             true => Some(LiveParticles::Device {
                 live: Live::new(device, compiler)?,

@@ -6,7 +6,7 @@ use super::staging::upload;
 use crate::error::Result;
 use crate::gpu::{Commands, Device};
 use crate::layout::facet::{FacetRecord, LitRecord};
-use crate::layout::particle::{BoxLaw, BoxRecord, ParticleRecord, TexturedRecord};
+use crate::layout::particle::{BoxRecord, ParticleRecord, TexturedRecord};
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::Scene;
 
@@ -82,11 +82,10 @@ fn box_records(scene: &Scene, groups: &[Group]) -> Vec<BoxRecord> {
     let mut records = Vec::with_capacity(groups.len());
     for cloud in &scene.clouds {
         match &cloud.source {
-            CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => {
-                let (form, optical_depth, radius_scale) = (*form, *optical_depth, *radius_scale);
-                let law = BoxLaw { form, optical_depth, radius_scale, seed: cloud.seed };
+            CloudSource::Boxes { boxes, law } => {
                 for (b, i_box) in boxes.iter().zip(0u32..) {
-                    records.push(BoxRecord::new(b, &law, i_box, groups[records.len()].i_first));
+                    let i_first = groups[records.len()].i_first;
+                    records.push(BoxRecord::new(b, law, cloud.seed, i_box, i_first));
                 }
             }
             CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Animated(_) => {

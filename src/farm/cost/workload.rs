@@ -8,8 +8,8 @@ use super::amounts::Amounts;
 use super::cell_visits::CellVisits;
 use super::layers::Layers;
 use crate::error::Result;
-use crate::frame::game::Game;
-use crate::frame::plan::{Pass, Plan, Tensors, Traits, plan};
+use crate::frame::plan::{Pass, Plan, Skipping, plan};
+use crate::frame::{Game, SceneFeatures, Tensors};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::picture::FrameReference;
@@ -100,7 +100,8 @@ fn plan_of(scene: &Scene, i_frame: u32) -> Result<Option<Plan>> {
     let mut game = Game::new(scene.clone(), None);
     let i_last = i_frame.max(1) - 1;
     let (last, next) = (game.step(i_last)?, game.step(i_last + 1)?);
-    Ok(Some(plan(&Traits::of(&scene, Tensors::Needless, true), Some(&last), &next)))
+    let features = SceneFeatures::new(&scene, Tensors::Needless);
+    Ok(Some(plan(&features, Skipping::new(true), Some(&last), &next)))
 }
 
 /// Returns the amount of making a scene's textures once.

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::task::{Merge, ShardResult, Task, Work};
 use crate::error::{Error, Result};
 use crate::farm::transient::io_error;
-use crate::frame::stage::{Bed, Player};
+use crate::frame::{GpuContext, Player};
 use crate::io::atomic;
 use crate::io::folder::replace_files;
 use crate::io::image::{ImageKind, encoded};
@@ -107,8 +107,8 @@ impl Work for Frames {
     }
 
     fn run(&self, task: &mut Task<'_>) -> Result<Device> {
-        let bed = Bed::open(task.choice)?;
-        let device = device_record(bed.device.info());
+        let gpu = GpuContext::open(task.choice)?;
+        let device = device_record(gpu.device.info());
         task.workplace.resume(&device)?;
         let loaded = task.loaded;
         let mut playing: Option<(Arc<Scene>, Player)> = None;
@@ -126,7 +126,7 @@ impl Work for Frames {
                         // Frees the device's memory before the next phase allocates.
                         drop(previous);
                         let scene = Arc::new(scene_at(loaded, i_frame));
-                        playing.insert((scene.clone(), bed.player(scene, true)?))
+                        playing.insert((scene.clone(), gpu.player(scene, true)?))
                     }
                 };
                 let packet = player.game.step(i_frame)?;
@@ -138,7 +138,7 @@ impl Work for Frames {
         drop(playing);
         // Closing reports the validation layers' messages. Later attempts must not take over
         // pictures that such a message may be about.
-        bed.close().inspect_err(|_| task.workplace.disown())?;
+        gpu.close().inspect_err(|_| task.workplace.disown())?;
         Ok(device)
     }
 

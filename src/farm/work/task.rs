@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::farm::manifest::Manifest;
 use crate::farm::scene_source::SceneSource;
 use crate::farm::workplace::Workplace;
-use crate::frame::stage::DeviceChoice;
+use crate::frame::DeviceChoice;
 use crate::io::scene_file::LoadedScene;
 use crate::timing::machine::Device;
 

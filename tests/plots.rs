@@ -9,9 +9,10 @@ mod studies;
 mod svg;
 
 use nimbus::report::charts::{Chart, error, frames, ledger, passes};
-use nimbus::studies::error::records::{Front, Study};
+use nimbus::studies::error::front::Front;
+use nimbus::studies::error::records::Study;
 use nimbus::studies::ledger::records::Ledger;
-use nimbus::studies::provenance::Figure;
+use nimbus::studies::figure::Figure;
 use nimbus::timing::frame_rows::FrameRow;
 use nimbus::timing::records::{Pass, Run};
 use studies::{configuration, row, study, usual_ledger, usual_study};

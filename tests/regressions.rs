@@ -17,7 +17,7 @@ use nimbus::error::Error;
 use nimbus::io::weather::wrf;
 use nimbus::io::{box_file, particle_file, scene_file};
 use nimbus::report::pages::source;
-use nimbus::studies::error::files::read_found;
+use nimbus::studies::error::files::read_earlier;
 
 type Reader = fn(&[u8]) -> Result<(), String>;
 
@@ -154,7 +154,7 @@ fn read_all(folder: &Path) -> Vec<Error> {
         scene_file::load(&path("scene.toml"), &[], None).err(),
         box_file::read(&path("b.dat")).err(),
         particle_file::read(&path("p.csv")).err(),
-        read_found(folder).err(),
+        read_earlier(folder).err(),
         wrf::open(&path("w.nc")).err(),
     ];
     results.into_iter().chain(others).flatten().collect()

@@ -16,7 +16,8 @@ use std::path::PathBuf;
 
 use browser::Browser;
 use nimbus::io::image::png_bytes;
-use nimbus::studies::error::records::{Front, Study};
+use nimbus::studies::error::front::Front;
+use nimbus::studies::error::records::Study;
 use nimbus::timing::attachments::Attachments;
 use nimbus::timing::frame_rows::{FrameRow, FrameTable};
 use nimbus::timing::results::write_results;

@@ -14,11 +14,11 @@ use nimbus::io::scene_file::load;
 use nimbus::model::scene::Scene;
 use nimbus::model::sort_bits::SortBits;
 use nimbus::reference::picture::{Pixels, Reference};
-use nimbus::studies::error::design::Design;
-use nimbus::studies::error::front::{Metric, best_within_error, best_within_ms};
-use nimbus::studies::error::records::{Configuration, Front};
-use nimbus::studies::error::run::{Event, Found, Loaded, Setup, StudyPlan, Subject};
-use nimbus::studies::error::turns::{Time, Turn};
+use nimbus::studies::error::blocks::{TimeKind, TimedBlock};
+use nimbus::studies::error::design::{Design, best_within};
+use nimbus::studies::error::front::{Front, Metric};
+use nimbus::studies::error::records::{Budget, Configuration};
+use nimbus::studies::error::study::{ErrorStudy, Event, LoadedConfiguration, Runner, StudyPlan, StudyResults};
 use nimbus::timing::names::Setting;
 use nimbus::timing::sweep::Axis;
 
@@ -29,7 +29,7 @@ use nimbus::timing::sweep::Axis;
 struct Law {
     /// (q, waste) of each configuration.
     of: Vec<(f64, bool)>,
-    n_turns: u64,
+    n_blocks: u64,
     n_pictures: usize,
 }
 
@@ -48,17 +48,17 @@ impl Law {
     /// Slow drifts and bursts by a factor of up to three, and single frames by chance, all the same
     /// in every run.
     fn noise(&mut self) -> f64 {
-        self.n_turns += 1;
-        let t = self.n_turns as f64;
+        self.n_blocks += 1;
+        let t = self.n_blocks as f64;
         let chance =
-            (self.n_turns.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / 2f64.powi(24);
+            (self.n_blocks.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / 2f64.powi(24);
         (1.0 + 0.5 * (t / 40.0).sin())
-            * if (self.n_turns / 60) % 3 == 1 { 2.0 } else { 1.0 }
+            * if (self.n_blocks / 60) % 3 == 1 { 2.0 } else { 1.0 }
             * (1.0 + 0.02 * chance)
     }
 }
 
-impl Subject for Law {
+impl Runner for Law {
     fn add(&mut self, scene: &Arc<Scene>) {
         self.of.push((scene.draw.cutoff, scene.draw.sort_bits == SortBits::Narrow));
     }
@@ -75,25 +75,25 @@ impl Subject for Law {
         Ok((0..SIDE * SIDE).flat_map(|k| [value(k); 4]).collect())
     }
 
-    fn turn(&mut self, i: usize, i_round: usize) -> Result<Turn> {
+    fn block(&mut self, i: usize, i_round: usize) -> Result<TimedBlock> {
         let ms: Vec<f64> = (0..3).map(|_| self.ms(i) * self.noise()).collect();
-        Ok(Turn { i_configuration: i, i_round, gpu_ms: ms.clone(), frame_ms: ms })
+        Ok(TimedBlock { i_configuration: i, i_round, gpu_ms: ms.clone(), frame_ms: ms })
     }
 }
 
-fn loaded(settings: &[Setting]) -> Result<Loaded> {
+fn loaded(settings: &[Setting]) -> Result<LoadedConfiguration> {
     let mut overrides = vec!["draw.sort_bits=32".to_owned()];
     overrides.extend(settings.iter().map(|s| format!("{}={}", s.key, s.value)));
     let loaded = load(Path::new("scenes/hello.toml"), &overrides, None)?;
-    Ok(Loaded { scene: loaded.scene.into(), hash: loaded.hash })
+    Ok(LoadedConfiguration { scene: loaded.scene.into(), hash: loaded.hash })
 }
 
 fn plan(knobs: &[&str], design: Design, n_rounds: usize) -> StudyPlan {
     let axes = knobs.iter().map(|text| Axis::parse("--knob", text).unwrap()).collect();
-    StudyPlan { axes, design, metric: Metric::Rmse, time: Time::Gpu, n_rounds, part: None }
+    StudyPlan { axes, design, metric: Metric::Rmse, time: TimeKind::Gpu, n_rounds, part: None }
 }
 
-fn study(law: &mut Law, plan: &StudyPlan, found: &mut Found, stop: &AtomicBool) -> bool {
+fn study(law: &mut Law, plan: &StudyPlan, found: &mut StudyResults, stop: &AtomicBool) -> bool {
     let pixels = Pixels::all(SIDE, SIDE);
     let n = (SIDE * SIDE) as usize;
     let reference = Reference {
@@ -103,17 +103,21 @@ fn study(law: &mut Law, plan: &StudyPlan, found: &mut Found, stop: &AtomicBool) 
         seconds: 0.0,
         pixels_s: 0.0,
     };
-    let setup = Setup { plan, load: &loaded, reference: &reference, pixels: &pixels, stop };
+    let setup = ErrorStudy { plan, load: &loaded, reference: &reference, pixels: &pixels, stop };
     setup.run(law, found, &mut |_: Event<'_>| Ok(())).unwrap()
 }
 
-fn named<'a>(found: &'a Found, name: &str) -> &'a Configuration {
+fn best(found: &StudyResults, budget: Budget, value: f64) -> Option<usize> {
+    best_within(&found.configurations, Metric::Rmse, TimeKind::Gpu, budget, value).configuration
+}
+
+fn named<'a>(found: &'a StudyResults, name: &str) -> &'a Configuration {
     found.configurations.iter().find(|c| c.name == name).unwrap_or_else(|| panic!("no {name}"))
 }
 
 #[test]
 fn a_knob_of_known_law_has_the_front_it_must_have() {
-    let (mut law, mut found) = (Law::default(), Found::default());
+    let (mut law, mut found) = (Law::default(), StudyResults::default());
     // The scene as it stands has q = 3 and no waste. Four qualities that nobody beats, the same
     // with waste, one too great.
     let plan =
@@ -152,20 +156,17 @@ fn a_knob_of_known_law_has_the_front_it_must_have() {
     // What a budget buys, in ms of the machine's median speed.
     let base_ms = found.configurations[0].gpu_ms.unwrap().value;
     let name = |best: Option<usize>| best.map(|i| found.configurations[i].name.as_str());
-    let within = |q: f64| {
-        best_within_ms(&found.configurations, Metric::Rmse, base_ms * q / 3.0, true).configuration
-    };
+    let within = |q: f64| best(&found, Budget::Ms, base_ms * q / 3.0);
     assert_eq!(name(within(4.4)), Some("draw.cutoff=4.0, draw.sort_bits=32"));
     assert_eq!((name(within(3.2)), within(1.8)), (Some("as it stands"), None));
-    let near =
-        |e: f64| best_within_error(&found.configurations, Metric::Rmse, e, true).configuration;
+    let near = |e: f64| best(&found, Budget::Error, e);
     assert_eq!(name(near(0.04)), Some("draw.cutoff=2.5, draw.sort_bits=32"));
     assert_eq!(near(0.001), None);
 }
 
 #[test]
 fn what_saves_time_is_put_together() {
-    let (mut law, mut found) = (Law::default(), Found::default());
+    let (mut law, mut found) = (Law::default(), StudyResults::default());
     // From q = 3 to 2.5 saves a sixth, to 2 a third; waste saves nothing.
     assert!(study(
         &mut law,
@@ -180,17 +181,17 @@ fn what_saves_time_is_put_together() {
 
 #[test]
 fn what_is_there_is_not_run_again() {
-    let (mut law, mut found) = (Law::default(), Found::default());
+    let (mut law, mut found) = (Law::default(), StudyResults::default());
     let stopped = AtomicBool::new(false);
     let first = plan(&["draw.cutoff=2.0,2.5"], Design::Alone, 4);
     assert!(study(&mut law, &first, &mut found, &stopped));
-    let (n_pictures, turns) = (law.n_pictures, found.turns.clone());
+    let (n_pictures, blocks) = (law.n_pictures, found.blocks.clone());
     assert_eq!(n_pictures, 3);
     // The same again: nothing to do. With one more value: that one alone, with the scene as it
     // stands beside it.
     let mut again = Law::default();
     assert!(study(&mut again, &first, &mut found, &stopped));
-    assert_eq!((again.n_pictures, found.turns.len()), (0, turns.len()));
+    assert_eq!((again.n_pictures, found.blocks.len()), (0, blocks.len()));
     let mut more = Law::default();
     assert!(study(
         &mut more,
@@ -198,13 +199,15 @@ fn what_is_there_is_not_run_again() {
         &mut found,
         &stopped
     ));
-    assert_eq!((more.n_pictures, found.turns[..turns.len()] == turns[..]), (1, true));
-    assert!(found.turns[turns.len()..].iter().all(|t| [0, 3].contains(&t.i_configuration)));
+    assert_eq!((more.n_pictures, found.blocks[..blocks.len()] == blocks[..]), (1, true));
+    assert!(found.blocks[blocks.len()..].iter().all(|t| [0, 3].contains(&t.i_configuration)));
     assert_eq!(named(&found, "draw.cutoff=4.0").front, Front::On);
     // One that is stopped at once has nothing and says so.
-    let mut none = Found::default();
+    let mut none = StudyResults::default();
     assert!(!study(&mut Law::default(), &first, &mut none, &AtomicBool::new(true)));
-    assert!(none.turns.is_empty() && none.configurations.iter().all(|c| c.front == Front::Unknown));
+    assert!(
+        none.blocks.is_empty() && none.configurations.iter().all(|c| c.front == Front::Unknown)
+    );
 }
 
 #[test]

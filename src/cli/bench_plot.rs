@@ -2,27 +2,33 @@
 
 use clap::ColorChoice;
 
-use super::output;
+use super::output::chart_text;
 use crate::error::Result;
 use crate::report::charts::{Chart, frames, passes};
 use crate::timing::attachments::{PASSES_CHART, frames_chart};
 use crate::timing::frame_rows::FrameRow;
 use crate::timing::records::Run;
 
-/// For the terminal: frame times of every point of a sweep, and what the device's time goes to.
+/// Returns the charts for the terminal: the frame times at every point of a sweep, and the device
+/// times of the passes.
+///
+/// # Errors
+/// Fails if a chart cannot be drawn.
 pub fn text(run: &Run, rows: &[FrameRow], color: ColorChoice) -> Result<String> {
-    let (columns, colored) = (output::columns(), output::colored(color));
     let mut out = String::new();
     for chart in frames::charts_of_rows(rows) {
-        out += &format!("\n{}", chart.text(columns, chart.rows(), colored)?);
+        out += &chart_text(&chart, color)?;
     }
     if let Some(chart) = passes::chart(run) {
-        out += &format!("\n{}", chart.text(columns, chart.rows(), colored)?);
+        out += &chart_text(&chart, color)?;
     }
     Ok(out)
 }
 
-/// As SVG: file names and documents.
+/// Returns the charts as file names and SVG documents.
+///
+/// # Errors
+/// Fails if a chart cannot be drawn.
 pub fn files(run: &Run, rows: &[FrameRow]) -> Result<Vec<(String, String)>> {
     let frames = frames::charts_of_rows(rows);
     let mut files = Vec::new();

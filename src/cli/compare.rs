@@ -5,7 +5,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::CompareArgs;
-use super::{compare_pictures, output};
+use super::compare_pictures;
+use super::output::{self, or_dash};
 use crate::error::{Error, Result};
 use crate::measure::bootstrap::Bootstrap;
 use crate::timing::compare::{Comparison, HEADLINE, MeasureComparison, ModeComparison};
@@ -13,16 +14,16 @@ use crate::timing::difference::{Condition, Difference};
 use crate::timing::records::Run;
 use crate::timing::results::{BenchResults, read_results};
 
-/// What `--json` prints. A change of meaning, or of a key, raises `schema`.
+/// The output of `--json`. A change of a key or of its meaning raises `schema`.
 #[derive(Debug, Serialize)]
 struct Report {
     schema: u32,
     a: Side,
     b: Side,
-    /// What differs and was allowed to.
+    /// The differences that `--allow` accepted.
     allowed: Vec<Difference>,
     n_resamples: usize,
-    /// The measure that decides; the others are not corrected for many comparisons.
+    /// The measure that decides. The others are not corrected for multiple comparisons.
     headline: &'static str,
     modes: Vec<ModeComparison>,
     remarks: Vec<String>,
@@ -30,7 +31,7 @@ struct Report {
 
 const REPORT_SCHEMA: u32 = 2;
 
-/// Where a run lies, and what it is.
+/// A compared run.
 #[derive(Debug, Serialize)]
 struct Side {
     folder: String,
@@ -54,8 +55,12 @@ impl Side {
     }
 }
 
+/// Runs `nimbus compare`.
+///
+/// # Errors
+/// Fails if the results or pictures cannot be read or compared, or a metric is beyond its limit.
 pub fn run(args: &CompareArgs) -> Result<()> {
-    if compare_pictures::are_meant(args)? {
+    if compare_pictures::has_pictures(args)? {
         return compare_pictures::run(args);
     }
     let (a, b) = (read_results(&args.a)?, read_results(&args.b)?);
@@ -89,14 +94,15 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if args.json { output::object(&report) } else { output::text(&text(&report)) }
 }
 
-/// What differs, and the flag that lets it.
+/// Returns the message about conditions that differ, with the flag that accepts them.
 fn refusal(args: &CompareArgs, refused: &[Difference]) -> String {
     let is_named =
         |kind: &Condition| args.allow.contains(kind) || refused.iter().any(|d| d.kind == *kind);
     let flag = Condition::ALL.into_iter().filter(is_named).map(Condition::name);
     let flag = flag.collect::<Vec<_>>().join(",");
     let mut what = format!(
-        "{} and {} did not measure the same; --allow {flag} compares them all the same",
+        "{} and {} were measured under different conditions; --allow {flag} compares them all the \
+         same",
         args.a.display(),
         args.b.display()
     );
@@ -110,7 +116,7 @@ fn line(d: &Difference) -> String {
     format!("{}, {}: A {}, B {}", d.kind.name(), d.what, d.a, d.b)
 }
 
-/// The human table.
+/// Returns the tables for people.
 fn text(report: &Report) -> String {
     let mut out = String::new();
     for (name, side) in [("A", &report.a), ("B", &report.b)] {
@@ -141,7 +147,7 @@ fn rows(mode: &ModeComparison) -> Vec<Vec<String>> {
         std::iter::once(format!("{}, ms", mode.name)).chain(header.map(str::to_owned)).collect(),
     ];
     for m in &mode.measures {
-        let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+        let number = |value: Option<f64>| or_dash(value, |v| format!("{v:.3}"));
         rows.push(vec![
             m.measure.clone(),
             number(m.a_ms),
@@ -170,7 +176,7 @@ fn sentence(m: &MeasureComparison) -> String {
     }
 }
 
-/// How the intervals were made, and what they do not know.
+/// Returns the note on how the intervals were computed and what they do not cover.
 fn foot(report: &Report) -> String {
     let lens: Vec<String> =
         report.modes.iter().filter_map(|m| Some(m.headline()?.block_len.to_string())).collect();
@@ -182,9 +188,10 @@ fn foot(report: &Report) -> String {
     format!(
         "\nIntervals: block bootstrap, {} resamples, ⌈√n⌉ neighbouring frames drawn together \
          (frame: {lens}).\n\
-        They know the noise within the runs, not from one start to the next. frame decides; the \
-        other rows are not\n\
-        corrected for many comparisons: of twenty equal ones, one will seem to differ.\n",
+        They cover the noise within the runs, not the changes from one start to the next. frame \
+        decides; the other\n\
+        rows are not corrected for many comparisons: of twenty equal ones, one will seem to \
+        differ.\n",
         report.n_resamples
     )
 }

@@ -6,14 +6,14 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::args::CompareArgs;
-use super::{output, refuse_existing};
+use super::output::{self, or_dash, refuse_existing};
 use crate::error::{Error, Result};
 use crate::io::image::{self, Image, ImageKind};
 use crate::measure::picture::flip::{self, Flip};
 use crate::measure::picture::{self, Errors, PEAK, RELATIVE_EPSILON, ssim};
 use crate::model::film::{Film, FilmFormat, ToneMap};
 
-/// What `--json` prints. A change of meaning, or of a key, raises `schema`.
+/// The output of `--json`. A change of a key or of its meaning raises `schema`.
 #[derive(Debug, Serialize)]
 struct Report {
     schema: u32,
@@ -23,12 +23,14 @@ struct Report {
     height: u32,
     /// "linear" (EXR) or "display" (PNG, sRGB in 0..1).
     values: &'static str,
-    /// Pixels that are not finite in A, in B, and in either; the last are left out.
+    /// Pixels that are not finite in A.
     not_finite_a: usize,
+    /// Pixels that are not finite in B.
     not_finite_b: usize,
+    /// Pixels that are not finite in A or B, which the errors leave out.
     not_finite: usize,
     metrics: Metrics,
-    /// What the metrics were made with.
+    /// Constant of the metrics.
     rel_mse_epsilon: f64,
     psnr_peak: f64,
     pixels_per_degree: f64,
@@ -36,29 +38,31 @@ struct Report {
 
 const REPORT_SCHEMA: u32 = 1;
 
-/// Of red, green and blue together; of alpha alone where both files have it.
+/// Metrics over red, green and blue together, and over alpha if both files have it.
 #[derive(Debug, Clone, Copy, Serialize)]
 struct Metrics {
     rmse: f64,
     max: f64,
     relmse: f64,
-    /// dB; null where the pictures are equal.
+    /// In dB; null if the pictures are equal.
     psnr: f64,
-    /// Null of pictures smaller than its window.
+    /// Null if the pictures are smaller than its window.
     ssim: Option<f64>,
     flip: f64,
     alpha_rmse: Option<f64>,
     alpha_max: Option<f64>,
 }
 
-/// Names of metrics that are greater where pictures differ more, and of those that are less.
+/// Metrics that grow with the difference of pictures, and those that fall.
 const OF_DIFFERENCE: [&str; 7] =
     ["rmse", "max", "relmse", "flip", "alpha_rmse", "alpha_max", "not_finite"];
 const OF_LIKENESS: [&str; 2] = ["psnr", "ssim"];
 
-/// Whether pictures are to be compared and not runs; an error where that is not clear, or does not
-/// fit the flags.
-pub fn are_meant(args: &CompareArgs) -> Result<bool> {
+/// Returns whether A and B are pictures and not results folders.
+///
+/// # Errors
+/// Fails if only one is a picture, or a flag belongs to the other kind.
+pub fn has_pictures(args: &CompareArgs) -> Result<bool> {
     let is_picture = |path: &Path| !path.is_dir() && ImageKind::of(path).is_ok();
     let mixed = |picture: &Path, other: &Path| {
         let (picture, other) = (picture.display(), other.display());
@@ -87,6 +91,10 @@ pub fn are_meant(args: &CompareArgs) -> Result<bool> {
     }
 }
 
+/// Compares two pictures.
+///
+/// # Errors
+/// Fails if the pictures cannot be read or compared, or a metric is beyond its limit.
 pub fn run(args: &CompareArgs) -> Result<()> {
     check_names(&args.fail_above, &OF_DIFFERENCE, "--fail-above")?;
     check_names(&args.fail_below, &OF_LIKENESS, "--fail-below")?;
@@ -143,18 +151,18 @@ fn check_names(limits: &[(String, f64)], known: &[&str], flag: &str) -> Result<(
 }
 
 fn check_alike(args: &CompareArgs, a: &Image, b: &Image) -> Result<()> {
-    let said = |of: &dyn Fn(&Image) -> String| {
+    let both = |of: &dyn Fn(&Image) -> String| {
         let (path_a, path_b) = (args.a.display(), args.b.display());
         format!("{path_a} {}, {path_b} {}", of(a), of(b))
     };
     if a.kind != b.kind {
-        let what = said(&|i| {
+        let what = both(&|i| {
             if i.kind == ImageKind::Exr { "is linear".into() } else { "is for display".into() }
         });
         return Err(Error::usage(format!("{what}; expected two .exr or two .png")));
     }
     if (a.width, a.height) != (b.width, b.height) {
-        let what = said(&|i| format!("has {}×{} pixels", i.width, i.height));
+        let what = both(&|i| format!("has {}×{} pixels", i.width, i.height));
         return Err(Error::usage(format!("{what}; expected pictures of one size")));
     }
     Ok(())
@@ -164,7 +172,7 @@ fn both_finite(a: &[f64; 4], b: &[f64; 4]) -> bool {
     picture::is_finite(a) && picture::is_finite(b)
 }
 
-/// None where no pixel is finite in both.
+/// Computes the metrics and the FLIP map; None if no pixel is finite in both.
 fn measure(a: &Image, b: &Image, pixels_per_degree: f64) -> Option<(Metrics, Flip)> {
     let pairs = || a.rgba.iter().zip(&b.rgba).filter(|(p, q)| both_finite(p, q));
     let color = picture::errors(pairs().flat_map(|(p, q)| (0..3).map(|i| (p[i], q[i]))))?;
@@ -173,7 +181,7 @@ fn measure(a: &Image, b: &Image, pixels_per_degree: f64) -> Option<(Metrics, Fli
     } else {
         None
     };
-    // As they are shown; what is left out of the errors is black in both.
+    // Display values; a pixel that the errors leave out is black in both.
     let show = |of: &Image| -> Vec<[f64; 3]> {
         let shown = |((p, q), own): ((&[f64; 4], &[f64; 4]), &[f64; 4])| match both_finite(p, q) {
             true => display(of.kind, own),
@@ -206,8 +214,8 @@ fn measure(a: &Image, b: &Image, pixels_per_degree: f64) -> Option<(Metrics, Fli
     Some((metrics, flip))
 }
 
-/// Display values of a pixel: a PNG's own, an EXR's over black and through the tone map that scenes
-/// have by default.
+/// Returns the display values of a pixel: those of a PNG as stored, those of an EXR over black and
+/// through the default tone map.
 fn display(kind: ImageKind, pixel: &[f64; 4]) -> [f64; 3] {
     let [r, g, b, a] = *pixel;
     match kind {
@@ -227,11 +235,11 @@ fn display(kind: ImageKind, pixel: &[f64; 4]) -> [f64; 3] {
     }
 }
 
-/// The human table.
+/// Returns the table for people.
 fn text(report: &Report) -> String {
     let Metrics { rmse, max, relmse, psnr, ssim, flip, alpha_rmse, alpha_max } = report.metrics;
     let shown = if report.values == "linear" { "over black, tone-mapped" } else { "as stored" };
-    let mut rows = vec![["metric", "value", "of"].map(str::to_owned).to_vec()];
+    let mut rows = output::header(["metric", "value", "of"]);
     let mut row =
         |name: &str, value: String, of: String| rows.push(vec![name.to_owned(), value, of]);
     row("rmse", format!("{rmse:.6e}"), format!("{} values, RGB", report.values));
@@ -239,7 +247,7 @@ fn text(report: &Report) -> String {
     row("relmse", format!("{relmse:.6e}"), format!("the same, (b - a)²/(a² + {RELATIVE_EPSILON})"));
     row("psnr", format!("{psnr:.3} dB"), format!("the same, peak {PEAK}"));
     let of_ssim = format!("luminance, {shown}; Gaussian window 11, σ 1.5, C1 = 0.01², C2 = 0.03²");
-    row("ssim", ssim.map_or("-".into(), |v| format!("{v:.6}")), of_ssim);
+    row("ssim", or_dash(ssim, |v| format!("{v:.6}")), of_ssim);
     row(
         "flip",
         format!("{flip:.6}"),
@@ -265,7 +273,7 @@ fn text(report: &Report) -> String {
     out
 }
 
-/// A line for every limit that was asked for and is not kept.
+/// Returns a line for every limit that a metric exceeds.
 fn beyond(args: &CompareArgs, report: &Report) -> Vec<String> {
     let m = &report.metrics;
     let value = |name: &str| match name {

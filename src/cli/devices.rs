@@ -7,6 +7,10 @@ use super::output;
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceInfo, Instance};
 
+/// Runs `nimbus devices`.
+///
+/// # Errors
+/// Fails if there is no Vulkan or no such device, or with `--validation` if there are messages.
 pub fn run(args: &DevicesArgs) -> Result<()> {
     let instance = Instance::new(args.validation)?;
     let devices = DeviceInfo::list(&instance)?;
@@ -14,7 +18,7 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     let i_used = used.as_ref().ok().map(|d| d.index);
     if args.json {
         let list: Vec<_> = devices.iter().map(|d| to_json(d, i_used)).collect();
-        output::text(&format!("{:#}\n", json!(list)))?;
+        output::object(&list)?;
     } else {
         output::text(&devices.iter().map(|d| describe(d, i_used)).collect::<String>())?;
     }
@@ -26,11 +30,12 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
         };
         eprintln!("device {}: {} is used: {why}", used.index, used.name);
     }
-    let said = instance.messages().take();
-    if said.is_empty() {
+    let messages = instance.messages().take();
+    if messages.is_empty() {
         return Ok(());
     }
-    Err(Error::Check { what: format!("{} validation messages:\n{}", said.len(), said.join("\n")) })
+    let (n, text) = (messages.len(), messages.join("\n"));
+    Err(Error::Check { what: format!("{n} validation messages:\n{text}") })
 }
 
 fn version(d: &DeviceInfo) -> String {
@@ -68,11 +73,9 @@ fn describe(d: &DeviceInfo, i_used: Option<usize>) -> String {
     };
     out += &format!("   images up to {} a side; {timestamps}\n", l.max_image_extent);
     out + &match d.calibrated_timestamps {
-        Some(name) => format!(
-            "   clock calibrated with the \
-            host's by {}\n",
-            name.to_string_lossy()
-        ),
+        Some(name) => {
+            format!("   clock calibrated with the host's by {}\n", name.to_string_lossy())
+        }
         None => {
             "   clock not calibrated with the host's: VK_KHR_ and VK_EXT_calibrated_timestamps \
              are missing\n"
@@ -84,16 +87,22 @@ fn describe(d: &DeviceInfo, i_used: Option<usize>) -> String {
 fn to_json(d: &DeviceInfo, i_used: Option<usize>) -> serde_json::Value {
     let l = &d.limits;
     json!({
-        "index": d.index, "name": d.name, "driver": d.driver, "api": version(d), "type": d.kind, "uuid": d.uuid,
+        "index": d.index, "name": d.name, "driver": d.driver, "api": version(d),
+        "type": d.kind, "uuid": d.uuid,
         "used": Some(d.index) == i_used, "unusable": d.unusable,
         "calibrated_timestamps": d.calibrated_timestamps.map(|name| name.to_string_lossy()),
         "limits": {
-            "device_memory_bytes": l.device_memory_bytes, "max_storage_buffer_bytes": l.max_storage_buffer_bytes,
+            "device_memory_bytes": l.device_memory_bytes,
+            "max_storage_buffer_bytes": l.max_storage_buffer_bytes,
             "max_texels": l.max_texels,
-            "max_workgroups_x": l.max_workgroups_x, "max_workgroup_invocations": l.max_workgroup_invocations,
-            "max_shared_memory_bytes": l.max_shared_memory_bytes, "max_push_constant_bytes": l.max_push_constant_bytes,
-            "max_image_extent": l.max_image_extent, "subgroup_size": l.subgroup_size,
-            "timestamp_valid_bits": l.timestamp_valid_bits, "timestamp_period_ns": l.timestamp_period_ns,
+            "max_workgroups_x": l.max_workgroups_x,
+            "max_workgroup_invocations": l.max_workgroup_invocations,
+            "max_shared_memory_bytes": l.max_shared_memory_bytes,
+            "max_push_constant_bytes": l.max_push_constant_bytes,
+            "max_image_extent": l.max_image_extent,
+            "subgroup_size": l.subgroup_size,
+            "timestamp_valid_bits": l.timestamp_valid_bits,
+            "timestamp_period_ns": l.timestamp_period_ns,
         },
     })
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use super::args::EditArgs;
-use super::{device_choice, load};
+use super::scene::{device_choice, load};
 use crate::error::{Error, Result};
 use crate::io::box_file;
 use crate::viewer::edit_window::{self, Options};
@@ -14,6 +14,10 @@ use crate::viewer::editor::{EditedScene, Session};
 /// Size of the window by default, pixels: that of the paper's pictures.
 const SIZE: (u32, u32) = (800, 600);
 
+/// Runs `nimbus edit`.
+///
+/// # Errors
+/// Fails if a file is faulty, or no window or device can be opened.
 pub fn run(args: &EditArgs, stop: &'static AtomicBool) -> Result<()> {
     let session = session_of(args.file.as_deref())?;
     let scene = match &args.scene {

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::args::{FarmArgs, FarmCommand, GcArgs, LocalArgs, MergeArgs, RunArgs, StatusArgs};
+use super::progress::{progress, spinner};
 use super::{farm_jobs, farm_plan, output};
 use crate::error::{Error, Result};
 use crate::farm::{
@@ -51,7 +52,7 @@ fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
     let plan = Plan::read(&args.plan)?;
     refuse_device(&plan, args.device.as_ref(), args.validation)?;
     let (n, noun) = (plan.shard(args.shard)?.n, plan.work.noun());
-    let bar = output::progress(u64::from(n), noun, args.quiet);
+    let bar = progress(u64::from(n), noun, args.quiet);
     let (device, validation) = (args.device.clone(), args.validation);
     let choice = DeviceChoice { device, validation, ..DeviceChoice::default() };
     let options = RunOptions { choice: &choice, stop, on_item: &|| bar.inc(1) };
@@ -84,7 +85,7 @@ fn local(args: &LocalArgs, stop: &AtomicBool) -> Result<()> {
         n_processes: args.jobs as usize,
         n_tries: args.tries,
     };
-    let bar = output::progress(open.len() as u64, "shards", args.quiet);
+    let bar = progress(open.len() as u64, "shards", args.quiet);
     let ended = pool.run(&open, stop, &|| bar.inc(1));
     bar.finish_and_clear();
     let (n, n_open) = (plan.shards.len(), open.len());
@@ -164,10 +165,10 @@ fn table(plan: &Plan, status: &Status) -> String {
 
 fn merge(args: &MergeArgs) -> Result<()> {
     let plan = Plan::read(&args.plan)?;
-    let spinner = output::spinner("merging", false);
+    let merging = spinner("merging", false);
     let options = MergeOptions { out: &args.output, force: args.force, mixed: args.mixed };
     let n = farm::merge(&args.plan, &plan, &options)?;
-    drop(spinner);
+    drop(merging);
     let summary = plan.work.summary(&args.output)?;
     output::text(&format!("{n} {} in {}\n{summary}", plan.work.noun(), args.output.display()))
 }

@@ -3,7 +3,10 @@
 use std::sync::atomic::AtomicBool;
 
 use super::args::{CalibrateArgs, FormatArg, PlanArgs, Span};
-use super::{farm_told, output};
+use super::farm_told;
+use super::output::{self, refuse_existing};
+use super::progress::progress;
+use super::scene::warnings;
 use crate::error::Result;
 use crate::farm::{
     AnyWork, Cut, CutOptions, Estimate, FileModel, Frames, PictureFormat, Plan, PlanRequest, Rate,
@@ -31,7 +34,7 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
         set.extend([format!("film.width={width}"), format!("film.height={height}")]);
     }
     let loaded = scene_file::load(&args.scene, &set, args.seed)?;
-    for warning in super::warnings_of(&loaded).iter().filter(|_| !args.quiet) {
+    for warning in warnings(&loaded).iter().filter(|_| !args.quiet) {
         eprintln!("warning: {warning}");
     }
     let cut = cut(args, &set, &loaded)?;
@@ -120,9 +123,9 @@ fn all_frames(loaded: &LoadedScene) -> Span {
 /// When a run fails, the runs do not determine a model, or the file cannot be written.
 pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
     atomic::check_place(&args.output)?;
-    super::refuse_existing(&args.output, args.force)?;
+    refuse_existing(&args.output, args.force)?;
     let choice = DeviceChoice { device: args.device.clone(), ..DeviceChoice::default() };
-    let bar = output::progress(n_frames(args.scenes.len(), args.frames), "frames", args.quiet);
+    let bar = progress(n_frames(args.scenes.len(), args.frames), "frames", args.quiet);
     let options = RunOptions { choice: &choice, stop, on_item: &|| bar.inc(1) };
     let found = match &args.farm[..] {
         [] => calibrate(&args.scenes, &args.set, args.frames, &options),

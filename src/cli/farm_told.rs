@@ -3,7 +3,7 @@
 use clap::Parser;
 
 use super::args::{Args, BenchArgs, Command, ErrorArgs, PlanArgs, SceneArgs};
-use super::{bench, tradeoff};
+use super::{bench_cases, error_configurations};
 use crate::error::{Error, Result};
 use crate::farm::{AnyWork, Study, Sweep, Workload};
 
@@ -19,7 +19,7 @@ pub(super) fn study(args: &PlanArgs, set: &[String]) -> Result<(AnyWork, Workloa
     let has_budget = !own.budget_ms.is_empty() || !own.budget_error.is_empty();
     let refused = "--out, --resume, --force, --plot, --json, --csv, --part, --budget-…";
     refuse(args, is_refused || has_budget, &own.options, refused)?;
-    let (configurations, workload) = tradeoff::configurations(&parsed(&of_scene(args, set))?)?;
+    let (configurations, workload) = error_configurations::configurations(&parsed(&of_scene(args, set))?)?;
     let arguments = args.told.clone();
     Ok((AnyWork::Error(Study { arguments, configurations }), workload))
 }
@@ -34,7 +34,7 @@ pub(super) fn sweep(args: &PlanArgs, set: &[String]) -> Result<(AnyWork, Workloa
     let is_refused = scenes.len() > 1 || trace.is_some() || plot || force || json || part.is_some();
     let refused = "other scene, --out, --trace, --plot, --force, --json, --part";
     refuse(args, is_refused, &options, refused)?;
-    let (cases, workload) = bench::case_names(&parsed(&of_scene(args, set))?)?;
+    let (cases, workload) = bench_cases::case_names(&parsed(&of_scene(args, set))?)?;
     Ok((AnyWork::Bench(Sweep { arguments: args.told.clone(), cases }), workload))
 }
 

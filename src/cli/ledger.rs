@@ -1,68 +1,78 @@
 //! `nimbus ledger SCENE`.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 use super::args::LedgerArgs;
-use super::render_reference::Shown;
-use super::{device_choice, load, output};
+use super::output::{self, header, interval, or_dash, refuse_existing, scientific};
+use super::progress::ReferenceProgress;
+use super::scene::{check_time, device_choice, load, with_texture_hint, without_textures};
 use crate::error::{Error, Result};
-use crate::frame::GpuContext;
 use crate::frame::limits;
+use crate::frame::GpuContext;
 use crate::io::atomic::check_place;
-use crate::reference::picture::{Pixels, ReferenceKind, RenderStage, n_reflections};
+use crate::reference::picture::ReferenceKind;
+use crate::reference::picture::n_reflections;
+use crate::reference::picture::Pixels;
 use crate::report::charts;
-use crate::studies::error::players::Frames;
-use crate::studies::ledger::records::{LEDGER_FILE, Ledger, Row};
-use crate::studies::ledger::run::Setup;
-use crate::studies::provenance::{Figure, Provenance};
+use crate::studies::error::device_runner::FrameChoice;
+use crate::studies::ledger::records::{Ledger, Row};
+use crate::studies::ledger::study::LedgerStudy;
+use crate::studies::provenance::Provenance;
 use crate::timing::json::{self, ResultFile};
 use crate::timing::machine;
 use crate::timing::results::prepare_out_dir;
 
-/// `graceful`: set, as rows that are finished are kept on Ctrl-C.
+/// Runs `nimbus ledger`; sets `graceful` once Ctrl-C should save the finished rows.
+///
+/// # Errors
+/// Fails if the arguments or the scene are faulty, the device fails, the rows do not sum up, or
+/// Ctrl-C came.
 pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
     if let Some(out) = &args.out {
-        super::refuse_existing(out, args.force)?;
+        refuse_existing(out, args.force)?;
     }
-    let mut options = args.options.clone();
+    let options = without_textures(&args.scene, &args.options, args.plain)?;
     let loaded = load(&args.scene, &options)?;
-    let loaded = match args.plain && !loaded.scene.clouds.is_empty() {
-        true => {
-            options.set.push("cloud.*.texture=\"none\"".to_owned());
-            load(&args.scene, &super::SceneArgs { quiet: true, ..options })?
-        }
-        false => loaded,
-    };
     let time_s = loaded.scene.time.at(args.frame);
-    let scene = loaded.clone().at_frame(args.frame).exact().into_owned();
-    super::check_time(&scene, time_s)?;
-    ReferenceKind::Model.check(&scene, time_s).map_err(|error| match error {
-        Error::Usage { what } if what.contains("textured") => {
-            Error::usage(format!("{what}, or --plain for all clouds"))
-        }
-        other => other,
-    })?;
-    if args.reflections < n_reflections(&scene) {
+    let scene = &loaded.clone().at_frame(args.frame).exact().into_owned();
+    check_time(scene, time_s)?;
+    ReferenceKind::Model.check(scene, time_s).map_err(|error| with_texture_hint(error, ""))?;
+    let n_least = n_reflections(scene);
+    if args.reflections < n_least {
         return Err(Error::usage(format!(
-            "--reflections {}: the scene has {}; expected at least as many",
-            args.reflections,
-            n_reflections(&scene)
+            "--reflections {}: the scene has {n_least}; expected at least as many",
+            args.reflections
         )));
     }
-    let bed = GpuContext::open(&device_choice(&args.options))?;
-    limits::check(&scene, bed.device.limits())?;
-    let clocks =
-        machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;
-    let made = Provenance::now(Ledger::SCHEMA, &args.scene, &loaded, bed.device.info(), clocks);
+    let gpu = GpuContext::open(&device_choice(&args.options))?;
+    limits::check(scene, gpu.device.limits())?;
+    let info = gpu.device.info();
+    let clocks = machine::clocks_record(info, &mut gpu.player(scene.clone(), true)?.renderer)?;
+    let made = Provenance::now(Ledger::SCHEMA, &args.scene, &loaded, info, clocks);
     if let Some(out) = &args.out {
         prepare_out_dir(out, true)?;
-        check_place(&out.join(LEDGER_FILE))?;
+        check_place(&out.join(Ledger::FILE))?;
     }
     graceful.store(true, Ordering::Relaxed);
-    let ledger = measure(args, &bed, &scene, time_s, made, stop)?;
+    let shown = ReferenceProgress::new(args.options.quiet);
+    let study = LedgerStudy {
+        gpu: &gpu,
+        scene,
+        frames: FrameChoice {
+            i_frame: args.frame,
+            time_s,
+            n_frames: args.frames,
+            as_played: false,
+        },
+        n_rounds: args.rounds as usize,
+        pixels: &Pixels::sample(scene.film.width, scene.film.height, args.pixels),
+        n_reflections: args.reflections,
+        stop,
+    };
+    let ledger = study.run(made, &|work, n| shown.advance(work, n))?;
+    drop(shown);
     if let Some(out) = &args.out {
-        json::write(&out.join(LEDGER_FILE), &ledger)?;
+        json::write(&out.join(Ledger::FILE), &ledger)?;
         output::write_chart(&out.join("ledger.svg"), &charts::ledger::chart(&ledger))?;
     }
     if args.json {
@@ -70,40 +80,19 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     } else {
         output::text(&report(&ledger))?;
     }
-    bed.close()?;
-    match (ledger.interrupted, ledger.holds) {
-        (true, _) => Err(Error::Interrupted),
-        (false, false) => Err(Error::Check {
-            what: format!(
-                "the total {:.3e} is more than the sum of all rows {:.3e}",
-                ledger.total.value, ledger.sum
-            ),
-        }),
-        (false, true) => Ok(()),
+    gpu.close()?;
+    if ledger.interrupted {
+        return Err(Error::Interrupted);
     }
+    if !ledger.holds {
+        let (total, sum) = (ledger.total.value, ledger.sum);
+        let what = format!("the total {total:.3e} is more than the sum of all rows {sum:.3e}");
+        return Err(Error::Check { what });
+    }
+    Ok(())
 }
 
-fn measure(
-    args: &LedgerArgs,
-    bed: &GpuContext,
-    scene: &crate::model::scene::Scene,
-    time_s: f64,
-    made: Provenance,
-    stop: &AtomicBool,
-) -> Result<Ledger> {
-    let quiet = args.options.quiet;
-    let shown = Mutex::new(Shown::spinner(quiet));
-    let on_part = |work: RenderStage, n: usize| {
-        shown.lock().unwrap_or_else(PoisonError::into_inner).advance(work, n, quiet);
-    };
-    let pixels = Pixels::sample(scene.film.width, scene.film.height, args.pixels);
-    let frames = Frames { i_frame: args.frame, time_s, n_frames: args.frames, as_played: false };
-    let n_rounds = args.rounds as usize;
-    Setup { bed, scene, frames, n_rounds, pixels: &pixels, n_reflections: args.reflections, stop }
-        .run(made, &on_part)
-}
-
-/// What is printed for people.
+/// Returns the text for people.
 fn report(ledger: &Ledger) -> String {
     let made = &ledger.made;
     let mut out = format!(
@@ -111,7 +100,7 @@ fn report(ledger: &Ledger) -> String {
         made.scene_file, made.device.name, made.device.driver, made.cpu.model
     );
     out += &format!(
-        "frame {}, {} of {} pixels; the last row's truth has an RMS of {:.3}{}\n\n",
+        "frame {}, {} of {} pixels; the last picture has an RMS of {:.3}{}\n\n",
         ledger.frame,
         ledger.n_pixels,
         u64::from(ledger.width) * u64::from(ledger.height),
@@ -120,7 +109,7 @@ fn report(ledger: &Ledger) -> String {
     );
     out += &output::table(&rows(ledger));
     out += &format!(
-        "\nas it is drawn against the last truth: RMSE {:.2e}; the rows sum to {:.2e}, in \
+        "\nas it is drawn against the last picture: RMSE {:.2e}; the rows sum to {:.2e}, in \
          quadrature to {:.2e}\n",
         ledger.total.value, ledger.sum, ledger.quadrature
     );
@@ -131,7 +120,7 @@ fn report(ledger: &Ledger) -> String {
 }
 
 fn rows(ledger: &Ledger) -> Vec<Vec<String>> {
-    let head = [
+    let mut rows = header([
         "approximation",
         "is",
         "stands for",
@@ -141,28 +130,21 @@ fn rows(ledger: &Ledger) -> Vec<Vec<String>> {
         "share",
         "own error",
         "GPU time by without",
-    ];
-    let interval = |f: &Figure, text: &dyn Fn(f64) -> String| {
-        f.low
-            .zip(f.high)
-            .map_or("-".to_owned(), |(low, high)| format!("{} to {}", text(low), text(high)))
-    };
-    let small = |v: f64| if v == 0.0 { "0".to_owned() } else { format!("{v:.2e}") };
-    let of = |row: &Row| {
-        let ratio = row.time_ratio.map_or("-".to_owned(), |f| {
-            format!("{:.3} ({})", f.value, interval(&f, &|v| format!("{v:.3}")))
-        });
+    ]);
+    let mark = |row: &Row| if row.is_resolved { "" } else { "!" };
+    let three = |v: f64| format!("{v:.3}");
+    rows.extend(ledger.rows.iter().map(|row| {
         vec![
             row.name.clone(),
             row.from.clone(),
             row.to.clone(),
-            format!("{}{}", if row.is_resolved { "" } else { "!" }, small(row.error.value)),
-            interval(&row.error, &small),
+            format!("{}{}", mark(row), scientific(row.error.value)),
+            interval(Some(row.error), scientific),
             format!("{:.2} %", 100.0 * row.relative),
             format!("{:.1} %", 100.0 * row.share),
-            small(row.own_error),
-            ratio,
+            scientific(row.own_error),
+            or_dash(row.time_ratio, |f| format!("{:.3} ({})", f.value, interval(Some(f), three))),
         ]
-    };
-    std::iter::once(head.map(str::to_owned).to_vec()).chain(ledger.rows.iter().map(of)).collect()
+    }));
+    rows
 }

@@ -3,10 +3,9 @@
 use serde_json::{Value, json};
 
 use super::args::RenderArgs;
-use super::{
-    check_time, device_choice, load, output, refuse_existing, render_reference, say_notes,
-    say_sizes,
-};
+use super::progress::spinner;
+use super::scene::{check_time, device_choice, load, print_notes, print_sizes};
+use super::{output, render_reference};
 use crate::error::Result;
 use crate::frame::Counts;
 use crate::frame::Rendered;
@@ -14,37 +13,44 @@ use crate::frame::Stage;
 use crate::frame::plan::Pass;
 use crate::io::image::{self, ImageKind, image_hash};
 use crate::model::film::FilmFormat;
+use crate::model::scene::Scene;
 use crate::timing::machine::device_record;
 
+/// Runs `nimbus render`.
+///
+/// # Errors
+/// Fails if the arguments or the scene are faulty, the device fails, or the file cannot be written.
 pub fn run(args: &RenderArgs) -> Result<()> {
-    // All that can be known to be wrong is said before any work.
+    // Faults of the arguments are reported before any work.
     ImageKind::of(&args.output)?;
-    refuse_existing(&args.output, args.force)?;
+    output::refuse_existing(&args.output, args.force)?;
     let loaded = load(&args.scene, &args.options)?;
     let time_s = args.time.unwrap_or_else(|| loaded.scene.time.at(args.frame));
     let i_frame = args.time.map_or(args.frame, |time_s| loaded.scene.time.frame_at(time_s));
     let scene = loaded.at_frame(i_frame);
     check_time(&scene, time_s)?;
-    if let Some(reference) = args.reference {
-        return render_reference::run(args, reference, &scene, time_s);
+    match args.reference {
+        Some(reference) => render_reference::run(args, reference, &scene, time_s),
+        None => render(args, scene, time_s),
     }
+}
+
+fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
     let film = scene.film;
     let quiet = args.options.quiet;
-
-    let spinner = output::spinner("drawing", quiet);
+    let drawing = spinner("drawing", quiet);
     let mut stage = Stage::new(scene, &device_choice(&args.options), !args.options.no_skip)?;
     let packet = stage.game.step_at(args.frame, time_s)?;
     let rendered = stage.renderer.step(packet)?;
     let rgba = stage.renderer.image()?;
-    drop(spinner);
-    say_notes(&mut stage, &args.options)?;
+    drop(drawing);
+    print_notes(&mut stage, &args.options)?;
 
     let device = device_record(stage.info());
     if args.options.verbose {
-        say_sizes(&stage.scene, Some(&stage));
+        print_sizes(&stage.scene, Some(&stage));
         for pass in Pass::ALL {
-            let time =
-                pass_ms(&rendered, pass).map_or(String::from("-"), |ms| format!("{ms:.3} ms"));
+            let time = output::or_dash(pass_ms(&rendered, pass), |ms| format!("{ms:.3} ms"));
             eprintln!("  {:9} {time:>12}  {}", pass.name(), rendered.plan.decision(pass).reason);
         }
     }
@@ -59,24 +65,22 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     if n_bad > 0 && !quiet {
         eprintln!("warning: {}", not_finite(n_bad, rgba.len(), film.format));
     }
-    let spinner = output::spinner("writing", quiet);
+    let writing = spinner("writing", quiet);
     image::write(&args.output, &film, film.width, film.height, &rgba)?;
     let hash = args.json.then(|| image_hash(&rgba));
-    drop(spinner);
+    drop(writing);
     let Some(hash) = hash else { return Ok(()) };
-    output::text(&format!(
-        "{:#}\n",
-        json!({
-            "file": args.output.display().to_string(), "width": film.width, "height": film.height,
-            "image_hash": hash, "device": device,
-            // A time that was asked for is no frame's.
-            "frame": args.time.is_none().then_some(args.frame), "time_s": time_s, "not_finite": n_bad, "counts": counts,
-            "passes": Pass::ALL.map(|pass| pass_json(&rendered, pass)),
-        })
-    ))
+    output::object(&json!({
+        "file": args.output.display().to_string(), "width": film.width, "height": film.height,
+        "image_hash": hash, "device": device,
+        // A time that was asked for belongs to no frame.
+        "frame": args.time.is_none().then_some(args.frame), "time_s": time_s,
+        "not_finite": n_bad, "counts": counts,
+        "passes": Pass::ALL.map(|pass| pass_json(&rendered, pass)),
+    }))
 }
 
-pub(super) fn not_finite(n_bad: usize, n: usize, format: FilmFormat) -> String {
+fn not_finite(n_bad: usize, n: usize, format: FilmFormat) -> String {
     let hint = match format {
         FilmFormat::Rgba16f => "; film.format = \"rgba32f\" holds more than 65504",
         FilmFormat::Rgba8 | FilmFormat::Rgba32f => "",
@@ -87,11 +91,12 @@ pub(super) fn not_finite(n_bad: usize, n: usize, format: FilmFormat) -> String {
 fn pass_json(rendered: &Rendered, pass: Pass) -> Value {
     let decision = rendered.plan.decision(pass);
     json!({
-        "name": pass.name(), "run": decision.run, "reason": decision.reason.to_string(), "ms": pass_ms(rendered, pass),
+        "name": pass.name(), "run": decision.run, "reason": decision.reason.to_string(),
+        "ms": pass_ms(rendered, pass),
     })
 }
 
-/// GPU time of a pass that ran, where the device has timestamps.
+/// Returns the device time of a pass that ran, in ms; None without timestamps.
 fn pass_ms(rendered: &Rendered, pass: Pass) -> Option<f64> {
     rendered.passes.iter().find(|p| p.name == pass.name()).map(|p| p.ms())
 }
@@ -101,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_finite_is_warned_of_with_the_way_out() {
+    fn the_warning_about_values_that_are_not_finite_names_a_wider_format() {
         let plain = "3 of 8 values of the picture are not finite";
         assert_eq!(not_finite(3, 8, FilmFormat::Rgba32f), plain);
         let half = not_finite(3, 8, FilmFormat::Rgba16f);

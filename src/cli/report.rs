@@ -3,13 +3,18 @@
 use std::io::Write;
 
 use super::args::ReportArgs;
-use super::{output, refuse_existing};
+use super::output::refuse_existing;
+use super::progress::spinner;
 use crate::error::{Error, Result};
 use crate::io::atomic;
 use crate::report::pages::{self, source};
 
+/// Runs `nimbus report`.
+///
+/// # Errors
+/// Fails if a result cannot be read or the page cannot be written.
 pub fn run(args: &ReportArgs) -> Result<()> {
-    // All that can be known to be wrong is said before any work.
+    // Faults of the arguments are reported before any work.
     let is_html = args
         .output
         .extension()
@@ -26,9 +31,9 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     for path in &args.runs {
         sources.extend(source::read(path)?);
     }
-    let spinner = output::spinner("writing", args.quiet);
+    let writing = spinner("writing", args.quiet);
     let page = pages::page(&sources)?;
     atomic::write_atomic(&args.output, |file| file.write_all(page.as_bytes()))?;
-    drop(spinner);
+    drop(writing);
     Ok(())
 }

@@ -5,13 +5,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use serde::Serialize;
 
 use super::args::StressArgs;
-use super::output;
+use super::output::{self, header};
+use super::progress::progress;
 use crate::error::{Error, Result};
 use crate::frame::DeviceChoice;
 use crate::stress::{Case, Outcome, StressContext, Verdict, cases};
 use crate::timing::machine::{self, Cpu, Device};
 
-/// What `--json` prints; its form is docs/stress.schema.json.
+/// The output of `--json`, which docs/stress.schema.json describes.
 #[derive(Debug, Serialize)]
 struct Report {
     schema: u32,
@@ -26,6 +27,10 @@ struct Report {
 
 const SCHEMA_VERSION: u32 = 1;
 
+/// Runs `nimbus stress`; sets `graceful` once Ctrl-C should print the finished cases.
+///
+/// # Errors
+/// Fails if no case has such a name, the device fails, a case fails, or Ctrl-C came.
 pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
     let chosen = chosen(&args.cases)?;
     if args.list {
@@ -40,7 +45,7 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     };
     let mut context = StressContext::open(&choice)?;
     graceful.store(true, Ordering::Relaxed);
-    let bar = output::progress(chosen.len() as u64, "cases", args.quiet);
+    let bar = progress(chosen.len() as u64, "cases", args.quiet);
     let mut done: Vec<Outcome> = Vec::new();
     for case in &chosen {
         if stop.load(Ordering::Relaxed) {
@@ -72,7 +77,7 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     if interrupted { Err(Error::Interrupted) } else { judged(&report.cases) }
 }
 
-/// The cases whose names begin with what was typed; all where nothing was.
+/// Returns the cases whose names begin with one of `names`; all cases if there are none.
 fn chosen(names: &[String]) -> Result<Vec<Case>> {
     let all = cases();
     if let Some(unknown) = names
@@ -87,7 +92,7 @@ fn chosen(names: &[String]) -> Result<Vec<Case>> {
             families.join(", ")
         )));
     }
-    // A whole name is that case alone, though others may begin with it.
+    // A complete name means that case alone, even if other names begin with it.
     let is_whole = |name: &String| all.iter().any(|c| c.name == name);
     let is_meant = |c: &Case| {
         names.iter().any(|n| if is_whole(n) { c.name == n } else { c.name.starts_with(n.as_str()) })
@@ -95,7 +100,7 @@ fn chosen(names: &[String]) -> Result<Vec<Case>> {
     Ok(all.iter().copied().filter(|c| names.is_empty() || is_meant(c)).collect())
 }
 
-/// An outcome as a row, for programs.
+/// An outcome as a row of CSV.
 #[derive(Debug, Serialize)]
 struct CsvRow<'a> {
     name: &'a str,
@@ -128,11 +133,8 @@ fn row(o: &Outcome) -> CsvRow<'_> {
     }
 }
 
-/// What is printed for people.
+/// Returns the table for people.
 fn text(report: &Report) -> String {
-    let head =
-        ["case", "verdict", "compared", "device", "reference", "error", "bound", "error/bound"]
-            .map(str::to_owned);
     let number = |v: f64| if v == 0.0 { "0".to_owned() } else { format!("{v:.3e}") };
     let of = |o: &Outcome| {
         let worst = o.worst.as_ref().map(|w| {
@@ -142,8 +144,17 @@ fn text(report: &Report) -> String {
         let worst = worst.unwrap_or([const { String::new() }; 5]);
         [vec![o.name.clone(), word(o.verdict).to_owned(), o.n.to_string()], worst.to_vec()].concat()
     };
-    let rows: Vec<Vec<String>> =
-        std::iter::once(head.to_vec()).chain(report.cases.iter().map(of)).collect();
+    let mut rows = header([
+        "case",
+        "verdict",
+        "compared",
+        "device",
+        "reference",
+        "error",
+        "bound",
+        "error/bound",
+    ]);
+    rows.extend(report.cases.iter().map(of));
     let count = |verdict: Verdict| report.cases.iter().filter(|o| o.verdict == verdict).count();
     let mut out =
         format!("{} ({}), {}\n\n", report.device.name, report.device.driver, report.cpu.model);
@@ -183,7 +194,7 @@ fn word(verdict: Verdict) -> &'static str {
     }
 }
 
-/// An error where a case failed.
+/// Fails if a case failed.
 fn judged(cases: &[Outcome]) -> Result<()> {
     let bad: Vec<&str> = cases
         .iter()

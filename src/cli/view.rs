@@ -6,14 +6,19 @@ use std::sync::atomic::AtomicBool;
 use serde_json::{Value, json};
 
 use super::args::{PresentArg, ViewArgs};
-use super::{device_choice, load_and_list, output, overrides};
+use super::output::{self, header};
+use super::scene::{device_choice, load_with_files, typed_overrides};
 use crate::error::Result;
 use crate::gpu::PresentMode;
 use crate::measure::stats::Summary;
 use crate::viewer::scene_window::{self, LoopTimes, Options, SceneSource, WindowTimes, help};
 
+/// Runs `nimbus view` until its window is closed.
+///
+/// # Errors
+/// Fails if the scene is faulty, or no window or device can be opened.
 pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
-    let (loaded, files) = load_and_list(&args.scene, &args.options)?;
+    let (loaded, files) = load_with_files(&args.scene, &args.options)?;
     if !args.options.quiet {
         eprint!("{}", help());
     }
@@ -24,7 +29,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
     };
     let source = SceneSource {
         path: args.scene.clone(),
-        overrides: overrides(&args.options),
+        overrides: typed_overrides(&args.options),
         seed: args.options.seed,
         first: Arc::new(loaded.scene),
         files,
@@ -42,10 +47,9 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
     if args.json {
         let rows: Vec<Value> = loops.iter().map(row).collect();
         let panels = Summary::of(&panels_ms).map(|s| numbers(&s));
-        return output::text(&format!("{:#}\n", json!({ "loops": rows, "panels": panels })));
+        return output::object(&json!({ "loops": rows, "panels": panels }));
     }
-    let mut table =
-        vec![["loop", "panels", "n", "p50 ms", "p95", "p99", "max"].map(str::to_owned).to_vec()];
+    let mut table = header(["loop", "panels", "n", "p50 ms", "p95", "p99", "max"]);
     table.extend(loops.iter().map(|t| {
         let s = &t.frame_ms;
         let times = [s.p50, s.p95, s.p99, s.max].map(|ms| format!("{ms:.3}"));
@@ -64,7 +68,10 @@ fn row(times: &LoopTimes) -> Value {
     row
 }
 
-/// Milliseconds.
+/// Returns statistics in ms as JSON.
 fn numbers(s: &Summary) -> Value {
-    json!({ "n": s.n, "mean": s.mean, "min": s.min, "p50": s.p50, "p95": s.p95, "p99": s.p99, "max": s.max })
+    json!({
+        "n": s.n, "mean": s.mean, "min": s.min, "p50": s.p50, "p95": s.p95, "p99": s.p99,
+        "max": s.max,
+    })
 }

@@ -3,20 +3,25 @@
 use serde::Serialize;
 
 use super::args::WeatherArgs;
-use super::output;
+use super::output::{self, header, or_dash};
+use super::progress::LateProgress;
 use crate::error::Result;
 use crate::io::weather::container::Variable;
 use crate::io::weather::wrf::{self, Clouds, WeatherFile};
 use crate::model::weather::statistics::{self, CloudStatistics};
 use crate::model::weather::{steps, sun};
 
+/// Runs `nimbus weather`.
+///
+/// # Errors
+/// Fails if the file is no output of WRF or has no such step.
 pub fn run(args: &WeatherArgs) -> Result<()> {
     let file = wrf::open(&args.file)?;
     let wanted = match args.step {
         Some(i_step) => i_step..i_step + 1,
         None => 0..file.n_steps,
     };
-    let progress = output::late_progress(wanted.len() as u64, "reading steps", args.quiet);
+    let progress = LateProgress::new(wanted.len() as u64, "reading steps", args.quiet);
     let mut of_steps = Vec::with_capacity(wanted.len());
     for i_step in wanted {
         of_steps.push(step_row(&file, i_step)?);
@@ -24,7 +29,7 @@ pub fn run(args: &WeatherArgs) -> Result<()> {
     }
     drop(progress);
     let mut found =
-        Found { about: about(&file, &args.file.display().to_string()), steps: of_steps };
+        Report { about: about(&file, &args.file.display().to_string()), steps: of_steps };
     found.about.notes.extend(notes(&found.steps));
     if args.json {
         return output::object(&found);
@@ -33,7 +38,7 @@ pub fn run(args: &WeatherArgs) -> Result<()> {
 }
 
 #[derive(Serialize)]
-struct Found {
+struct Report {
     #[serde(flatten)]
     about: About,
     steps: Vec<StepRow>,
@@ -46,7 +51,7 @@ struct About {
     title: Option<String>,
     grid: GridRow,
     n_steps: usize,
-    /// "given" or "diagnosed".
+    /// "given" as mixing ratios, or "diagnosed" from humidity.
     clouds: &'static str,
     notes: Vec<String>,
     variables: Vec<VariableRow>,
@@ -59,9 +64,9 @@ struct GridRow {
     nz: usize,
     dx_m: f64,
     dy_m: f64,
-    /// As the file names it.
+    /// Name of the map projection in the file.
     projection: String,
-    /// Without a map.
+    /// Whether the domain has no map.
     idealised: bool,
 }
 
@@ -84,21 +89,22 @@ struct DimensionRow {
 struct StepRow {
     step: usize,
     time: Option<String>,
-    /// The domain's middle.
+    /// Position of the middle of the domain.
     latitude_deg: Option<f64>,
     longitude_deg: Option<f64>,
-    /// Degrees above the horizon, and from north over east, in the domain's middle.
+    /// Direction of the sun in the middle of the domain: above the horizon, and from north over
+    /// east.
     sun_elevation_deg: Option<f64>,
     sun_azimuth_deg: Option<f64>,
     clouds: CloudRow,
-    /// Least and greatest height of the ground; none where the file does not say, or says what is
-    /// none.
+    /// Least and greatest height of the ground; none if the file has no valid heights.
     ground_m: Option<[f64; 2]>,
-    /// What is wrong with it.
+    /// The fault of its heights.
     #[serde(skip)]
     ground_fault: Option<String>,
-    /// Mixing ratios below 0, and those that are NaN or fill values.
+    /// Mixing ratios below 0.
     negative: u64,
+    /// Mixing ratios that are NaN or fill values.
     missing: u64,
 }
 
@@ -111,7 +117,7 @@ struct CloudRow {
     mean_opacity: f64,
     base_m: Option<f64>,
     top_m: Option<f64>,
-    /// With cloud in the highest level.
+    /// Columns with cloud in the highest level.
     columns_to_the_top: usize,
 }
 
@@ -169,7 +175,7 @@ fn variable_row(v: &Variable) -> VariableRow {
     }
 }
 
-/// What a file says, short and without characters that a terminal would obey.
+/// Shortens a text from a file and escapes control characters, which a terminal would interpret.
 fn plain(text: &str) -> String {
     text.chars()
         .take(80)
@@ -202,7 +208,7 @@ fn step_row(file: &WeatherFile, i_step: usize) -> Result<StepRow> {
     })
 }
 
-/// What the steps have that their figures do not say.
+/// Returns notes on clouds that the highest level cuts off and on faulty ground.
 fn notes(rows: &[StepRow]) -> Vec<String> {
     let cut = rows
         .iter()
@@ -211,8 +217,8 @@ fn notes(rows: &[StepRow]) -> Vec<String> {
     let cut = cut.map(|r| {
         let (n, step) = (r.clouds.columns_to_the_top, r.step);
         format!(
-            "at step {step} clouds of {n} columns reach the highest level: what is above is \
-            not in the file"
+            "at step {step} clouds of {n} columns reach the highest level; the file has nothing \
+             above"
         )
     });
     let fault =
@@ -220,7 +226,7 @@ fn notes(rows: &[StepRow]) -> Vec<String> {
     cut.into_iter().chain(fault).collect()
 }
 
-/// A zero has no sign.
+/// Returns a number without decimals; a zero has no sign.
 fn whole(number: f64) -> String {
     format!("{:.0}", if number.round() == 0.0 { 0.0 } else { number })
 }
@@ -232,7 +238,7 @@ fn extent(numbers: &[f64]) -> [f64; 2] {
     ]
 }
 
-fn describe(found: &Found, quiet: bool) -> String {
+fn describe(found: &Report, quiet: bool) -> String {
     let (a, g) = (&found.about, &found.about.grid);
     let mut out =
         format!("{}: {}, {}\n", a.file, a.container, a.title.as_deref().unwrap_or("no title"));
@@ -260,7 +266,7 @@ fn describe(found: &Found, quiet: bool) -> String {
 }
 
 fn variables(rows: &[VariableRow]) -> Vec<Vec<String>> {
-    let mut table = vec![["variable", "type", "shape", "units"].map(str::to_owned).to_vec()];
+    let mut table = header(["variable", "type", "shape", "units"]);
     for v in rows {
         let shape: Vec<String> = v.dimensions.iter().map(|d| d.length.to_string()).collect();
         table.push(vec![v.name.clone(), v.r#type.clone(), shape.join(" x "), v.units.clone()]);
@@ -270,7 +276,7 @@ fn variables(rows: &[VariableRow]) -> Vec<Vec<String>> {
 
 fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
     let cells = if source == "given" { "cloudy cells" } else { "diagnosed cells" };
-    let header = [
+    let mut table = header([
         "step",
         "time (UTC)",
         "middle",
@@ -284,9 +290,14 @@ fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
         "top m",
         "ground m",
         "odd",
-    ];
-    let mut table = vec![header.map(str::to_owned).to_vec()];
-    let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+    ]);
+    let place = |(north, east): (f64, f64)| {
+        let side = |degrees: f64, ahead, behind| {
+            format!("{:.1}° {}", degrees.abs(), if degrees < 0.0 { behind } else { ahead })
+        };
+        format!("{} {}", side(north, "N", "S"), side(east, "E", "W"))
+    };
+    let metres = |m: f64| format!("{m:.0}");
     for r in rows {
         let c = &r.clouds;
         let odd = match (r.negative, r.missing) {
@@ -295,25 +306,17 @@ fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
         };
         table.push(vec![
             r.step.to_string(),
-            or_none(r.time.clone()),
-            or_none(r.latitude_deg.zip(r.longitude_deg).map(|(north, east)| {
-                let side = |degrees: f64, ahead, behind| {
-                    format!("{:.1}° {}", degrees.abs(), if degrees < 0.0 { behind } else { ahead })
-                };
-                format!("{} {}", side(north, "N", "S"), side(east, "E", "W"))
-            })),
-            or_none(r.sun_elevation_deg.map(|degrees| format!("{degrees:.1}°"))),
+            or_dash(r.time.clone(), |time| time),
+            or_dash(r.latitude_deg.zip(r.longitude_deg), place),
+            or_dash(r.sun_elevation_deg, |degrees| format!("{degrees:.1}°")),
             if c.cells == 0 { "no cloud".to_owned() } else { c.cells.to_string() },
             c.columns.to_string(),
             format!("{:.4}", c.greatest_extinction_per_m),
             format!("{:.2}", c.greatest_depth),
             format!("{:.4}", c.mean_opacity),
-            or_none(c.base_m.map(|m| format!("{m:.0}"))),
-            or_none(c.top_m.map(|m| format!("{m:.0}"))),
-            or_none(
-                r.ground_m
-                    .map(|[least, greatest]| format!("{} to {}", whole(least), whole(greatest))),
-            ),
+            or_dash(c.base_m, metres),
+            or_dash(c.top_m, metres),
+            or_dash(r.ground_m, |[least, most]| format!("{} to {}", whole(least), whole(most))),
             odd,
         ]);
     }

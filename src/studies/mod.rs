@@ -1,6 +1,13 @@
-//! Studies of run time against error: error studies over knobs, and the ledger of approximations.
+//! Studies of run time against error.
+//!
+//! An [`error`] study draws and times every setting of a scene's knobs; a [`ledger`] lists the
+//! error of every approximation, each against the next better picture. Both measure pictures by
+//! [`picture_error`] against references in f64, which [`reference_cache`] keeps between runs, and
+//! begin their records with [`provenance`].
 
 pub mod error;
+pub mod figure;
 pub mod ledger;
+pub mod picture_error;
 pub mod provenance;
 pub mod reference_cache;

@@ -1,42 +1,51 @@
-//! What every record of a study says of how it came to be.
+//! The conditions of a study, and the reference that it measures by.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::picture_error::magnitude;
+use super::reference_cache::CachedReference;
 use crate::gpu::DeviceInfo;
 use crate::io::scene_file::LoadedScene;
-use crate::reference::picture::{Pixels, ReferenceKind};
-use crate::studies::reference_cache::Kept;
+use crate::reference::picture::ReferenceKind;
+use crate::reference::picture::Pixels;
 use crate::timing::machine::{self, Clocks, Cpu, Device};
 
-/// With what, where and of what a study was made.
+/// The conditions that a study was made under.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
-    /// Version of the form of the file.
+    /// Schema version of the file.
     pub schema: u32,
+    /// Version of nimbus.
     pub nimbus: String,
+    /// Git revision that was built.
     pub revision: String,
-    /// Digest of the sources that were built: two builds that differ from one revision differ in
-    /// it.
+    /// Digest of the sources that were built, which tells modified builds of one revision apart.
     pub code: String,
-    /// UTC, ISO 8601.
+    /// Start of the study, UTC, ISO 8601.
     pub date: String,
+    /// The command line.
     pub command: Vec<String>,
-    /// As typed.
+    /// Path of the scene file, as typed.
     pub scene_file: String,
     /// SHA-256 of the resolved scene and its files.
     pub scene_hash: String,
+    /// The scene with every default filled in.
     pub scene: serde_json::Value,
+    /// Vulkan device.
     pub device: Device,
+    /// Processor.
     pub cpu: Cpu,
+    /// Environment variables that change what drivers do.
     pub environment: BTreeMap<String, String>,
+    /// Clocks of host and device.
     pub clocks: Clocks,
 }
 
 impl Provenance {
-    /// Of a study of `scene` that is being made now.
+    /// Returns the conditions of a study of `scene` that begins now.
     pub fn now(
         schema: u32,
         scene_file: &Path,
@@ -62,58 +71,52 @@ impl Provenance {
     }
 }
 
-/// A figure with its 95 % interval; none where there were too few values for one.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Figure {
-    pub value: f64,
-    pub low: Option<f64>,
-    pub high: Option<f64>,
-}
-
-/// What a picture or a study is measured by.
+/// The reference that pictures are compared with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceRecord {
     /// "thin", "volume", "model" or "reflections=K".
     pub against: String,
-    /// SHA-256 of all that it is computed from.
+    /// SHA-256 of everything that it depends on.
     pub hash: String,
-    /// Root mean square of its own error over the pixels: an estimate, see `accuracy`; none where
-    /// there is no bound.
+    /// Estimated root mean square of its own error over the pixels; none if there is no bound.
     pub own_error: Option<f64>,
-    /// What that estimate is, in words.
+    /// Meaning of that estimate in words.
     pub accuracy: String,
-    /// Root mean square of its premultiplied red, green, blue and alpha: what errors are relative
-    /// to.
+    /// Root mean square of its premultiplied red, green, blue and alpha, which relative errors are
+    /// relative to.
     pub magnitude: f64,
-    /// It was computed before and kept.
+    /// Whether it was read from the cache.
     pub from_cache: bool,
-    /// What computing it took.
+    /// Seconds that computing it took.
     pub seconds: f64,
+    /// Width of the picture in pixels.
     pub width: u32,
+    /// Height of the picture in pixels.
     pub height: u32,
     /// Pixels at which it is known: all of them, or a stratified sample.
     pub n_pixels: usize,
+    /// Frame number.
     pub frame: u32,
+    /// Scene time in seconds.
     pub time_s: f64,
 }
 
 impl ReferenceRecord {
-    /// Of `kept`, which is `against`'s picture of a frame at `pixels`.
+    /// Describes a reference at `pixels` of a frame.
     pub fn of(
-        kept: &Kept,
+        cached: &CachedReference,
         against: ReferenceKind,
         pixels: &Pixels,
         frame: u32,
         time_s: f64,
     ) -> ReferenceRecord {
-        let Kept { reference, hash, from_cache } = kept;
-        let squares: f64 = reference.rgba.iter().flatten().map(|v| v * v).sum();
+        let CachedReference { reference, hash, from_cache } = cached;
         ReferenceRecord {
             against: against.to_string(),
             hash: hash.clone(),
             own_error: Some(reference.own_error).filter(|e| e.is_finite()),
             accuracy: reference.accuracy.clone(),
-            magnitude: (squares / (4 * reference.rgba.len()).max(1) as f64).sqrt(),
+            magnitude: magnitude(&reference.rgba),
             from_cache: *from_cache,
             seconds: reference.seconds,
             width: pixels.width,

@@ -1,5 +1,5 @@
-//! References kept between runs, by the hash of all that they are computed from: the code, the
-//! scene as far as it counts, time, pixels, and what is asked for.
+//! A cache of references on disk. The key is the hash of everything that a reference depends on:
+//! the code, the relevant keys of the scene, the time, the pixels and the kind of reference.
 
 use std::fs;
 use std::io::Write;
@@ -17,16 +17,18 @@ use crate::model::scene::{Gather, Lighting, Pairs, Scene, Simulate, Threading, T
 use crate::model::sums::Sums;
 use crate::reference::picture::{OnProgress, Pixels, Reference, ReferenceKind};
 
-/// A reference, and where it came from.
+/// A reference, and whether it was computed now.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Kept {
+pub struct CachedReference {
+    /// The picture.
     pub reference: Reference,
-    /// SHA-256, hex.
+    /// SHA-256 of everything that it depends on, in hex.
     pub hash: String,
+    /// Whether it was read from the cache.
     pub from_cache: bool,
 }
 
-/// The first line of a file; numbers of f64 in little-endian order follow, four a pixel.
+/// The first line of a file, as JSON. Little-endian f64 values follow, four a pixel.
 #[derive(Debug, Serialize, Deserialize)]
 struct Head {
     hash: String,
@@ -35,16 +37,20 @@ struct Head {
     seconds: f64,
     pixels_s: f64,
     n_pixels: usize,
-    /// SHA-256 of the numbers, hex.
+    /// SHA-256 of the values, in hex.
     content: String,
 }
 
-/// Where references are kept; none where there is no place for caches.
+/// Returns the folder of the cache; none if the system has no folder for caches.
 pub fn default_folder() -> Option<PathBuf> {
     cache_folder("references")
 }
 
-/// The reference from `folder`, or computed and put there.
+/// Returns the reference from the cache in `folder`, or computes it and stores it there.
+///
+/// # Errors
+/// Fails if the scene has no such reference, or computing it fails. A cache that cannot be written
+/// is not an error.
 pub fn reference(
     against: ReferenceKind,
     scene: &Scene,
@@ -52,45 +58,45 @@ pub fn reference(
     pixels: &Pixels,
     folder: Option<&Path>,
     listener: OnProgress,
-) -> Result<Kept> {
+) -> Result<CachedReference> {
     against.check(scene, time_s)?;
     let hash = hash_of(against, scene, time_s, pixels);
     let path = folder.map(|folder| folder.join(format!("{hash}.f64")));
-    // A file that is not whole is made again.
+    // A damaged file is computed again.
     if let Some(reference) = path.as_ref().and_then(|path| read(path, &hash, pixels.at.len())) {
-        return Ok(Kept { reference, hash, from_cache: true });
+        return Ok(CachedReference { reference, hash, from_cache: true });
     }
     let reference = against.render(scene, time_s, pixels, listener)?;
     if let Some(path) = path {
-        // A cache that cannot be written costs time and nothing else.
+        // A cache that cannot be written only costs time.
         let _ = path.parent().map(fs::create_dir_all);
         let _ = write(&path, &hash, &reference);
     }
-    Ok(Kept { reference, hash, from_cache: false })
+    Ok(CachedReference { reference, hash, from_cache: false })
 }
 
-/// Whether two scenes have one reference at one time.
+/// Returns whether two scenes have the same reference at every time.
 pub fn is_same(against: ReferenceKind, a: &Scene, b: &Scene) -> bool {
-    counted(&ReferenceKind::without_approximations(a), against)
-        == counted(&ReferenceKind::without_approximations(b), against)
+    relevant(a, against) == relevant(b, against)
 }
 
 fn hash_of(against: ReferenceKind, scene: &Scene, time_s: f64, pixels: &Pixels) -> String {
     let mut hasher = Sha256::new();
-    let counted = counted(&ReferenceKind::without_approximations(scene), against);
     let pixels = (pixels.width, pixels.height, pixels.tile, pixels.cell);
     hasher.update(format!(
         "{}\n{against}\n{:x}\n{pixels:?}\n",
         env!("NIMBUS_REFERENCE_CODE"),
         time_s.to_bits()
     ));
-    // Shortest digits that read back as the same numbers: two scenes that differ differ here.
-    hasher.update(format!("{counted:?}"));
+    // Debug prints the shortest digits that read back as the same numbers, so that two different
+    // scenes have different texts.
+    hasher.update(format!("{:?}", relevant(scene, against)));
     format!("{:x}", hasher.finalize())
 }
 
-/// `scene` with everything that `against` does not look at made alike.
-fn counted(scene: &Scene, against: ReferenceKind) -> Scene {
+/// Returns `scene` with every setting that this kind of reference ignores at a fixed value.
+fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
+    let scene = ReferenceKind::without_approximations(scene);
     let Lighting { mode, grid, step, forward, facets_per_cloud, .. } = scene.lighting;
     let by_model = matches!(against, ReferenceKind::Model | ReferenceKind::Reflections(_));
     let (grid, step, facets_per_cloud) =
@@ -117,11 +123,11 @@ fn counted(scene: &Scene, against: ReferenceKind) -> Scene {
         ..scene.film
     };
     let threads = Threads { mode: Threading::Serial, simulate: Simulate::Gpu };
-    let mut counted = Scene { title: String::new(), film, lighting, threads, ..scene.clone() };
+    let mut relevant = Scene { title: String::new(), film, lighting, threads, ..scene.clone() };
     if by_model {
-        counted.surfaces.iter_mut().for_each(|s| s.subdivide = [1, 1]);
+        relevant.surfaces.iter_mut().for_each(|s| s.subdivide = [1, 1]);
     }
-    counted
+    relevant
 }
 
 fn read(path: &Path, hash: &str, n_pixels: usize) -> Option<Reference> {
@@ -172,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_kept_is_read_back_and_what_is_broken_is_not() {
+    fn a_cached_reference_is_read_back_and_a_damaged_one_is_not() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.f64");
         let rgba = vec![[0.1, -2.0, 1e-300, 1.0], [0.0, f64::MAX, 0.3, 0.4]];
@@ -186,7 +192,7 @@ mod tests {
         write(&path, "abc", &reference).unwrap();
         assert_eq!(read(&path, "abc", 2), Some(reference));
         assert_eq!((read(&path, "abd", 2), read(&path, "abc", 3)), (None, None));
-        // A bit that flipped, a file that was cut.
+        // A flipped bit, and a file that was cut off.
         let mut bytes = fs::read(&path).unwrap();
         let n = bytes.len();
         bytes[n - 3] ^= 1;

@@ -16,7 +16,7 @@ use nimbus::io::{box_file, particle_file};
 use nimbus::model::weather::particles::Layout;
 use nimbus::report::pages::page;
 use nimbus::report::pages::source::{Results, Source};
-use nimbus::studies::error::files::parse_found;
+use nimbus::studies::error::files::parse_earlier;
 use nimbus::studies::error::records::Study;
 use nimbus::studies::ledger::records::Ledger;
 use nimbus::timing::compare::Comparison;
@@ -137,7 +137,7 @@ pub fn results(bytes: &[u8]) -> std::result::Result<(), String> {
     }
     match json::parse::<Study>(text, &path("study.json")) {
         // A study without a table is one that will not be resumed.
-        Ok(study) => match parse_found(study.clone(), table, &path("times.csv")) {
+        Ok(study) => match parse_earlier(study.clone(), table, &path("times.csv")) {
             Err(e) if !table.is_empty() => refuse(e),
             _ => found.push(Results::Study(Box::new(study))),
         },

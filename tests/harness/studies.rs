@@ -4,9 +4,13 @@
 
 use std::collections::BTreeMap;
 
-use nimbus::studies::error::records::{Best, Configuration, Front, PictureError, Study};
+use nimbus::studies::error::blocks::TimeKind;
+use nimbus::studies::error::front::{Front, Metric};
+use nimbus::studies::error::records::{Best, Budget, Configuration, Study};
+use nimbus::studies::figure::Figure;
 use nimbus::studies::ledger::records::{Ledger, Row};
-use nimbus::studies::provenance::{Figure, Provenance, ReferenceRecord};
+use nimbus::studies::picture_error::PictureError;
+use nimbus::studies::provenance::{Provenance, ReferenceRecord};
 use nimbus::timing::json::ResultFile;
 use nimbus::timing::machine::{Clocks, Cpu, Device};
 use nimbus::timing::names::Setting;
@@ -93,8 +97,8 @@ pub fn study(configurations: Vec<Configuration>) -> Study {
             frame: 0,
             time_s: 0.0,
         },
-        metric: "rmse".to_owned(),
-        time: "gpu".to_owned(),
+        metric: Metric::Rmse,
+        time: TimeKind::Gpu,
         rounds: 8,
         frames: 10,
         configurations,
@@ -131,13 +135,12 @@ pub fn usual_study() -> Study {
         ));
     }
     let mut study = study(all);
-    let best = |budget: &str, value, configuration| Best {
-        budget: budget.to_owned(),
-        value,
-        configuration,
-    };
-    study.best =
-        vec![best("ms", 8.0, Some(2)), best("error", 0.005, Some(3)), best("ms", 1.0, None)];
+    let best = |budget, value, configuration| Best { budget, value, configuration };
+    study.best = vec![
+        best(Budget::Ms, 8.0, Some(2)),
+        best(Budget::Error, 0.005, Some(3)),
+        best(Budget::Ms, 1.0, None),
+    ];
     study
 }
 

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Subcommand, ValueEnum};
 
-use super::farm_plan::{CalibrateArgs, PlanArgs, from_one};
+use super::at_least_one;
+use super::farm_plan::{CalibrateArgs, PlanArgs};
 
 /// Arguments of `nimbus farm`.
 #[derive(Debug, ClapArgs)]
@@ -84,7 +85,7 @@ pub struct RunArgs {
     pub quiet: bool,
     /// End with 1 in place of 75 after so many failures of the same Slurm task in a row that
     /// finished nothing
-    #[arg(long, value_name = "N", value_parser = from_one())]
+    #[arg(long, value_name = "N", value_parser = at_least_one())]
     pub tries: Option<u32>,
     /// Number of the shard, from 0
     #[arg(long, value_name = "I")]
@@ -98,10 +99,10 @@ pub struct LocalArgs {
     #[arg(long, value_name = "DIR")]
     pub plan: PathBuf,
     /// Processes at a time. One is enough for a device; a software device uses all cores
-    #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = from_one())]
+    #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = at_least_one())]
     pub jobs: u32,
     /// Tries of a shard that fails in a way that another try may not
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = from_one())]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one())]
     pub tries: u32,
     /// Vulkan device, by index or part of its name
     #[arg(long, value_name = "INDEX|NAME")]
@@ -188,7 +189,7 @@ pub struct JobArgs {
     /// Tries of a shard, or of the merge, that fails in a way that another try may not. With Slurm
     /// a shard's failures count in a row, up to one that finished frames; nodes that die count for
     /// the merge alone
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = from_one())]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one())]
     pub tries: u32,
     /// Option for sbatch of the shards, e.g. --sbatch=--gres=gpu:1 (repeatable). The merge gets
     /// --account, --partition, --qos and --reservation, too

@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use clap::builder::RangedI64ValueParser;
 use clap::{Args as ClapArgs, ValueEnum};
 
-use super::parse_size;
+use super::{at_least_one, parse_size};
 use crate::reference::picture::{MAX_SAMPLES, ReferenceKind};
 
 /// Arguments of `nimbus farm plan`.
@@ -56,15 +55,15 @@ pub struct PlanArgs {
     pub shard_samples: Option<u32>,
     /// Configurations of a shard, with --error [default: 8, or by --model]. Each shard also times
     /// the base configuration
-    #[arg(long, value_name = "N", requires = "error", value_parser = from_one())]
+    #[arg(long, value_name = "N", requires = "error", value_parser = at_least_one())]
     pub shard_configurations: Option<u32>,
     /// Cases of a shard, with --bench [default: 8, or by --model]. Each shard also times the first
     /// case of all
-    #[arg(long, value_name = "N", requires = "bench", value_parser = from_one())]
+    #[arg(long, value_name = "N", requires = "bench", value_parser = at_least_one())]
     pub shard_cases: Option<u32>,
     /// Frames of a shard [default: 16, or by --model]. Each shard opens the device and fills its
     /// buffers once, which takes time; a killed run of a long shard delays the others more
-    #[arg(long, value_name = "N", value_parser = from_one())]
+    #[arg(long, value_name = "N", value_parser = at_least_one())]
     pub shard_frames: Option<u32>,
     /// Cost model from `nimbus farm calibrate`: shards are cut to take 1 to 10 minutes, and the
     /// duration and price of all of them are printed
@@ -75,7 +74,7 @@ pub struct PlanArgs {
         long,
         value_name = "N",
         requires = "model",
-        value_parser = from_one(),
+        value_parser = at_least_one(),
         help_heading = "Cost"
     )]
     pub nodes: Option<u32>,
@@ -189,11 +188,6 @@ pub struct CalibrateArgs {
     /// Print no progress
     #[arg(short, long)]
     pub quiet: bool,
-}
-
-/// Returns a parser of numbers from 1.
-pub(super) fn from_one() -> RangedI64ValueParser<u32> {
-    clap::value_parser!(u32).range(1..)
 }
 
 /// Parses FIRST..END, or the number of items from 0.

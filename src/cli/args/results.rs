@@ -1,4 +1,4 @@
-//! Arguments of the commands that read results: `compare` and `report`.
+//! The arguments of the commands that read results: `compare` and `report`.
 
 use std::path::PathBuf;
 
@@ -7,6 +7,7 @@ use clap::Args as ClapArgs;
 use super::{parse_limit, parse_positive};
 use crate::timing::difference::Condition;
 
+/// Arguments of `nimbus compare`.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Two settings of a scene:\n  \
     nimbus bench scenes/threads.toml --out before\n  \
@@ -21,11 +22,11 @@ use crate::timing::difference::Condition;
     --fail-below;\n  \
     2 not comparable, or neither results of nimbus bench nor pictures.")]
 pub struct CompareArgs {
-    /// Results folder (`nimbus bench --out DIR`) or picture to measure by
+    /// Results folder (`nimbus bench --out DIR`) or picture that serves as the reference
     pub a: PathBuf,
-    /// Results folder that may be faster or slower, or picture that may be off
+    /// Results folder or picture that is compared with A
     pub b: PathBuf,
-    /// What may differ between A and B; anything else that does is refused
+    /// Conditions that may differ between A and B; any other difference is refused
     #[arg(
         long,
         value_enum,
@@ -34,27 +35,28 @@ pub struct CompareArgs {
         help_heading = "Results"
     )]
     pub allow: Vec<Condition>,
-    /// Write every pixel's FLIP error as a picture, dark for none
+    /// Write the FLIP error of every pixel as a picture, dark for no error
     #[arg(short, long, value_name = "FILE.png", help_heading = "Pictures")]
     pub output: Option<PathBuf>,
     /// Replace an existing file
     #[arg(long, requires = "output", help_heading = "Pictures")]
     pub force: bool,
-    /// Pixels that a degree of the eye's field of view sees, for FLIP [default: 67]
+    /// Pixels a degree of the field of view, for FLIP [default: 67]
     #[arg(long, value_name = "N", value_parser = parse_positive, help_heading = "Pictures")]
     pub pixels_per_degree: Option<f64>,
-    /// Exit with 1 where a metric is greater: rmse, max, relmse, flip, alpha_rmse, alpha_max or
+    /// Exit with 1 if a metric is greater: rmse, max, relmse, flip, alpha_rmse, alpha_max or
     /// not_finite (repeatable)
     #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_limit, help_heading = "Pictures")]
     pub fail_above: Vec<(String, f64)>,
-    /// Exit with 1 where a metric is less: psnr or ssim (repeatable)
+    /// Exit with 1 if a metric is less: psnr or ssim (repeatable)
     #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_limit, help_heading = "Pictures")]
     pub fail_below: Vec<(String, f64)>,
-    /// JSON in place of the table
+    /// Print JSON instead of the table
     #[arg(long)]
     pub json: bool,
 }
 
+/// Arguments of `nimbus report`.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "One run:\n  \
     nimbus bench scenes/threads.toml --out run\n  \

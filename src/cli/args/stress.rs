@@ -1,9 +1,10 @@
-//! `nimbus stress`, as typed.
+//! The arguments of `nimbus stress`.
 
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
+/// Arguments of `nimbus stress`.
 #[derive(Debug, ClapArgs)]
 #[command(
     after_help = "Examples:\n  nimbus stress\n  nimbus stress --list\n  nimbus stress functions \
@@ -11,16 +12,16 @@ use clap::Args as ClapArgs;
     nimbus stress --json --validation > stress.json\n  nimbus stress --shaders my-shaders functions"
 )]
 pub struct StressArgs {
-    /// Cases to run, by what their names begin with; all without
+    /// Cases to run, by the beginning of their names [default: all]
     #[arg(value_name = "CASE")]
     pub cases: Vec<String>,
-    /// Say what the cases try and what is allowed, and run none
+    /// List the cases and their bounds without running them
     #[arg(long, conflicts_with_all = ["json", "csv"])]
     pub list: bool,
-    /// JSON in place of the table
+    /// Print JSON instead of the table
     #[arg(long, conflicts_with = "csv")]
     pub json: bool,
-    /// CSV in place of the table
+    /// Print CSV instead of the table
     #[arg(long)]
     pub csv: bool,
     /// Vulkan device, by index or part of its name (see `nimbus devices`)

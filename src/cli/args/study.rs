@@ -1,12 +1,16 @@
-//! What `nimbus error` and `nimbus ledger` take.
+//! The arguments of the studies: `error` and `ledger`.
 
 use std::path::PathBuf;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
 
-use super::{SceneArgs, parse_positive};
+use super::farm_plan::{Span, parse_span};
+use super::{SceneArgs, at_least_one, parse_positive};
 use crate::reference::picture::ReferenceKind;
+use crate::studies::error::blocks::TimeKind;
+use crate::studies::error::front::Metric;
 
+/// Arguments of `nimbus error`.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \
     nimbus error scenes/study-cloud.toml\n  \
@@ -23,70 +27,70 @@ pub struct ErrorArgs {
     /// [default: every knob that can change the scene]
     #[arg(long, value_name = "KEY=VALUE,…", help_heading = "Knobs")]
     pub knob: Vec<String>,
-    /// All combinations of the knobs; else each value alone, then what saves time for little error
-    /// put together
+    /// Run all combinations of the knobs [default: each value alone, then combinations of those
+    /// that save time for little error]
     #[arg(long, requires = "knob", help_heading = "Knobs")]
     pub grid: bool,
-    /// What pictures are compared with: thin, volume, model or reflections=K
+    /// Reference of the pictures: thin, volume, model or reflections=K
     #[arg(long, value_name = "WHAT", default_value = "model", help_heading = "Error")]
     pub against: ReferenceKind,
-    /// Draw every cloud without its texture, which no volume and no light knows
+    /// Draw every cloud without its texture, which the references but thin do not have
     #[arg(long, help_heading = "Error")]
     pub plain: bool,
-    /// The error that decides who is on the front
+    /// The error that decides which configurations are on the front
     #[arg(long, value_enum, default_value = "rmse", help_heading = "Error")]
-    pub metric: MetricArg,
-    /// The reference is computed at so many pixels at most, spread over the picture; "all" for
-    /// every one
+    pub metric: Metric,
+    /// Most pixels that the reference is computed at, spread over the picture; or "all"
     #[arg(long, value_name = "N", default_value = "16384", value_parser = parse_pixels, help_heading = "Error")]
     pub pixels: usize,
-    /// The frame that is drawn and compared, and the first that is timed
+    /// Number of the frame that is drawn and compared, and the first that is timed
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Error")]
     pub frame: u32,
     /// The time that decides [default: gpu where the device has timestamps]
     #[arg(long, value_enum, help_heading = "Time")]
-    pub time: Option<TimeArg>,
-    /// Turns of each configuration
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Time")]
+    pub time: Option<TimeKind>,
+    /// Timed blocks of each configuration
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one(), help_heading = "Time")]
     pub rounds: u32,
-    /// Timed frames of a turn
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Time")]
+    /// Timed frames of a block
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one(), help_heading = "Time")]
     pub frames: u32,
-    /// Time what the scene's own frames leave to be done
+    /// Let frames skip the work that the scene lets them skip
     #[arg(long, help_heading = "Time")]
     pub as_played: bool,
-    /// Say what is the most exact within so many ms a frame (repeatable)
+    /// Print the most exact configuration within this time of a frame (repeatable)
     #[arg(long, value_name = "MS", value_parser = parse_positive, help_heading = "Budgets")]
     pub budget_ms: Vec<f64>,
-    /// Say what is the fastest within such an error (repeatable)
+    /// Print the fastest configuration within this error (repeatable)
     #[arg(long, value_name = "ERROR", value_parser = parse_positive, help_heading = "Budgets")]
     pub budget_error: Vec<f64>,
-    /// Only these of the configurations, counted from 0, and the scene as it stands; nothing is put
-    /// together. What the nodes of a farm run
-    #[arg(long, value_name = "FIRST..END", value_parser = super::farm_plan::parse_span, requires = "out", hide_short_help = true)]
-    pub part: Option<super::Span>,
+    /// Run only these configurations, counted from 0, and the scene as it stands, without
+    /// combinations; for the nodes of a farm
+    #[arg(long, value_name = "FIRST..END", value_parser = parse_span, requires = "out", hide_short_help = true)]
+    pub part: Option<Span>,
     /// Folder for study.json, configurations.csv, times.csv, front.svg and pictures
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Go on with the study in --out: what it has is kept and not run again
+    /// Resume the study in --out: its results are kept and not measured again
     #[arg(long, requires = "out", conflicts_with = "force")]
     pub resume: bool,
     /// Replace existing results
     #[arg(long)]
     pub force: bool,
-    /// Draw time against error in the terminal, too
+    /// Also draw time against error in the terminal
     #[arg(long)]
     pub plot: bool,
-    /// Print study.json in place of the table
+    /// Print study.json instead of the table
     #[arg(long, conflicts_with = "csv")]
     pub json: bool,
-    /// Print configurations.csv in place of the table
+    /// Print configurations.csv instead of the table
     #[arg(long)]
     pub csv: bool,
     #[command(flatten)]
     pub options: SceneArgs,
 }
 
+/// Arguments of `nimbus ledger`.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \
     nimbus ledger scenes/study-both.toml\n  \
@@ -96,23 +100,23 @@ pub struct ErrorArgs {
 pub struct LedgerArgs {
     /// Scene file
     pub scene: PathBuf,
-    /// Draw every cloud without its texture, which no volume and no light knows
+    /// Draw every cloud without its texture, which the references but thin do not have
     #[arg(long)]
     pub plain: bool,
-    /// Pictures are compared at so many pixels at most, spread over them; "all" for every one
+    /// Most pixels that pictures are compared at, spread over them; or "all"
     #[arg(long, value_name = "N", default_value = "8192", value_parser = parse_pixels)]
     pub pixels: usize,
-    /// The frame
+    /// Frame number
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub frame: u32,
     /// Reflections of the last row
     #[arg(long, value_name = "K", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub reflections: u32,
-    /// Turns of each picture that the device draws
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Timed blocks of each picture that the device draws
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one())]
     pub rounds: u32,
-    /// Timed frames of a turn
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Timed frames of a block
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one())]
     pub frames: u32,
     /// Folder for ledger.json and ledger.svg
     #[arg(long, value_name = "DIR")]
@@ -120,29 +124,11 @@ pub struct LedgerArgs {
     /// Replace existing results
     #[arg(long)]
     pub force: bool,
-    /// Print ledger.json in place of the table
+    /// Print ledger.json instead of the table
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
     pub options: SceneArgs,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MetricArg {
-    /// Root mean square over premultiplied linear red, green, blue and alpha
-    Rmse,
-    /// The greatest difference at the pixels that are compared
-    Max,
-    /// Mean square relative to the reference's
-    Relmse,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum TimeArg {
-    /// Device time of all passes
-    Gpu,
-    /// From the begin of the game step to the finished picture
-    Frame,
 }
 
 fn parse_pixels(text: &str) -> Result<usize, String> {

@@ -1,21 +1,21 @@
-//! `nimbus view` and `nimbus edit`: what opens a window.
+//! The arguments of the commands that open a window: `view` and `edit`.
 
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
 
-use super::SceneArgs;
+use super::{SceneArgs, at_least_one};
 
+/// Arguments of `nimbus view`.
 #[derive(Debug, ClapArgs)]
 pub struct ViewArgs {
     /// Scene file (TOML)
     pub scene: PathBuf,
-    /// When pictures are shown: at the next refresh in order, at the next refresh the newest, at
-    /// once
+    /// When pictures are presented
     #[arg(long, value_name = "MODE", default_value = "fifo")]
     pub present: PresentArg,
-    /// Close the window after so many frames
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Close the window after this many frames
+    #[arg(long, value_name = "N", value_parser = at_least_one())]
     pub frames: Option<u32>,
     /// Begin without panels (the key h shows them)
     #[arg(long)]
@@ -27,20 +27,25 @@ pub struct ViewArgs {
     pub options: SceneArgs,
 }
 
+/// Arguments of `nimbus edit`.
 #[derive(Debug, ClapArgs)]
 pub struct EditArgs {
-    /// Box file, which need not exist yet; a new cloud without a file when left out
+    /// Box file, which need not exist yet [default: a new cloud without a file]
     pub file: Option<PathBuf>,
-    /// Scene around the cloud, of which the first cloud made from boxes gives way to the file's
+    /// Scene around the cloud; the edited cloud replaces its first cloud made from boxes
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
     #[command(flatten)]
     pub options: SceneArgs,
 }
 
+/// The present modes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum PresentArg {
+    /// In order, one at each refresh
     Fifo,
+    /// The newest at each refresh
     Mailbox,
+    /// At once
     Immediate,
 }

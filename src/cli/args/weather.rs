@@ -1,11 +1,12 @@
-//! `nimbus weather`, as typed.
+//! The arguments of `nimbus weather`.
 
 use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
+/// Arguments of `nimbus weather`.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "What is in a file, and one of its steps alone:\n  \
+#[command(after_help = "The contents of a file, and one of its steps alone:\n  \
     nimbus weather scenes/weather/katrina.nc\n  nimbus weather scenes/weather/supercell.nc --step \
     2\n\n\
     The greatest optical depth of every step:\n  \
@@ -14,10 +15,10 @@ use clap::Args as ClapArgs;
 pub struct WeatherArgs {
     /// Weather file: output of WRF (wrfout_d01_…)
     pub file: PathBuf,
-    /// Clouds of this step alone, counted from 0; the others are not read
+    /// Read the clouds of this step only, counted from 0
     #[arg(long, value_name = "N")]
     pub step: Option<usize>,
-    /// JSON in place of the tables
+    /// Print JSON instead of the tables
     #[arg(long)]
     pub json: bool,
     /// No notes, no progress

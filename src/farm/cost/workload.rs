@@ -13,8 +13,8 @@ use crate::frame::{Game, SceneFeatures, Tensors};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::picture::FrameReference;
-use crate::studies::error::players::frames_of_turns;
-use crate::studies::error::turns::BETWEEN;
+use crate::studies::error::blocks::BETWEEN;
+use crate::studies::error::device_runner::n_frames_drawn;
 use crate::timing::cases::{Case, Loop};
 
 /// The amounts of work that is cut into shards.
@@ -165,7 +165,7 @@ pub struct StudyTurns {
 
 impl StudyTurns {
     fn amounts(self, scene: &Scene) -> Result<Amounts> {
-        let n_frames = f64::from(frames_of_turns(self.n_rounds, self.n_frames));
+        let n_frames = f64::from(n_frames_drawn(self.n_rounds, self.n_frames));
         let frames = if self.as_played {
             let FrameAmounts { first, next } = FrameAmounts::new(scene, self.i_frame)?;
             first + next * (n_frames - 1.0)

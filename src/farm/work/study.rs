@@ -14,10 +14,10 @@ use crate::error::{Error, Result};
 use crate::farm::transient::io_error;
 use crate::io::atomic::write_atomic;
 use crate::report::charts::{self, Chart};
-use crate::studies::error::files::{self, CONFIGURATIONS_FILE};
-use crate::studies::error::parts::{Part, differences, join};
-use crate::studies::error::records::{self, STUDY_FILE, TIMES_FILE};
-use crate::timing::json;
+use crate::studies::error::files::{self, CONFIGURATIONS_FILE, TIMES_FILE};
+use crate::studies::error::parts::{Joined, Part, differences, join};
+use crate::studies::error::records;
+use crate::timing::json::{self, ResultFile};
 use crate::timing::machine::Device;
 use crate::timing::results::prepare_out_dir;
 
@@ -50,7 +50,7 @@ impl Work for Study {
 
     /// Every shard has pictures besides these.
     fn outputs(&self, _: Range<u32>) -> Vec<String> {
-        [CONFIGURATIONS_FILE, STUDY_FILE, TIMES_FILE].map(str::to_owned).to_vec()
+        [CONFIGURATIONS_FILE, records::Study::FILE, TIMES_FILE].map(str::to_owned).to_vec()
     }
 
     fn is_exact(&self) -> bool {
@@ -65,12 +65,12 @@ impl Work for Study {
     fn merge(&self, merge: &Merge<'_>) -> Result<usize> {
         let Merge { results, out, force, .. } = merge;
         let read = |result: &ShardResult| {
-            let (study, found) = files::read_found(&result.folder)?;
-            Ok(Part { name: result.name(), study, found })
+            let (study, results) = files::read_earlier(&result.folder)?;
+            Ok(Part { name: result.name(), study, results })
         };
         let parts: Vec<Part> = results.iter().map(read).collect::<Result<_>>()?;
         subprocess::check_comparable(differences(&parts), results)?;
-        let Some((study, found, moved)) = join(&parts) else {
+        let Some(Joined { study, results: joined, pictures }) = join(&parts) else {
             return Err(Error::usage("the plan has no shards"));
         };
         prepare_out_dir(out, *force)?;
@@ -79,11 +79,11 @@ impl Work for Study {
             let to = out.join(to);
             fs::copy(results[i_part].folder.join(from), &to).map_err(io_error(&to))
         };
-        for picture in &moved {
+        for picture in &pictures {
             copy(picture.i_part, &picture.from, &picture.to)?;
         }
         copy(0, "reference.png", "reference.png")?;
-        files::write(out, &study, &found)?;
+        files::write(out, &study, &joined)?;
         let chart = charts::error::chart(&study);
         let svg = chart.svg(chart.size())?;
         write_atomic(&out.join("front.svg"), |file| file.write_all(svg.as_bytes()))?;

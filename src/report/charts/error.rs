@@ -12,8 +12,10 @@ use super::medium::{INK, MUTED, Medium, series};
 use super::number::{number, with_interval};
 use super::overlap::place_labels;
 use super::plot_area::{Canvas, GridLines, MarkerFill, PlotArea};
-use crate::studies::error::records::{Configuration, Front, PictureError, Study};
-use crate::studies::provenance::Figure;
+use crate::studies::error::blocks::TimeKind;
+use crate::studies::error::front::{Front, Metric};
+use crate::studies::error::records::{Configuration, Study};
+use crate::studies::figure::Figure;
 
 /// Number of configurations on the front that are listed below the chart.
 const N_LISTED: usize = 14;
@@ -64,40 +66,33 @@ pub fn chart(study: &Study) -> ErrorChart {
         })
     };
     let points: Vec<Point> = study.configurations.iter().enumerate().filter_map(point).collect();
-    let time = if study.time == "gpu" { "GPU time" } else { "time" };
+    let time = if study.time == TimeKind::Gpu { "GPU time" } else { "time" };
     let reference = &study.reference.against;
     ErrorChart {
         time_name: format!("{time} of a frame, ms"),
-        error_name: format!("{} from the reference \"{reference}\"", metric_name(&study.metric)),
+        error_name: format!("{} from the reference \"{reference}\"", metric_name(study.metric)),
         n_missing: study.configurations.len() - points.len(),
         points,
     }
 }
 
 /// Returns the usual name of a metric.
-pub fn metric_name(metric: &str) -> &str {
+pub fn metric_name(metric: Metric) -> &'static str {
     match metric {
-        "rmse" => "RMSE",
-        "max" => "greatest difference",
-        "relmse" => "relMSE",
-        other => other,
+        Metric::Rmse => "RMSE",
+        Metric::Max => "greatest difference",
+        Metric::RelMse => "relMSE",
     }
 }
 
 /// Returns the time that a study compares, GPU or frame, ms.
 pub fn time_of(study: &Study, configuration: &Configuration) -> Option<Figure> {
-    if study.time == "gpu" { configuration.gpu_ms } else { configuration.frame_ms }
+    configuration.ms(study.time)
 }
 
 /// Returns the error that a study compares, by its metric.
 pub fn error_of(study: &Study, configuration: &Configuration) -> Option<Figure> {
-    let bare = |value| Figure { value, low: None, high: None };
-    let figure = |error: PictureError| match study.metric.as_str() {
-        "max" => bare(error.max),
-        "relmse" => bare(error.relmse),
-        _ => error.rmse,
-    };
-    configuration.error.map(figure)
+    configuration.error.map(|error| study.metric.of(&error))
 }
 
 /// Numbers the configurations on the front from 1, the fastest first.

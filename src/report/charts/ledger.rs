@@ -10,7 +10,7 @@ use super::medium::{INK, MUTED, series};
 use super::number::{number, with_interval};
 use super::plot_area::{Canvas, GridLines, PlotArea};
 use crate::studies::ledger::records::{Ledger, Row};
-use crate::studies::provenance::Figure;
+use crate::studies::figure::Figure;
 
 /// Bars begin this much below the smallest error, in decades, so that every bar has a length.
 const BELOW: f64 = 0.33;

@@ -11,8 +11,11 @@ use super::table::{Cell, count, figure, remark_list, table, text, value};
 use crate::error::Result;
 use crate::report::charts::error::{chart, error_of, front_numbers, metric_name, time_of};
 use crate::report::charts::number;
-use crate::studies::error::records::{Best, Configuration, Front, PictureError, Study};
-use crate::studies::provenance::Figure;
+use crate::studies::error::blocks::TimeKind;
+use crate::studies::error::front::Front;
+use crate::studies::error::records::{Best, Budget, Configuration, Study};
+use crate::studies::picture_error::PictureError;
+use crate::studies::figure::Figure;
 
 /// File name of the reference's picture.
 const REFERENCE_FILE: &str = "reference.png";
@@ -92,11 +95,11 @@ fn configurations(study: &Study) -> Markup {
         "relMSE",
         "remark",
     ];
-    let decides = if study.time == "gpu" { "GPU time" } else { "frame time" };
+    let decides = if study.time == TimeKind::Gpu { "GPU time" } else { "frame time" };
     let caption = format!(
         "Every configuration with 95 % intervals; {decides} and {} determine the front; № is the \
          number in the chart",
-        metric_name(&study.metric)
+        metric_name(study.metric)
     );
     table(&caption, &header, &rows)
 }
@@ -120,9 +123,9 @@ fn remark(error: Option<PictureError>) -> &'static str {
 fn best(study: &Study) -> Markup {
     let row = |b: &Best| -> Vec<Cell> {
         let found = b.configuration.and_then(|i| study.configurations.get(i));
-        let unit = match b.budget.as_str() {
-            "ms" => " ms".to_owned(),
-            _ => format!(" {}", metric_name(&study.metric)),
+        let unit = match b.budget {
+            Budget::Ms => " ms".to_owned(),
+            Budget::Error => format!(" {}", metric_name(study.metric)),
         };
         vec![
             text(&format!("at most {}{unit}", number(b.value))),
@@ -165,7 +168,7 @@ fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
             map.figure(&format!("Difference of {} from the reference", c.name), "difference")
         });
         let error = error_of(study, c).map_or(String::new(), |e: Figure| {
-            format!(", {} {}", metric_name(&study.metric), number(e.value))
+            format!(", {} {}", metric_name(study.metric), number(e.value))
         });
         match (picture, &reference) {
             (Some(picture), Some(reference)) => {

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use crate::report::charts::{number, with_interval};
-use crate::studies::provenance::Figure;
+use crate::studies::figure::Figure;
 use crate::timing::records::Measured;
 
 /// A cell of a table.

@@ -1,127 +1,120 @@
-//! Which configurations a study has: each knob's values alone, all combinations, or what was worth
-//! it put together.
+//! The configurations of a study: each value of each knob alone, or all combinations; then the
+//! worthwhile values combined. And the best configuration for a budget.
 
+use super::blocks::TimeKind;
 use super::front::Metric;
-use super::records::Configuration;
+use super::records::{Best, Budget, Configuration};
+use crate::studies::figure::Figure;
 use crate::timing::names::Setting;
-use crate::timing::names::sweep_text;
 use crate::timing::sweep::{Axis, points};
 
+/// How the values of knobs are combined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Design {
-    /// Each value of each knob, all others as they stand; then those that save time one on top of
-    /// the other.
+    /// Each value of each knob with all others as they stand; then those that save time, one on top
+    /// of the other.
     Alone,
     /// All combinations.
     Grid,
 }
 
-/// What the scene as it stands is called.
-pub const BASE: &str = "as it stands";
-
-/// What does not surely save this share of the time is not put together with others: of thirty
-/// settings that save nothing one in forty has an interval below 1 by chance, but hardly by so
-/// much.
+/// Least share of the time that a setting must surely save to be combined with others. By chance
+/// one in forty settings that save nothing has an interval below 1, but hardly by this much.
 const LEAST_SAVING: f64 = 0.02;
 
-/// "key=value, key=value".
-pub fn name_of(settings: &[Setting]) -> String {
-    if settings.is_empty() { BASE.to_owned() } else { sweep_text(settings) }
-}
-
-/// The settings of all configurations but the scene as it stands; some may come to the same as it.
+/// Returns the settings of all configurations but the scene as it stands; some can result in the
+/// same scene as it.
 pub fn settings(axes: &[Axis], design: Design) -> Vec<Vec<Setting>> {
     match design {
         Design::Grid => points(axes).into_iter().filter(|point| !point.is_empty()).collect(),
-        Design::Alone => {
-            let alone = |axis: &Axis| {
-                let key = axis.key.clone();
-                axis.values
-                    .clone()
-                    .into_iter()
-                    .map(move |value| vec![Setting { key: key.clone(), value }])
-            };
-            axes.iter().flat_map(alone).collect()
-        }
+        Design::Alone => axes.iter().flat_map(|axis| points(std::slice::from_ref(axis))).collect(),
     }
 }
 
-/// Single settings that save time, put together: first the one that costs the least error for what
-/// it saves, then the next on top of it. Where two are of one key the later one stands in place of
-/// the earlier, if it saves more. Squares of errors are taken to add up: what one setting errs
-/// knows nothing of what another does.
-pub fn together(found: &[Configuration], metric: Metric) -> Vec<Vec<Setting>> {
-    let Some(base) = found.first().and_then(|base| metric.of(base)) else { return Vec::new() };
-    let least = base.value.powi(2);
+/// Returns combinations of the single settings that save time: first the one with the least added
+/// error for the time that it saves, then the next on top of it, and so on.
+///
+/// If two settings have the same key, the later one replaces the earlier if it saves more. Squared
+/// errors are assumed to add up, because the errors of different settings are independent.
+pub fn combinations(measured: &[Configuration], metric: Metric) -> Vec<Vec<Setting>> {
+    let error = |c: &Configuration| Some(metric.of(&c.error?).value);
+    let Some(base) = measured.first().and_then(error) else { return Vec::new() };
     let mut worth: Vec<(f64, f64, &Setting)> = Vec::new();
-    for configuration in &found[1..] {
-        let ([setting], Some(ratio), Some(error)) =
-            (&configuration.settings[..], configuration.by_base, metric.of(configuration))
-        else {
+    for c in &measured[1..] {
+        let ([setting], Some(ratio), Some(error)) = (&c.settings[..], c.by_base, error(c)) else {
             continue;
         };
-        if ratio.high.is_some_and(|high| high < 1.0 - LEAST_SAVING) && error.value.is_finite() {
-            let added = (error.value.powi(2) - least).max(0.0);
+        if ratio.high.is_some_and(|high| high < 1.0 - LEAST_SAVING) && error.is_finite() {
+            let added = (error.powi(2) - base.powi(2)).max(0.0);
             worth.push((added / (1.0 - ratio.value), ratio.value, setting));
         }
     }
     worth.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (mut taken, mut all): (Vec<(f64, Setting)>, Vec<Vec<Setting>>) = (Vec::new(), Vec::new());
+    let (mut taken, mut all): (Vec<(f64, &Setting)>, Vec<Vec<Setting>>) = (Vec::new(), Vec::new());
     for (_, ratio, setting) in worth {
         match taken.iter_mut().find(|(_, t)| t.key == setting.key) {
             Some((before, _)) if *before <= ratio => continue,
-            Some(place) => *place = (ratio, setting.clone()),
-            None => taken.push((ratio, setting.clone())),
+            Some(place) => *place = (ratio, setting),
+            None => taken.push((ratio, setting)),
         }
         if taken.len() > 1 {
-            all.push(taken.iter().map(|(_, setting)| setting.clone()).collect());
+            all.push(taken.iter().map(|(_, setting)| (*setting).clone()).collect());
         }
     }
     all
 }
 
+/// Returns the configuration with the least error within a time of `value` ms, or the least time
+/// within an error of `value`; of equal ones the better in the other quantity.
+pub fn best_within(
+    configurations: &[Configuration],
+    metric: Metric,
+    time: TimeKind,
+    budget: Budget,
+    value: f64,
+) -> Best {
+    let limited_and_free = |c: &Configuration| {
+        let figures = [c.ms(time)?, metric.of(&c.error?)].map(|f: Figure| f.value);
+        Some(if budget == Budget::Ms { figures } else { [figures[1], figures[0]] })
+    };
+    let all = configurations.iter().enumerate();
+    let within = all.filter_map(|(i, c)| Some((i, limited_and_free(c)?)));
+    let best = within
+        .filter(|(_, [limited, _])| *limited <= value)
+        .min_by(|(_, a), (_, b)| a[1].total_cmp(&b[1]).then(a[0].total_cmp(&b[0])));
+    Best { budget, value, configuration: best.map(|(i, _)| i) }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::records::{Front, PictureError};
     use super::*;
-    use crate::studies::provenance::Figure;
+    use crate::studies::error::records::name_of;
+    use crate::studies::picture_error::PictureError;
 
     fn setting(text: &str) -> Setting {
         let (key, value) = text.split_once('=').unwrap();
         Setting { key: key.to_owned(), value: value.to_owned() }
     }
 
-    /// A setting whose time is `ratio` of the scene's, surely so, with RMSE `error`.
-    fn found(text: &str, ratio: f64, error: f64) -> Configuration {
+    /// A setting that surely takes `ratio` of the scene's time, with RMSE `error`.
+    fn measured(text: &str, ratio: f64, error: f64) -> Configuration {
         let figure = |value: f64, spread: f64| Figure {
             value,
             low: Some(value - spread),
             high: Some(value + spread),
         };
         let settings: Vec<Setting> = if text.is_empty() { vec![] } else { vec![setting(text)] };
+        let error =
+            PictureError { rmse: figure(error, 0.0), max: error, relmse: error, is_resolved: true };
         Configuration {
-            name: name_of(&settings),
-            settings,
-            hash: String::new(),
-            gpu_ms: None,
-            frame_ms: None,
             by_base: Some(figure(ratio, 0.05)),
-            n_turns: 8,
-            error: Some(PictureError {
-                rmse: figure(error, 0.0),
-                max: error,
-                relmse: error,
-                is_resolved: true,
-            }),
-            front: Front::Unknown,
-            failure: None,
-            picture: None,
-            error_map: None,
+            error: Some(error),
+            ..Configuration::new(settings, String::new())
         }
     }
 
     #[test]
-    fn alone_or_all_combinations() {
+    fn settings_are_each_value_alone_or_all_combinations() {
         let axes = ["a=1,2", "b=3,4,5"].map(|text| Axis::parse("--knob", text).unwrap());
         let alone: Vec<String> =
             settings(&axes, Design::Alone).iter().map(|s| name_of(s)).collect();
@@ -132,30 +125,33 @@ mod tests {
     }
 
     #[test]
-    fn what_costs_least_for_what_it_saves_comes_first() {
+    fn the_setting_with_the_least_error_for_its_saving_comes_first() {
         // Added squares by saved shares: a 3e-4/0.4, b=1 0/0.1, b=2 8e-4/0.5; c is not surely
         // faster, d is slower.
         let all = [
-            found("", 1.0, 0.1),
-            found("a=1", 0.6, (0.01f64 + 3e-4).sqrt()),
-            found("b=1", 0.9, 0.1),
-            found("b=2", 0.5, (0.01f64 + 8e-4).sqrt()),
-            found("c=1", 0.97, 0.1),
-            found("d=1", 1.5, 0.01),
+            measured("", 1.0, 0.1),
+            measured("a=1", 0.6, (0.01f64 + 3e-4).sqrt()),
+            measured("b=1", 0.9, 0.1),
+            measured("b=2", 0.5, (0.01f64 + 8e-4).sqrt()),
+            measured("c=1", 0.97, 0.1),
+            measured("d=1", 1.5, 0.01),
         ];
-        let names: Vec<String> = together(&all, Metric::Rmse).iter().map(|s| name_of(s)).collect();
+        let names: Vec<String> =
+            combinations(&all, Metric::Rmse).iter().map(|s| name_of(s)).collect();
         assert_eq!(names, ["b=1, a=1", "b=2, a=1"]);
-        // What saves less than the same knob's other value already taken is left out.
+        // A value that saves less than another value of its knob that was taken is left out.
         let all = [
-            found("", 1.0, 0.1),
-            found("b=2", 0.5, 0.1),
-            found("b=1", 0.9, 0.2),
-            found("a=1", 0.5, 0.3),
+            measured("", 1.0, 0.1),
+            measured("b=2", 0.5, 0.1),
+            measured("b=1", 0.9, 0.2),
+            measured("a=1", 0.5, 0.3),
         ];
-        let names: Vec<String> = together(&all, Metric::Rmse).iter().map(|s| name_of(s)).collect();
+        let names: Vec<String> =
+            combinations(&all, Metric::Rmse).iter().map(|s| name_of(s)).collect();
         assert_eq!(names, ["b=2, a=1"]);
         assert!(
-            together(&all[..2], Metric::Rmse).is_empty() && together(&[], Metric::Rmse).is_empty()
+            combinations(&all[..2], Metric::Rmse).is_empty()
+                && combinations(&[], Metric::Rmse).is_empty()
         );
     }
 }

@@ -1,6 +1,7 @@
-//! A study on disk: `study.json`, `configurations.csv`, `times.csv` and pictures. Written after
-//! every round, so that whatever ends a run early leaves what was finished, and a later run goes on
-//! from there.
+//! A study on disk: `study.json`, `configurations.csv`, `times.csv` and pictures.
+//!
+//! The files are written after every round, so that a study that ends early keeps its results and
+//! can be resumed.
 
 use std::fs;
 use std::io::Write;
@@ -8,22 +9,27 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::records::{Configuration, Front, STUDY_FILE, Study, TIMES_FILE};
-use super::run::Found;
-use super::turns::Turn;
+use super::blocks::TimedBlock;
+use super::front::Front;
+use super::records::{Configuration, Study};
+use super::study::StudyResults;
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::io::folder::replace_files;
 use crate::io::text_file::{TABLE_LIMIT, read_result};
-use crate::studies::provenance::Figure;
-use crate::timing::json;
+use crate::studies::figure::Figure;
+use crate::timing::json::{self, ResultFile};
 
+/// File name of the table of configurations.
 pub const CONFIGURATIONS_FILE: &str = "configurations.csv";
+/// File name of the table of all times.
+pub const TIMES_FILE: &str = "times.csv";
 
-/// A frame of times.csv.
+/// A frame in `times.csv`.
 #[derive(Debug, Serialize, Deserialize)]
 struct TimeRow {
     round: usize,
+    /// Number of the block.
     turn: usize,
     configuration: usize,
     name: String,
@@ -31,16 +37,23 @@ struct TimeRow {
     frame_ms: f64,
 }
 
-/// Writes the study and its tables; all of them, or none.
-pub fn write(folder: &Path, study: &Study, found: &Found) -> Result<()> {
-    replace_files(folder, &[TIMES_FILE, CONFIGURATIONS_FILE, STUDY_FILE], |folder| {
-        write_times(&folder.join(TIMES_FILE), study, &found.turns)?;
+/// Writes the study and its tables, all together or not at all.
+///
+/// # Errors
+/// Fails if a file cannot be written.
+pub fn write(folder: &Path, study: &Study, results: &StudyResults) -> Result<()> {
+    replace_files(folder, &[TIMES_FILE, CONFIGURATIONS_FILE, Study::FILE], |folder| {
+        let rows = results.blocks.iter().enumerate().flat_map(|(i, b)| time_rows(study, i, b));
+        write_csv(&folder.join(TIMES_FILE), rows)?;
         write_csv(&folder.join(CONFIGURATIONS_FILE), study.configurations.iter().map(csv_row))?;
-        json::write(&folder.join(STUDY_FILE), study)
+        json::write(&folder.join(Study::FILE), study)
     })
 }
 
-/// Takes the pictures and charts of an earlier study out of a folder that a new one takes over.
+/// Removes the pictures and charts of an earlier study from a folder.
+///
+/// # Errors
+/// Fails if the folder cannot be read or a file cannot be removed.
 pub fn remove_earlier(folder: &Path) -> Result<()> {
     let is_ours = |name: &str| {
         let number = |begin| name.strip_prefix(begin).and_then(|rest| rest.strip_suffix(".png"));
@@ -57,23 +70,17 @@ pub fn remove_earlier(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-fn write_times(path: &Path, study: &Study, turns: &[Turn]) -> Result<()> {
-    let of_turn = |(i_turn, turn): (usize, &Turn)| {
-        let name = study
-            .configurations
-            .get(turn.i_configuration)
-            .map_or(String::new(), |c| c.name.clone());
-        let row = |(k, frame_ms): (usize, &f64)| TimeRow {
-            round: turn.i_round,
-            turn: i_turn,
-            configuration: turn.i_configuration,
-            name: name.clone(),
-            gpu_ms: turn.gpu_ms.get(k).copied(),
-            frame_ms: *frame_ms,
-        };
-        turn.frame_ms.iter().enumerate().map(row).collect::<Vec<_>>()
+fn time_rows(study: &Study, i_block: usize, block: &TimedBlock) -> Vec<TimeRow> {
+    let configuration = study.configurations.get(block.i_configuration);
+    let row = |(k, frame_ms): (usize, &f64)| TimeRow {
+        round: block.i_round,
+        turn: i_block,
+        configuration: block.i_configuration,
+        name: configuration.map_or(String::new(), |c| c.name.clone()),
+        gpu_ms: block.gpu_ms.get(k).copied(),
+        frame_ms: *frame_ms,
     };
-    write_csv(path, turns.iter().enumerate().flat_map(of_turn))
+    block.frame_ms.iter().enumerate().map(row).collect()
 }
 
 fn write_csv<T: Serialize>(path: &Path, rows: impl Iterator<Item = T>) -> Result<()> {
@@ -85,7 +92,7 @@ fn write_csv<T: Serialize>(path: &Path, rows: impl Iterator<Item = T>) -> Result
     write_atomic(path, |file| file.write_all(&bytes))
 }
 
-/// A configuration as a row, for programs.
+/// A configuration as a row of `configurations.csv`.
 #[derive(Debug, Serialize)]
 pub struct CsvRow {
     name: String,
@@ -109,26 +116,29 @@ pub struct CsvRow {
     failure: Option<String>,
 }
 
+/// Returns a configuration as a row.
 pub fn csv_row(c: &Configuration) -> CsvRow {
-    let value = |f: Option<Figure>| f.map(|f| f.value);
-    let low = |f: Option<Figure>| f.and_then(|f| f.low);
-    let high = |f: Option<Figure>| f.and_then(|f| f.high);
-    let rmse = c.error.map(|e| e.rmse);
+    let fields =
+        |f: Option<Figure>| [f.map(|f| f.value), f.and_then(|f| f.low), f.and_then(|f| f.high)];
+    let [gpu_ms, gpu_ms_low, gpu_ms_high] = fields(c.gpu_ms);
+    let [frame_ms, frame_ms_low, frame_ms_high] = fields(c.frame_ms);
+    let [by_base, by_base_low, by_base_high] = fields(c.by_base);
+    let [rmse, rmse_low, rmse_high] = fields(c.error.map(|e| e.rmse));
     CsvRow {
         name: c.name.clone(),
         front: c.front,
-        gpu_ms: value(c.gpu_ms),
-        gpu_ms_low: low(c.gpu_ms),
-        gpu_ms_high: high(c.gpu_ms),
-        frame_ms: value(c.frame_ms),
-        frame_ms_low: low(c.frame_ms),
-        frame_ms_high: high(c.frame_ms),
-        by_base: value(c.by_base),
-        by_base_low: low(c.by_base),
-        by_base_high: high(c.by_base),
-        rmse: value(rmse),
-        rmse_low: low(rmse),
-        rmse_high: high(rmse),
+        gpu_ms,
+        gpu_ms_low,
+        gpu_ms_high,
+        frame_ms,
+        frame_ms_low,
+        frame_ms_high,
+        by_base,
+        by_base_low,
+        by_base_high,
+        rmse,
+        rmse_low,
+        rmse_high,
         max: c.error.map(|e| e.max),
         relmse: c.error.map(|e| e.relmse),
         reference_resolves: c.error.map(|e| e.is_resolved),
@@ -137,54 +147,54 @@ pub fn csv_row(c: &Configuration) -> CsvRow {
     }
 }
 
-/// What no study writes: rounds are counted from 0, and what took no finite time was not timed.
-fn check_row(row: &TimeRow) -> std::result::Result<(), String> {
+/// Rejects rows that no study writes: times are finite, and rounds are numbered from 0.
+fn check_row(row: &TimeRow, n_configurations: usize) -> std::result::Result<(), String> {
+    let TimeRow { round, turn, configuration, .. } = row;
+    if *configuration >= n_configurations {
+        return Err(format!("names configuration {configuration}; {} has none such", Study::FILE));
+    }
     let times = [Some(row.frame_ms), row.gpu_ms];
     if let Some(ms) = times.into_iter().flatten().find(|ms| !ms.is_finite()) {
-        return Err(format!("turn {}: expected a finite time in ms, found {ms}", row.turn));
+        return Err(format!("turn {turn}: expected a finite time in ms, found {ms}"));
     }
-    if u32::try_from(row.round).is_err() {
-        return Err(format!(
-            "turn {}: expected a round from 0 to {}, found {}",
-            row.turn,
-            u32::MAX,
-            row.round
-        ));
+    match u32::try_from(*round) {
+        Ok(_) => Ok(()),
+        Err(_) => {
+            Err(format!("turn {turn}: expected a round from 0 to {}, found {round}", u32::MAX))
+        }
     }
-    Ok(())
 }
 
-/// What an earlier run in `folder` found, to be gone on with.
-pub fn read_found(folder: &Path) -> Result<(Study, Found)> {
+/// Reads the results of an earlier run in `folder`, so that it can be resumed.
+///
+/// # Errors
+/// Fails if a file is missing or damaged, or the two do not belong together.
+pub fn read_earlier(folder: &Path) -> Result<(Study, StudyResults)> {
     let study = json::read(folder)?;
     let path = folder.join(TIMES_FILE);
-    parse_found(study, &read_result(&path, TABLE_LIMIT)?, &path)
+    parse_earlier(study, &read_result(&path, TABLE_LIMIT)?, &path)
 }
 
-/// The same of a study and the text of its `times.csv`; `path` is for messages.
-pub fn parse_found(study: Study, text: &str, path: &Path) -> Result<(Study, Found)> {
+/// Joins a study with the text of its `times.csv`; errors name `path`.
+///
+/// # Errors
+/// Fails if the text is not such a table or not that of the study.
+pub fn parse_earlier(study: Study, text: &str, path: &Path) -> Result<(Study, StudyResults)> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
-    let mut turns: Vec<Turn> = Vec::new();
+    let mut blocks: Vec<TimedBlock> = Vec::new();
     let mut i_last = None;
     for row in reader.deserialize::<TimeRow>() {
         let row = row.map_err(|cause| Error::io(path, cause))?;
-        if row.configuration >= study.configurations.len() {
-            return Err(Error::io(
-                path,
-                format!("names configuration {}; {STUDY_FILE} has none such", row.configuration),
-            ));
-        }
-        check_row(&row).map_err(|what| Error::io(path, what))?;
+        check_row(&row, study.configurations.len()).map_err(|what| Error::io(path, what))?;
         if i_last.replace(row.turn) != Some(row.turn) {
-            let (i_configuration, i_round) = (row.configuration, row.round);
-            turns.push(Turn { i_configuration, i_round, gpu_ms: Vec::new(), frame_ms: Vec::new() });
+            blocks.push(TimedBlock::new(row.configuration, row.round));
         }
-        if let Some(turn) = turns.last_mut() {
-            turn.gpu_ms.extend(row.gpu_ms);
-            turn.frame_ms.push(row.frame_ms);
+        if let Some(block) = blocks.last_mut() {
+            block.gpu_ms.extend(row.gpu_ms);
+            block.frame_ms.push(row.frame_ms);
         }
     }
-    let n_rounds = turns.iter().map(|turn| turn.i_round + 1).max().unwrap_or(0);
+    let n_rounds = blocks.iter().map(|block| block.i_round + 1).max().unwrap_or(0);
     let configurations = study.configurations.clone();
-    Ok((study, Found { configurations, turns, n_rounds }))
+    Ok((study, StudyResults { configurations, blocks, n_rounds }))
 }

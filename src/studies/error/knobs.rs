@@ -1,11 +1,11 @@
-//! The knobs that are turned where none is named, each where it can change anything of the scene.
+//! The knobs of a study for which none is named: those that can change the scene.
 
 use glam::DVec3;
 
 use crate::model::scene::{LightingMode, Scene};
 use crate::timing::sweep::Axis;
 
-/// A key of scenes, and values worth comparing.
+/// A scene key, the values worth comparing, and the scenes that it can change.
 struct Knob {
     key: &'static str,
     values: &'static [&'static str],
@@ -48,7 +48,7 @@ const KNOBS: [Knob; 17] = [
     Knob { key: "lighting.sampling", values: &["log", "uniform"], applies: is_glossy },
 ];
 
-/// The axes of a scene for which none is named.
+/// Returns the knobs that can change `scene`, with their values.
 pub fn default_axes(scene: &Scene) -> Vec<Axis> {
     let axis = |knob: &Knob| Axis {
         key: knob.key.to_owned(),
@@ -65,7 +65,7 @@ fn has_surfaces(scene: &Scene) -> bool {
     !scene.surfaces.is_empty()
 }
 
-/// 0 where nothing is lit.
+/// Returns the number of reflections; 0 if nothing is lit.
 fn reflections(scene: &Scene) -> u32 {
     match scene.lighting.mode {
         LightingMode::None => 0,
@@ -74,7 +74,7 @@ fn reflections(scene: &Scene) -> u32 {
     }
 }
 
-/// Whether light comes through a density grid.
+/// Returns whether light is marched through a density grid.
 fn marches(scene: &Scene) -> bool {
     reflections(scene) > 0 && has_particles(scene)
 }
@@ -91,7 +91,7 @@ fn is_lit_surface(scene: &Scene) -> bool {
     has_surfaces(scene) && reflections(scene) > 0
 }
 
-/// Whether a lobe is gathered, for which the basis is.
+/// Returns whether the second reflection has lobes, which the basis represents.
 fn is_glossy(scene: &Scene) -> bool {
     let shines =
         |i: usize| scene.region_material(i).keys.iter().any(|key| key.brdf.ks != DVec3::ZERO);

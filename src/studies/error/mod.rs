@@ -1,17 +1,16 @@
-//! Run time against error over the knobs of a scene: every configuration is drawn once and compared
-//! with a reference, and all are timed in turn with the scene as it stands.
+//! Error studies: run time against error over the knobs of a scene.
 //!
-//! [`knobs`] say what is varied, [`design`] which configurations that makes, [`errors`] and
-//! [`turns`] measure each, [`front`] says which are worth having, [`run`] does all of it and
-//! [`files`] keeps it.
+//! Every configuration of the [`knobs`] ([`design`]) is drawn once and compared with a reference;
+//! all are timed in alternating [`blocks`], on the device ([`device_runner`]). [`study`] runs it
+//! all, [`front`] says which configurations are worth having, [`files`] writes and reads the
+//! [`records`], and [`parts`] joins studies that several nodes made.
 
+pub mod blocks;
 pub mod design;
-pub mod errors;
+pub mod device_runner;
 pub mod files;
 pub mod front;
 pub mod knobs;
 pub mod parts;
-pub mod players;
 pub mod records;
-pub mod run;
-pub mod turns;
+pub mod study;

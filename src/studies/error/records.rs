@@ -1,36 +1,40 @@
-//! `study.json`: what `nimbus error` found. Its form is docs/study.schema.json; a change of
-//! meaning, or of a key, raises [`SCHEMA_VERSION`].
+//! The types of `study.json`, the record of `nimbus error`, which docs/study.schema.json describes.
 
 use serde::{Deserialize, Serialize};
 
-use crate::studies::provenance::{Figure, Provenance, ReferenceRecord};
+use super::blocks::TimeKind;
+use super::front::{Front, Metric};
+use crate::studies::figure::Figure;
+use crate::studies::picture_error::PictureError;
+use crate::studies::provenance::{Provenance, ReferenceRecord};
 use crate::timing::json::ResultFile;
-use crate::timing::names::Setting;
+use crate::timing::names::{Setting, sweep_text};
 
-pub const STUDY_FILE: &str = Study::FILE;
-/// Every time that was taken, raw.
-pub const TIMES_FILE: &str = "times.csv";
-
+/// The whole of `study.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Study {
+    /// Conditions of the study.
     #[serde(flatten)]
     pub made: Provenance,
+    /// The reference that pictures are compared with.
     pub reference: ReferenceRecord,
-    /// The error that decides who is on the front: "rmse", "max" or "relmse".
-    pub metric: String,
-    /// The time that does: "gpu" or "frame".
-    pub time: String,
-    /// Times the configurations were all timed in turn.
+    /// The error that decides which configurations are on the front.
+    pub metric: Metric,
+    /// The time that decides it.
+    pub time: TimeKind,
+    /// Rounds in which all configurations were timed.
     pub rounds: usize,
     /// Timed frames of a configuration in a round.
     pub frames: u32,
-    /// Frames leave out what did not change, as when the scene is played; else everything moves.
+    /// Whether frames skip the work that the scene lets them skip; else everything moves in each.
     pub as_played: bool,
-    /// The shaders are those of a folder and not the build's.
+    /// Whether the shaders are those of a folder instead of the build's.
     pub own_shaders: bool,
-    /// The first is the scene as it stands, which the others' times are measured by.
+    /// All configurations. The first is the scene as it stands, which times are relative to.
     pub configurations: Vec<Configuration>,
+    /// The best configuration for each budget.
     pub best: Vec<Best>,
+    /// Whether the study ended early.
     pub interrupted: bool,
 }
 
@@ -39,68 +43,86 @@ impl ResultFile for Study {
     const SCHEMA: u32 = 1;
 }
 
+/// Name of the configuration without settings, the scene as it stands.
+pub const BASE: &str = "as it stands";
+
 /// One setting of the knobs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
-    /// "key=value, key=value"; of the scene as it stands "as it stands".
+    /// "key=value, key=value", or [`BASE`].
     pub name: String,
     /// The keys that differ from the scene as it stands.
     pub settings: Vec<Setting>,
     /// SHA-256 of its resolved scene and files.
     pub hash: String,
-    /// ms of a frame: that of the scene as it stands times `by_base`; none where the device has no
-    /// timestamps.
+    /// Device time of a frame in ms: that of the scene as it stands times `by_base`; none if the
+    /// device has no timestamps.
     pub gpu_ms: Option<Figure>,
-    /// ms of a frame, game step to finished picture, in the same way.
+    /// Time of a frame in ms, from the game step to the finished picture, computed in the same way.
     pub frame_ms: Option<Figure>,
-    /// Its time (of `Study::time`) by that of the scene as it stands, taken in turn with it.
+    /// Its time (see [`Study::time`]) divided by that of the scene as it stands.
     pub by_base: Option<Figure>,
-    /// Turns that it was timed in.
+    /// Timed blocks.
     pub n_turns: usize,
+    /// Error of its picture; none before it was drawn.
     pub error: Option<PictureError>,
+    /// Place relative to the other configurations.
     pub front: Front,
     /// Why it could not be run.
     pub failure: Option<String>,
-    /// Its picture as a PNG file beside study.json.
+    /// File name of its picture, a PNG beside `study.json`.
     pub picture: Option<String>,
-    /// Where its picture differs from the reference and by how much: a PNG file.
+    /// File name of the map of its error, a PNG.
     pub error_map: Option<String>,
 }
 
-/// How far a picture is from the reference, over premultiplied linear red, green, blue and alpha.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct PictureError {
-    /// Root mean square; its interval is over the picture's parts, and no narrower than the
-    /// reference's own error.
-    pub rmse: Figure,
-    pub max: f64,
-    /// Mean of squares relative to the reference's (`measure::picture`).
-    pub relmse: f64,
-    /// Whether the reference's own error is at most a tenth of `rmse`.
-    pub is_resolved: bool,
+impl Configuration {
+    /// Returns a configuration that was neither drawn nor timed yet.
+    pub fn new(settings: Vec<Setting>, hash: String) -> Configuration {
+        Configuration {
+            name: name_of(&settings),
+            settings,
+            hash,
+            gpu_ms: None,
+            frame_ms: None,
+            by_base: None,
+            n_turns: 0,
+            error: None,
+            front: Front::Unknown,
+            failure: None,
+            picture: None,
+            error_map: None,
+        }
+    }
+
+    /// Returns its time of the given kind in ms.
+    pub fn ms(&self, time: TimeKind) -> Option<Figure> {
+        if time == TimeKind::Gpu { self.gpu_ms } else { self.frame_ms }
+    }
 }
 
-/// Where a configuration lies among all.
+/// Returns the settings as "key=value, key=value"; [`BASE`] if there are none.
+pub fn name_of(settings: &[Setting]) -> String {
+    if settings.is_empty() { BASE.to_owned() } else { sweep_text(settings) }
+}
+
+/// A quantity that is limited while the other one is minimized.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Front {
-    /// None is better, as the figures stand: at most as long and as far off, and one of the two
-    /// less.
-    On,
-    /// Some are, but none is faster by more than the intervals.
-    Near,
-    /// One is, and faster by more than the intervals.
-    Off,
-    /// It has no time or no error.
-    Unknown,
+#[serde(rename_all = "lowercase")]
+pub enum Budget {
+    /// Time, in ms.
+    Ms,
+    /// Error, by [`Study::metric`].
+    Error,
 }
 
-/// What a budget buys.
+/// The best configuration within a budget.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Best {
-    /// "ms" or "error".
-    pub budget: String,
+    /// The limited quantity.
+    pub budget: Budget,
+    /// The limit.
     pub value: f64,
-    /// Which of `configurations`; none where no one is within.
+    /// Its place in [`Study::configurations`]; none if no configuration is within the limit.
     pub configuration: Option<usize>,
 }

@@ -1,35 +1,40 @@
-//! `ledger.json`: what `nimbus ledger` found. Its form is docs/ledger.schema.json; a change of
-//! meaning, or of a key, raises [`SCHEMA_VERSION`].
+//! The types of `ledger.json`, which docs/ledger.schema.json describes.
 
 use serde::{Deserialize, Serialize};
 
-use crate::studies::provenance::{Figure, Provenance};
+use crate::studies::figure::Figure;
+use crate::studies::provenance::Provenance;
 use crate::timing::json::ResultFile;
 
-pub const LEDGER_FILE: &str = Ledger::FILE;
-
+/// The whole of `ledger.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
+    /// Conditions of the study.
     #[serde(flatten)]
     pub made: Provenance,
+    /// Frame number.
     pub frame: u32,
+    /// Scene time in seconds.
     pub time_s: f64,
+    /// Width of the picture in pixels.
     pub width: u32,
+    /// Height of the picture in pixels.
     pub height: u32,
     /// Pixels that pictures are compared at.
     pub n_pixels: usize,
-    /// Root mean square of the last row's truth: what relative errors are relative to.
+    /// Root mean square of the last picture, which relative errors are relative to.
     pub magnitude: f64,
-    /// From the picture as it is drawn down to the whole model.
+    /// The approximations, from the picture as it is drawn to the whole model.
     pub rows: Vec<Row>,
-    /// RMSE of the picture as it is drawn by the last truth.
+    /// RMSE of the picture as it is drawn against the last picture.
     pub total: Figure,
-    /// Of all rows' errors.
+    /// Sum of the errors of all rows.
     pub sum: f64,
-    /// Root of the sum of their squares: what the total is where they know nothing of each other.
+    /// Root of the sum of their squares, which is the total of independent errors.
     pub quadrature: f64,
-    /// total ≤ sum, but for rounding: anything else is a fault of nimbus.
+    /// Whether total ≤ sum but for rounding; false means a fault of nimbus.
     pub holds: bool,
+    /// Whether the study ended early.
     pub interrupted: bool,
 }
 
@@ -41,21 +46,23 @@ impl ResultFile for Ledger {
 /// One approximation: two pictures that differ in nothing else.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
-    /// Short, such as "cutoff".
+    /// Short name, such as "cutoff".
     pub name: String,
-    /// What it is, and what it stands for: "3 σ", "6 σ".
+    /// The approximation, such as "3 σ".
     pub from: String,
+    /// The value that it stands for, such as "6 σ".
     pub to: String,
     /// RMSE over premultiplied linear red, green, blue and alpha.
     pub error: Figure,
-    /// By `Ledger::magnitude`.
+    /// `error` divided by [`Ledger::magnitude`].
     pub relative: f64,
-    /// Of the sum of all rows.
+    /// Share of the sum of all rows.
     pub share: f64,
-    /// What the two pictures' own errors may make of `error`: its root mean square.
+    /// Sum of the root mean square errors that the two pictures have themselves.
     pub own_error: f64,
     /// Whether `own_error` is at most a tenth of `error`.
     pub is_resolved: bool,
-    /// GPU time of a frame with it by that without, where both are drawn by the device.
+    /// Device time of a frame with the approximation divided by that without, if the device draws
+    /// both.
     pub time_ratio: Option<Figure>,
 }

@@ -13,7 +13,7 @@ use super::request::{ProbeRequest, ReferencePicture};
 use crate::error::Result;
 use crate::model::scene::Scene;
 use crate::reference::picture::{Pixels, Reference, RenderStage};
-use crate::studies::reference_cache::{self, Kept};
+use crate::studies::reference_cache::{self, CachedReference};
 use crate::viewer::sync::lock;
 
 /// Progress of the reference that is being computed.
@@ -179,7 +179,7 @@ impl Worker {
         };
         let (request, folder) = (job.request.clone(), self.cache_folder.as_deref());
         let (kind, time_s) = (request.kind, request.time_s);
-        let Kept { reference, from_cache, .. } = self.pool.install(|| {
+        let CachedReference { reference, from_cache, .. } = self.pool.install(|| {
             reference_cache::reference(kind, &job.scene, time_s, &pixels, folder, &on_progress)
         })?;
         let picture = Arc::new(ReferencePicture { request, pixels, reference, from_cache });

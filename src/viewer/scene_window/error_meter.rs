@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::render_links::Readback;
 use super::status::{ErrorStatus, ViewStatus};
 use super::view_state::ViewState;
-use crate::studies::error::records::PictureError;
+use crate::studies::picture_error::PictureError;
 use crate::studies::reference_cache::default_folder;
 use crate::viewer::error_probe::{ErrorProbe, ProbeRequest, ProbeStatus, ReferencePicture};
 use crate::viewer::fly_camera::FlyCamera;

@@ -8,7 +8,7 @@ use crate::frame::FrameTimes;
 use crate::frame::plan::Plan;
 use crate::gpu::PresentMode;
 use crate::model::scene::Threading;
-use crate::studies::error::records::PictureError;
+use crate::studies::picture_error::PictureError;
 use crate::viewer::error_probe::ProbeStatus;
 
 /// Status of the scene window.

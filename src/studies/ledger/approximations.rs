@@ -1,5 +1,4 @@
-//! The approximations that the device itself can leave out, one after the other: what each is in a
-//! scene, and what it stands for.
+//! The approximations that the device itself can do without.
 
 use crate::frame::{gathers_from_tree, is_glossy};
 use crate::model::basis::MAX_BASES;
@@ -9,92 +8,92 @@ use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, DrawPath, Gather, LightingMode, Scene};
 use crate::model::sort_bits::SortBits;
 
-/// An approximation, and the scene without it.
-pub struct Step {
+/// An approximation of the scene, and the scene without it.
+pub struct Approximation {
+    /// Short name.
     pub name: &'static str,
+    /// The setting in the scene, in words.
     pub from: String,
+    /// The setting without the approximation.
     pub to: String,
+    /// The scene without it.
     pub without: Scene,
 }
 
-/// Nothing of a blob is cut there: e^{−32} of its depth are left.
+/// Cutoff in σ beyond which e^{−32} of a blob's depth is left.
 const UNCUT: f64 = 8.0;
 
-/// Those of `scene`, in which nothing is "auto", each on top of the one before.
-pub fn steps(scene: &Scene) -> Vec<Step> {
-    let mut steps: Vec<Step> = Vec::new();
+/// Returns the approximations of `scene`, in which nothing is "auto". Each scene also lacks the
+/// approximations before it.
+pub fn approximations(scene: &Scene) -> Vec<Approximation> {
+    let mut found: Vec<Approximation> = Vec::new();
     let mut now = scene.clone();
-    for (name, what, describe, lift) in ALL {
-        if !what.is_in(scene) {
-            continue;
-        }
+    for (name, part, describe, remove) in ALL {
         let mut without = now.clone();
-        lift(&mut without);
-        if without != now {
-            steps.push(Step {
-                name,
-                from: describe(&now),
-                to: describe(&without),
-                without: without.clone(),
-            });
+        remove(&mut without);
+        if part.is_in(scene) && without != now {
+            let (from, to) = (describe(&now), describe(&without));
+            found.push(Approximation { name, from, to, without: without.clone() });
             now = without;
         }
     }
-    steps
+    found.extend(ungrouped(&now));
+    found
 }
 
-/// What of a scene an approximation is of.
+/// The part of a scene that an approximation affects.
 #[derive(Clone, Copy)]
-enum What {
+enum Part {
     Picture,
     Particles,
-    Second,
+    SecondReflection,
     Lobes,
 }
 
-impl What {
+impl Part {
     fn is_in(self, scene: &Scene) -> bool {
-        let second = scene.lighting.mode == LightingMode::TwoReflection;
+        let has_second = scene.lighting.mode == LightingMode::TwoReflection;
         match self {
-            What::Picture => true,
-            What::Particles => scene.n_particles() > 0,
-            What::Second => second,
-            What::Lobes => second && (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
+            Part::Picture => true,
+            Part::Particles => scene.n_particles() > 0,
+            Part::SecondReflection => has_second,
+            Part::Lobes => has_second && (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
         }
     }
 }
 
-/// How a scene has it, in words.
+/// Describes the setting of a scene in words.
 type Describe = fn(&Scene) -> String;
-type Lift = fn(&mut Scene);
+/// Removes an approximation from a scene.
+type Remove = fn(&mut Scene);
 
-/// From what is drawn last up to what light is made of.
-const ALL: [(&str, What, Describe, Lift); 10] = [
+/// The approximations in order: drawing first, the sources of light last.
+const ALL: [(&str, Part, Describe, Remove); 10] = [
     (
         "resolution",
-        What::Particles,
+        Part::Particles,
         |s| s.draw.resolution.name().into(),
         |s| s.draw.resolution = Resolution::Full,
     ),
     (
         "smallest",
-        What::Particles,
+        Part::Particles,
         |s| format!("{} px", s.draw.smallest.bound()),
         |s| s.draw.smallest = Cutoff::At(0.0),
     ),
     (
         "threshold",
-        What::Particles,
+        Part::Particles,
         |s| format!("tau {}", s.draw.threshold.bound()),
         |s| s.draw.threshold = Cutoff::At(0.0),
     ),
-    ("format", What::Picture, format_of, |s| s.film.format = FilmFormat::Rgba32f),
+    ("format", Part::Picture, format_of, |s| s.film.format = FilmFormat::Rgba32f),
     (
         "chunks",
-        What::Particles,
+        Part::Particles,
         |s| if let Chunks::Of(n) = s.draw.chunks { n.to_string() } else { "auto".into() },
         |s| {
-            // Of tiles they are nothing.
+            // Tiles have no chunks.
             if s.draw.path == DrawPath::Sprites {
                 s.draw.chunks = Chunks::Of(0);
             }
@@ -102,20 +101,20 @@ const ALL: [(&str, What, Describe, Lift); 10] = [
     ),
     (
         "sort bits",
-        What::Particles,
+        Part::Particles,
         |s| s.draw.sort_bits.number().map_or("auto".into(), |n| n.to_string()),
         |s| s.draw.sort_bits = SortBits::Wide,
     ),
     (
         "count",
-        What::Particles,
+        Part::Particles,
         |s| if s.draw.count.is_some() { "by distance" } else { "all" }.into(),
         |s| s.draw.count = None,
     ),
-    ("cutoff", What::Particles, |s| format!("{} sigma", s.draw.cutoff), |s| s.draw.cutoff = UNCUT),
+    ("cutoff", Part::Particles, |s| format!("{} sigma", s.draw.cutoff), |s| s.draw.cutoff = UNCUT),
     (
         "bases",
-        What::Lobes,
+        Part::Lobes,
         |s| s.lighting.bases.to_string(),
         |s| {
             if s.lighting.mode == LightingMode::TwoReflection {
@@ -125,7 +124,7 @@ const ALL: [(&str, What, Describe, Lift); 10] = [
     ),
     (
         "tree",
-        What::Second,
+        Part::SecondReflection,
         |s| if gathers_from_tree(s) { "clusters" } else { "pairs" }.into(),
         |s| {
             if gathers_from_tree(s) {
@@ -143,18 +142,18 @@ fn format_of(scene: &Scene) -> String {
         .to_owned()
 }
 
-/// The step from groups of particles to a facet a particle, where `scene` has such.
-pub fn ungrouped(scene: &Scene) -> Option<Step> {
+/// Returns the approximation of one facet for a group of particles, if the scene has groups.
+fn ungrouped(scene: &Scene) -> Option<Approximation> {
     let lit = scene.lighting.mode != LightingMode::None;
     (lit && scene.groups_facets()).then(|| {
         let mut without = scene.clone();
         without.lighting.facets_per_cloud = None;
-        // Whichever light is gathered by, it stays.
+        // The choice between tree and pairs stays the same.
         if without.lighting.gather == Gather::Auto {
             without.lighting.gather =
                 if gathers_from_tree(scene) { Gather::Tree } else { Gather::Exact };
         }
         let n = |s: &Scene| format!("{} facets", s.n_facets());
-        Step { name: "facet groups", from: n(scene), to: n(&without), without }
+        Approximation { name: "facet groups", from: n(scene), to: n(&without), without }
     })
 }

@@ -1,20 +1,37 @@
-//! How far a picture is from a reference, with an interval: over the parts of the picture, and by
-//! the reference's own error.
+//! The error of a picture against a reference, with an interval.
 
-use super::records::PictureError;
+use serde::{Deserialize, Serialize};
+
+use super::figure::Figure;
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::picture::errors;
 use crate::reference::picture::Pixels;
-use crate::studies::provenance::Figure;
 
-/// Parts of a picture along its longer side. What a blob is off by it is off by all over its disc:
-/// single pixels are no independent draws, parts as large as blobs nearly are.
+/// Parts of a picture along its longer side. The error of a blob is the same all over its disc, so
+/// that single pixels are not independent; parts as large as blobs nearly are.
 const N_PARTS: u32 = 12;
-/// The reference's own error must be this many times smaller than what it judges.
+/// The reference's own error must be this many times smaller than the error that it measures.
 pub const RESOLVED: f64 = 10.0;
 
-/// Of a device's picture, pixel by pixel of `pixels`, by `reference`, which is itself off by
-/// `own_error`, root mean square. None where some value of either is no finite number.
+/// The difference between a picture and the reference, over premultiplied linear red, green, blue
+/// and alpha.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PictureError {
+    /// Root mean square. Its interval is over the parts of the picture, widened by the reference's
+    /// own error.
+    pub rmse: Figure,
+    /// Greatest absolute difference.
+    pub max: f64,
+    /// Mean of squares relative to the reference's ([`crate::measure::picture::Errors::rel_mse`]).
+    pub relmse: f64,
+    /// Whether the reference's own error is at most a tenth of `rmse`.
+    pub is_resolved: bool,
+}
+
+/// Returns the error of a picture against `reference`; none if a value of either is not finite.
+///
+/// *Shape*: `picture` and `reference` have a pixel for each of `pixels`. `own_error` is the root
+/// mean square of the reference's own error.
 pub fn picture_error(
     pixels: &Pixels,
     picture: &[[f64; 4]],
@@ -40,12 +57,25 @@ pub fn picture_error(
     Some(PictureError { rmse, max: whole.max_abs, relmse: whole.rel_mse, is_resolved })
 }
 
-/// Mean of the squared differences of a pixel's four numbers.
+/// Returns the values of a device's picture (RGBA, rows from the top) at `pixels`.
+pub fn sampled(pixels: &Pixels, rgba: &[f32]) -> Vec<[f64; 4]> {
+    let whole: Vec<[f64; 4]> =
+        rgba.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|k| f64::from(p[k]))).collect();
+    pixels.pick(&whole)
+}
+
+/// Returns the root mean square of all values of a picture.
+pub fn magnitude(rgba: &[[f64; 4]]) -> f64 {
+    let squares: f64 = rgba.iter().flatten().map(|v| v * v).sum();
+    (squares / (4 * rgba.len()).max(1) as f64).sqrt()
+}
+
+/// Returns the mean square difference of two pixels.
 fn square(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / 4.0
 }
 
-/// Of every part of the picture the sum of the squares in it, and their number.
+/// Returns, for every part of the picture, the sum of its squares and their number.
 fn parts(pixels: &Pixels, squares: &[f64]) -> Vec<(f64, f64)> {
     let side = pixels.width.max(pixels.height).div_ceil(N_PARTS).max(1);
     let columns = pixels.width.div_ceil(side) as usize;
@@ -62,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_offset_is_its_size_everywhere() {
+    fn a_constant_offset_is_the_error_with_no_spread() {
         let pixels = Pixels::all(24, 12);
         let (a, b) = (vec![[0.5; 4]; 288], vec![[0.4; 4]; 288]);
         let e = picture_error(&pixels, &a, &b, 0.0).unwrap();
@@ -73,7 +103,7 @@ mod tests {
                 && (high - 0.1).abs() < 1e-12
         );
         assert!(e.is_resolved && (e.max - 0.1).abs() < 1e-15);
-        // The reference's own error widens it, and decides what it can judge.
+        // The reference's own error widens the interval and decides what is resolved.
         let e = picture_error(&pixels, &a, &b, 0.02).unwrap();
         assert!(
             (e.rmse.low.unwrap() - 0.08).abs() < 1e-12
@@ -83,13 +113,13 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_in_few_parts_is_less_certain() {
+    fn an_error_in_few_parts_has_a_wider_interval() {
         let pixels = Pixels::all(48, 48);
         let zero = vec![[0.0; 4]; 48 * 48];
         let with = |n: usize| {
             let mut picture = zero.clone();
-            // n parts of 4 × 4 pixels, spread over the picture, each as wrong as makes the same
-            // RMSE.
+            // n parts of 4 × 4 pixels, spread over the picture, with the error that gives the same
+            // RMSE for every n.
             for k in 0..n {
                 let (i, j) = (4 * (k * 5 % 12), 4 * (k / 12 * 3 % 12));
                 for y in j..j + 4 {
@@ -107,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_has_no_error() {
+    fn a_picture_that_is_not_finite_has_no_error() {
         let pixels = Pixels::all(2, 1);
         let (zero, bad) = ([[0.0; 4]; 2], [[0.0; 4], [f64::NAN, 0.0, 0.0, 0.0]]);
         assert_eq!(

@@ -1,0 +1,50 @@
+//! The arguments of `nimbus render`.
+
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+use super::{SceneArgs, parse_samples};
+use crate::reference::picture::ReferenceKind;
+
+/// Arguments of `nimbus render`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "The errors of the sprites against two references:\n  \
+    nimbus render scenes/cubes-554.toml --size 200x150 -o drawn.exr\n  \
+    nimbus render scenes/cubes-554.toml --size 200x150 -o thin.exr --reference thin\n  \
+    nimbus render scenes/cubes-554.toml --size 200x150 --set 'cloud.0.texture=\"none\"' -o \
+    volume.exr --reference volume\n  \
+    nimbus compare thin.exr drawn.exr\n  nimbus compare volume.exr thin.exr\n\n\
+    The second reflection of a reference is integrated over areas, which takes minutes for hundreds \
+    of facets. \
+    --set 'lighting.mode=\"first\"' leaves it out.")]
+pub struct RenderArgs {
+    /// Scene file
+    pub scene: PathBuf,
+    /// Picture: .png (tone-mapped, over the background) or .exr (linear RGBA, premultiplied)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Frame number
+    #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "time")]
+    pub frame: u32,
+    /// Time in seconds, in place of a frame number
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub time: Option<f64>,
+    /// Draw a reference in f64 instead of the device's picture: thin, volume, model, or
+    /// reflections=K
+    #[arg(long, value_name = "WHICH")]
+    #[arg(conflicts_with_all = ["device", "shaders", "validation", "no_skip"])]
+    pub reference: Option<ReferenceKind>,
+    /// Samples of every pixel of a reference: the first through its centre, the others spread over
+    /// it
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "reference", value_parser = parse_samples)]
+    pub samples: u32,
+    /// Replace an existing file
+    #[arg(long)]
+    pub force: bool,
+    /// Print JSON: hash of the picture, device and passes, or the reference and its error
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub options: SceneArgs,
+}

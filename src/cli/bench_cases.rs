@@ -1,0 +1,96 @@
+//! The cases that `nimbus bench` times: the scene at every point of its sweep.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::args::{BenchArgs, SceneArgs, Span, ThreadingArg};
+use super::scene::{load, load_at, warnings};
+use crate::error::{Error, Result};
+use crate::farm::{Workload, bench_workload};
+use crate::model::scene::Threading;
+use crate::timing::cases::{Case, LoopChoice, cases};
+use crate::timing::names::sweep_text;
+use crate::timing::parts::numbers;
+use crate::timing::sweep::{Axis, SIZE_KEY, points};
+
+/// The cases of a scene, and its own record.
+pub struct BenchCases {
+    /// All cases, or those of `--part`.
+    pub cases: Vec<Case>,
+    /// SHA-256 of the scene without a sweep.
+    pub scene_hash: String,
+    /// The scene with every default filled in.
+    pub resolved: serde_json::Value,
+}
+
+/// Loads the scene at `path` at every point of the sweep.
+///
+/// # Errors
+/// Fails if the sweep or a scene is faulty, or there are no such cases as `--part` names.
+pub fn bench_cases(args: &BenchArgs, path: &Path, options: &SceneArgs) -> Result<BenchCases> {
+    let modes: &[Threading] = match args.threading {
+        ThreadingArg::Serial => &[Threading::Serial],
+        ThreadingArg::Parallel => &[Threading::Parallel],
+        ThreadingArg::Both => &[Threading::Serial, Threading::Parallel],
+    };
+    let axes = axes(args)?;
+    let loops = LoopChoice { modes, skip: !options.no_skip, saved: !args.no_saved };
+    let loaded = load(path, options)?;
+    let (scene_hash, resolved) = (loaded.hash.clone(), loaded.resolved.clone());
+    let mut printed = BTreeSet::from_iter(warnings(&loaded));
+    let mut all = Vec::new();
+    if axes.is_empty() {
+        all = cases(loaded, &[], args.frames, loops);
+    } else {
+        for point in points(&axes) {
+            let at = load_at(path, options, "--sweep", &point)?;
+            for warning in warnings(&at).into_iter().filter(|_| !options.quiet) {
+                if printed.insert(warning.clone()) {
+                    eprintln!("warning: {}: {warning}", sweep_text(&point));
+                }
+            }
+            all.extend(cases(at, &point, args.frames, loops));
+        }
+    }
+    Ok(BenchCases { cases: of_part(args, all)?, scene_hash, resolved })
+}
+
+/// Returns the cases of `--part` after the first of all; all cases without `--part`.
+fn of_part(args: &BenchArgs, cases: Vec<Case>) -> Result<Vec<Case>> {
+    let Some(Span { first, end }) = args.part else { return Ok(cases) };
+    let (n, range) = (cases.len(), first as usize..end as usize);
+    if range.end > n {
+        let what = format!("--part {first}..{end}: expected a part of cases 0..{n}");
+        return Err(Error::usage(what));
+    }
+    Ok(numbers(&range).into_iter().map(|i| cases[i].clone()).collect())
+}
+
+/// Returns the names of the cases in the order that `--part` counts in, and the work in them.
+///
+/// # Errors
+/// Fails if there is not one scene, or it or its sweep is faulty.
+pub fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Workload)> {
+    let [scene] = &args.scenes[..] else {
+        return Err(Error::usage(format!("expected one scene, found {}", args.scenes.len())));
+    };
+    let quiet = SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
+    let cases = bench_cases(args, scene, &quiet)?.cases;
+    let workload = bench_workload(&cases, args.warmup, args.repeat)?;
+    Ok((cases.iter().map(Case::name).collect(), workload))
+}
+
+/// Parses the sweep and rejects keys that set the same thing twice.
+fn axes(args: &BenchArgs) -> Result<Vec<Axis>> {
+    let axes = Axis::parse_all("--sweep", &args.sweep)?;
+    let has = |key: &str| axes.iter().any(|a| a.key == key);
+    let refuse = |key: &str, what: &str| Err(Error::usage(format!("--sweep {key}: {what}")));
+    if has(SIZE_KEY) && (has("film.width") || has("film.height")) {
+        let what = "sets film.width and film.height, which another --sweep sets, too";
+        return refuse(SIZE_KEY, what);
+    }
+    if has("time.frames") && args.frames.is_some() {
+        return refuse("time.frames", "--frames says how many frames are timed");
+    }
+    Ok(axes)
+}

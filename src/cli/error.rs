@@ -1,0 +1,279 @@
+//! `nimbus error SCENE`.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::ColorChoice;
+use indicatif::ProgressBar;
+
+use super::args::ErrorArgs;
+use super::error_configurations::{axes, design, load_configuration};
+use super::error_table;
+use super::output::{self, refuse_existing};
+use super::progress::{ReferenceProgress, progress};
+use super::scene::{
+    check_time, device_choice, load, print_sizes, with_texture_hint, without_textures,
+};
+use crate::error::{Error, Result};
+use crate::frame::limits;
+use crate::frame::GpuContext;
+use crate::io::image;
+use crate::measure::picture::map::error_map;
+use crate::model::film::Film;
+use crate::model::scene::Scene;
+use crate::reference::picture::Pixels;
+use crate::report::charts;
+use crate::studies::error::blocks::TimeKind;
+use crate::studies::error::design::best_within;
+use crate::studies::error::device_runner::{DeviceRunner, FrameChoice};
+use crate::studies::error::files;
+use crate::studies::error::records::{Budget, Configuration, Study};
+use crate::studies::error::study::{ErrorStudy, Event, StudyPlan, StudyResults};
+use crate::studies::provenance::{Provenance, ReferenceRecord};
+use crate::studies::reference_cache::{self, CachedReference};
+use crate::timing::json::ResultFile;
+use crate::timing::machine;
+use crate::timing::names::Setting;
+use crate::timing::results::prepare_out_dir;
+
+/// Runs `nimbus error`; sets `graceful` once Ctrl-C should save the results.
+///
+/// # Errors
+/// Fails if the arguments or the scene are faulty, the device fails, or Ctrl-C came. Finished
+/// results are kept in `--out`.
+pub fn run(
+    args: &ErrorArgs,
+    color: ColorChoice,
+    stop: &AtomicBool,
+    graceful: &AtomicBool,
+) -> Result<()> {
+    if let (Some(out), false) = (&args.out, args.resume) {
+        refuse_existing(out, args.force)?;
+    }
+    let options = without_textures(&args.scene, &args.options, args.plain)?;
+    let base = load(&args.scene, &options)?;
+    let time_s = base.scene.time.at(args.frame);
+    let scene = &base.clone().at_frame(args.frame);
+    check_time(scene, time_s)?;
+    let film = scene.film;
+    let axes = axes(args, &options, scene)?;
+    let gpu = GpuContext::open(&device_choice(&args.options))?;
+    limits::check(scene, gpu.device.limits())?;
+    let info = gpu.device.info();
+    let clocks = machine::clocks_record(info, &mut gpu.player(scene.clone(), true)?.renderer)?;
+    if args.options.verbose {
+        print_sizes(scene, None);
+    }
+    let plan = StudyPlan {
+        axes,
+        design: design(args),
+        metric: args.metric,
+        time: time_kind(args, gpu.device.limits().timestamp_valid_bits > 0)?,
+        n_rounds: args.rounds as usize,
+        part: args.part.map(|part| part.first as usize..part.end as usize),
+    };
+    let pixels = Pixels::sample(film.width, film.height, args.pixels);
+    let cached = reference(args, scene, time_s, &pixels)?;
+    let mut study = Study {
+        made: Provenance::now(Study::SCHEMA, &args.scene, &base, info, clocks),
+        reference: ReferenceRecord::of(&cached, args.against, &pixels, args.frame, time_s),
+        metric: plan.metric,
+        time: plan.time,
+        rounds: 0,
+        frames: args.frames,
+        as_played: args.as_played,
+        own_shaders: args.options.shaders.is_some(),
+        configurations: Vec::new(),
+        best: Vec::new(),
+        // A study that is killed before its end is one that can be resumed.
+        interrupted: true,
+    };
+    let mut results = earlier(args, &study)?;
+    update(args, &mut study, &results);
+    if let Some(out) = &args.out {
+        prepare_out_dir(out, true)?;
+        if !args.resume {
+            files::remove_earlier(out)?;
+        }
+        write_reference(&out.join("reference.png"), &film, &pixels, &cached.reference.rgba)?;
+        files::write(out, &study, &results)?;
+    }
+    graceful.store(true, Ordering::Relaxed);
+    let (n_frames, as_played) = (args.frames, args.as_played);
+    let frames = FrameChoice { i_frame: args.frame, time_s, n_frames, as_played };
+    let mut runner = DeviceRunner::new(&gpu, frames);
+    let load = |settings: &[Setting]| load_configuration(args, &options, settings);
+    let reference = &cached.reference;
+    let running = ErrorStudy { plan: &plan, load: &load, reference, pixels: &pixels, stop };
+    let bar = progress(0, "configurations", args.options.quiet);
+    let done = {
+        let mut recorder = Recorder {
+            args,
+            study: &mut study,
+            film: &film,
+            pixels: &pixels,
+            reference: &cached.reference.rgba,
+            bar: &bar,
+        };
+        running.run(&mut runner, &mut results, &mut |event| recorder.on(event))
+    };
+    bar.finish_and_clear();
+    drop(runner);
+    study.interrupted = !matches!(done, Ok(true));
+    update(args, &mut study, &results);
+    if let Some(out) = &args.out {
+        files::write(out, &study, &results)?;
+        output::write_chart(&out.join("front.svg"), &charts::error::chart(&study))?;
+    }
+    done?;
+    print(args, color, &study)?;
+    gpu.close()?;
+    if study.interrupted { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
+    if args.json {
+        return output::object(study);
+    }
+    if args.csv {
+        let rows: Vec<_> = study.configurations.iter().map(files::csv_row).collect();
+        return output::rows(&rows, false);
+    }
+    output::text(&error_table::report(study))?;
+    if args.plot {
+        output::text(&output::chart_text(&charts::error::chart(study), color)?)?;
+    }
+    Ok(())
+}
+
+/// Returns the reference, from the cache if it is there.
+fn reference(
+    args: &ErrorArgs,
+    scene: &Scene,
+    time_s: f64,
+    pixels: &Pixels,
+) -> Result<CachedReference> {
+    let shown = ReferenceProgress::new(args.options.quiet);
+    let folder = reference_cache::default_folder();
+    let listener = &|work, n| shown.advance(work, n);
+    reference_cache::reference(args.against, scene, time_s, pixels, folder.as_deref(), listener)
+        .map_err(|error| with_texture_hint(error, ", or --against thin"))
+}
+
+/// Returns the time that decides.
+fn time_kind(args: &ErrorArgs, has_timestamps: bool) -> Result<TimeKind> {
+    match args.time {
+        Some(TimeKind::Gpu) if !has_timestamps => {
+            Err(Error::usage("--time gpu: this device has no timestamps; expected --time frame"))
+        }
+        Some(time) => Ok(time),
+        None => Ok(if has_timestamps { TimeKind::Gpu } else { TimeKind::Frame }),
+    }
+}
+
+/// Returns the results in `--out` if they are to be resumed.
+fn earlier(args: &ErrorArgs, study: &Study) -> Result<StudyResults> {
+    let Some(out) = args.out.as_ref().filter(|out| args.resume && out.exists()) else {
+        return Ok(StudyResults::default());
+    };
+    let (before, results) = files::read_earlier(out)?;
+    let (made, made_before) = (&study.made, &before.made);
+    let is_same_device =
+        made_before.device == made.device && made_before.environment == made.environment;
+    let mut differ: Vec<&str> = [
+        ("the scene", made_before.scene_hash == made.scene_hash),
+        ("the reference", before.reference.hash == study.reference.hash),
+        ("the device", is_same_device),
+        ("the build", made_before.code == made.code),
+        ("the time that decides", before.time == study.time),
+        ("--frames", before.frames == study.frames),
+        ("--frame", before.reference.frame == study.reference.frame),
+        ("--as-played", before.as_played == args.as_played),
+        // The shaders in a folder may have changed.
+        ("--shaders", !before.own_shaders && !study.own_shaders),
+    ]
+    .into_iter()
+    .filter(|(_, is_same)| !is_same)
+    .map(|(what, _)| what)
+    .collect();
+    if differ.is_empty() {
+        return Ok(results);
+    }
+    differ.sort_unstable();
+    let what = format!("is of another study; what differs: {}", differ.join(", "));
+    Err(Error::io(out, what))
+}
+
+/// Copies the results into the record, and finds the best configuration for each budget.
+fn update(args: &ErrorArgs, study: &mut Study, results: &StudyResults) {
+    study.configurations = results.configurations.clone();
+    study.rounds = results.n_rounds;
+    let by_ms = args.budget_ms.iter().map(|value| (Budget::Ms, *value));
+    let by_error = args.budget_error.iter().map(|value| (Budget::Error, *value));
+    let best = |(budget, value)| {
+        best_within(&study.configurations, study.metric, study.time, budget, value)
+    };
+    study.best = by_ms.chain(by_error).map(best).collect();
+}
+
+/// Shows the progress of a study and saves its results on the way.
+struct Recorder<'a> {
+    args: &'a ErrorArgs,
+    study: &'a mut Study,
+    film: &'a Film,
+    pixels: &'a Pixels,
+    reference: &'a [[f64; 4]],
+    bar: &'a ProgressBar,
+}
+
+impl Recorder<'_> {
+    fn on(&mut self, event: Event<'_>) -> Result<()> {
+        match event {
+            Event::More(n) => self.bar.inc_length(n as u64),
+            Event::Block => self.bar.inc(1),
+            Event::Picture { i, rgba, results } => {
+                self.bar.inc(1);
+                if let Some(out) = &self.args.out {
+                    self.write_picture(out, i, rgba, &mut results.configurations[i])?;
+                }
+            }
+            Event::Round(results) => {
+                if let Some(out) = &self.args.out {
+                    self.study.configurations = results.configurations.clone();
+                    self.study.rounds = results.n_rounds;
+                    files::write(out, self.study, results)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the picture of a configuration, and the map of its error.
+    fn write_picture(
+        &self,
+        out: &Path,
+        i: usize,
+        rgba: &[f32],
+        configuration: &mut Configuration,
+    ) -> Result<()> {
+        let (Film { width, height, .. }, pixels) = (*self.film, self.pixels);
+        let [picture, map] = [format!("picture-{i}.png"), format!("error-{i}.png")];
+        image::write(&out.join(&picture), self.film, width, height, rgba)?;
+        let at = |k: usize| &rgba[4 * pixels.index(pixels.at[k])..][..4];
+        let error = |(k, r): (usize, &[f64; 4])| {
+            let sum: f64 = at(k).iter().zip(r).map(|(a, b)| (f64::from(*a) - b).powi(2)).sum();
+            (0.25 * sum).sqrt()
+        };
+        let errors: Vec<f64> = self.reference.iter().enumerate().map(error).collect();
+        let colors = error_map(width, height, &pixels.spread(&errors));
+        image::write_bytes(&out.join(&map), width, height, &colors)?;
+        (configuration.picture, configuration.error_map) = (Some(picture), Some(map));
+        Ok(())
+    }
+}
+
+/// Writes the reference as a picture in which every cell has the value of its pixel.
+fn write_reference(path: &Path, film: &Film, pixels: &Pixels, rgba: &[[f64; 4]]) -> Result<()> {
+    let whole: Vec<f32> = pixels.spread(rgba).into_iter().flatten().map(|v| v as f32).collect();
+    image::write(path, film, film.width, film.height, &whole)
+}

@@ -1,0 +1,165 @@
+//! Loads scenes and opens devices as the arguments say.
+
+use std::path::{Path, PathBuf};
+
+use super::args::SceneArgs;
+use crate::error::{Error, Result};
+use crate::frame::light_notes;
+use crate::frame::limits::advice;
+use crate::frame::{DeviceChoice, Stage};
+use crate::inspect::basis::basis_warnings;
+use crate::io::bounds::{GREATEST, is_carried_place, shortest};
+use crate::io::scene_file::{self, LoadedScene};
+use crate::model::scene::Scene;
+use crate::timing::names::Setting;
+use crate::timing::sweep::{SIZE_KEY, overrides};
+
+/// Returns the scene keys that the arguments set, as `--set` takes them.
+pub fn typed_overrides(args: &SceneArgs) -> Vec<String> {
+    let mut overrides = args.set.clone();
+    if let Some((width, height)) = args.size {
+        overrides.push(format!("film.width={width}"));
+        overrides.push(format!("film.height={height}"));
+    }
+    overrides
+}
+
+/// Loads a scene with the keys that the arguments set, and prints its warnings.
+///
+/// # Errors
+/// Fails if the scene or a file that it names is faulty.
+pub fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
+    load_with_files(path, args).map(|(loaded, _)| loaded)
+}
+
+/// Loads a scene as [`load`] does, and also returns the files that it was read from.
+///
+/// # Errors
+/// Fails if the scene or a file that it names is faulty.
+pub fn load_with_files(path: &Path, args: &SceneArgs) -> Result<(LoadedScene, Vec<PathBuf>)> {
+    let (loaded, files) = scene_file::load_and_list(path, &typed_overrides(args), args.seed);
+    let loaded = loaded?;
+    for warning in warnings(&loaded).iter().filter(|_| !args.quiet) {
+        eprintln!("warning: {warning}");
+    }
+    Ok((loaded, files))
+}
+
+/// Loads a scene silently with more settings, which the argument `flag` gave.
+///
+/// # Errors
+/// Fails if the scene or a file that it names is faulty; a fault of a setting names `flag`.
+pub fn load_at(
+    path: &Path,
+    args: &SceneArgs,
+    flag: &str,
+    settings: &[Setting],
+) -> Result<LoadedScene> {
+    let overrides = overrides(settings)?;
+    let mut with = SceneArgs { quiet: true, ..args.clone() };
+    with.set.extend(overrides.iter().cloned());
+    if settings.iter().any(|s| s.key == SIZE_KEY) {
+        with.size = None;
+    }
+    load(path, &with).map_err(|mut error| {
+        if let Error::Scene { at, .. } = &mut error {
+            let set = at.source.strip_prefix("--set ").map(str::to_owned);
+            if let Some(set) = set.filter(|set| overrides.contains(set)) {
+                at.source = format!("{flag} {set}");
+            }
+        }
+        error
+    })
+}
+
+/// Returns the arguments, with the textures of all clouds removed if `plain` is set.
+///
+/// # Errors
+/// Fails if the scene cannot be loaded.
+pub fn without_textures(path: &Path, args: &SceneArgs, plain: bool) -> Result<SceneArgs> {
+    let mut args = args.clone();
+    let quiet = SceneArgs { quiet: true, ..args.clone() };
+    if plain && !load(path, &quiet)?.scene.clouds.is_empty() {
+        args.set.push("cloud.*.texture=\"none\"".to_owned());
+    }
+    Ok(args)
+}
+
+/// Adds to the error of a textured scene, which has no such reference, how to go on.
+pub fn with_texture_hint(error: Error, hint: &str) -> Error {
+    match error {
+        Error::Usage { what } if what.contains("textured") => {
+            Error::usage(format!("{what}, or --plain for all clouds{hint}"))
+        }
+        other => other,
+    }
+}
+
+/// Returns the warnings about a scene and its phases: settings that are allowed but hardly meant.
+pub fn warnings(loaded: &LoadedScene) -> Vec<String> {
+    let of_scene =
+        |scene: &Scene| basis_warnings(scene).into_iter().chain(advice(scene)).collect::<Vec<_>>();
+    let mut all: Vec<String> = loaded.warnings.clone();
+    let phases = loaded.phases.iter().map(|p| &p.scene);
+    for warning in std::iter::once(&loaded.scene).chain(phases).flat_map(of_scene) {
+        if !all.contains(&warning) {
+            all.push(warning);
+        }
+    }
+    all
+}
+
+/// Returns the device that the arguments choose.
+pub fn device_choice(args: &SceneArgs) -> DeviceChoice {
+    DeviceChoice {
+        device: args.device.clone(),
+        shaders: args.shaders.clone(),
+        validation: args.validation,
+        poison: args.poison,
+    }
+}
+
+/// Checks that f32 can represent the scene at a time that a user asked for. The loader has checked
+/// the frames of the scene itself.
+///
+/// # Errors
+/// Fails if the time is too great or not a number, or the wind carries a cloud too far until then.
+pub fn check_time(scene: &Scene, time_s: f64) -> Result<()> {
+    let is_in_range = time_s.abs() <= GREATEST;
+    if is_in_range && scene.clouds.iter().all(|c| is_carried_place(c.origin_at(time_s))) {
+        return Ok(());
+    }
+    let (time, greatest) = (shortest(time_s), shortest(GREATEST));
+    let what = if is_in_range {
+        format!("the wind carries a cloud's origin too far: expected at most {greatest}")
+    } else {
+        format!("expected a finite number from -{greatest} to {greatest}")
+    };
+    Err(Error::usage(format!("time {time} s: {what}")))
+}
+
+/// Prints the settings that "auto" chose, and warnings about the light of the last frame.
+///
+/// # Errors
+/// Fails if reading the light back from the device fails.
+pub fn print_notes(stage: &mut Stage, args: &SceneArgs) -> Result<()> {
+    if !args.quiet {
+        for chosen in stage.take_chosen() {
+            eprintln!("note: {chosen}");
+        }
+        for note in light_notes(stage)? {
+            eprintln!("warning: {note}");
+        }
+    }
+    Ok(())
+}
+
+/// Prints the device and the sizes of a scene, for `--verbose`.
+pub fn print_sizes(scene: &Scene, stage: Option<&Stage>) {
+    if let Some(stage) = stage {
+        eprintln!("{} ({})", stage.info().name, stage.info().driver);
+    }
+    let film = scene.film;
+    let (particles, groups) = (scene.n_particles(), scene.groups().len());
+    eprintln!("{particles} particles in {groups} groups, film {} x {}", film.width, film.height);
+}

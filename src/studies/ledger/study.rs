@@ -1,0 +1,262 @@
+//! Makes the pictures of a ledger, from the one that the device draws to the whole model, compares
+//! each with the next, and times those that the device draws.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::DVec3;
+
+use super::approximations::approximations;
+use super::records::{Ledger, Row};
+use crate::error::{Error, Result};
+use crate::frame::GpuContext;
+use crate::measure::stats::median;
+use crate::model::scene::{LightingMode, Scene};
+use crate::reference::picture::{
+    BlobModel, FrameReference, ModelDrawing, OnProgress, PixelSample, Pixels, ReferenceKind,
+    RenderStage, RenderedPixels, n_reflections, render_lit_scene, render_model,
+};
+use crate::studies::error::blocks::TimedBlock;
+use crate::studies::error::device_runner::{DeviceRunner, FrameChoice};
+use crate::studies::error::study::Runner;
+use crate::studies::figure::Figure;
+use crate::studies::picture_error::{RESOLVED, magnitude, picture_error, sampled};
+use crate::studies::provenance::Provenance;
+
+/// A ledger and everything that it is made with.
+pub struct LedgerStudy<'a> {
+    /// The device.
+    pub gpu: &'a GpuContext,
+    /// The scene, in which nothing is "auto".
+    pub scene: &'a Scene,
+    /// The frame that is drawn, and those that are timed.
+    pub frames: FrameChoice,
+    /// Timed blocks of each picture of the device.
+    pub n_rounds: usize,
+    /// The pixels that are compared.
+    pub pixels: &'a Pixels,
+    /// Reflections of the last picture.
+    pub n_reflections: u32,
+    /// Ends the study early once it is set.
+    pub stop: &'a AtomicBool,
+}
+
+/// A picture at the pixels that are compared.
+struct ChainPicture {
+    rgba: Vec<[f64; 4]>,
+    /// Root mean square of its own error.
+    own_error: f64,
+}
+
+/// An approximation: the difference between two neighbours of the chain.
+struct Link {
+    name: String,
+    from: String,
+    to: String,
+    /// Whether the device draws both pictures, configurations `i` and `i + 1`.
+    is_on_device: bool,
+}
+
+impl Link {
+    fn computed(name: &str, from: &str, to: &str) -> Link {
+        let [name, from, to] = [name, from, to].map(str::to_owned);
+        Link { name, from, to, is_on_device: false }
+    }
+}
+
+/// Pictures, each with one approximation less than the one before, and the links between them.
+#[derive(Default)]
+struct Chain {
+    pictures: Vec<ChainPicture>,
+    links: Vec<Link>,
+}
+
+impl Chain {
+    fn add(&mut self, link: Link, drawn: RenderedPixels) {
+        let own_error = drawn.own_error();
+        self.links.push(link);
+        self.pictures.push(ChainPicture { rgba: drawn.rgba, own_error });
+    }
+}
+
+impl LedgerStudy<'_> {
+    /// Makes the ledger, or as much of it as was finished before `stop` was set.
+    ///
+    /// # Errors
+    /// Fails if drawing fails, a reference cannot be computed, or a picture is not finite.
+    pub fn run(&self, made: Provenance, listener: OnProgress) -> Result<Ledger> {
+        let approximations = approximations(self.scene);
+        let mut runner = DeviceRunner::new(self.gpu, self.frames);
+        let mut chain = Chain::default();
+        let scenes = approximations.iter().map(|a| &a.without);
+        let scenes: Vec<&Scene> = std::iter::once(self.scene).chain(scenes).collect();
+        scenes.iter().for_each(|scene| runner.add(&Arc::new(Scene::clone(scene))));
+        for i in 0..scenes.len() {
+            let rgba = sampled(self.pixels, &runner.picture(i)?);
+            chain.pictures.push(ChainPicture { rgba, own_error: 0.0 });
+        }
+        chain.links.extend(approximations.iter().map(|a| Link {
+            name: a.name.to_owned(),
+            from: a.from.clone(),
+            to: a.to.clone(),
+            is_on_device: true,
+        }));
+        let last = scenes.len() - 1;
+        self.add_references(&mut runner, last, scenes[last], &mut chain, listener)?;
+        let rounds = self.time(&mut runner, scenes.len())?;
+        self.summarize(made, &chain, &rounds)
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Adds the pictures in f64 below the last one of the device, configuration `i` of `scene`.
+    fn add_references(
+        &self,
+        runner: &mut DeviceRunner<'_>,
+        i: usize,
+        scene: &Scene,
+        chain: &mut Chain,
+        listener: OnProgress,
+    ) -> Result<()> {
+        let scene = &ReferenceKind::without_approximations(scene);
+        let light = &|n| listener(RenderStage::Lighting, n);
+        let exact = FrameReference::with_progress(scene, self.frames.time_s, light)?;
+        let is_lit = scene.lighting.mode != LightingMode::None;
+        let mut by_device = exact.clone();
+        if is_lit {
+            let lit = runner.lit(i)?;
+            by_device.radiance = lit.iter().map(|l| DVec3::from(l.first.map(f64::from))).collect();
+            by_device.second = lit.iter().map(|l| DVec3::from(l.second.map(f64::from))).collect();
+            // The device's light counts as exact here; later rows measure its error.
+            by_device.second_error = Vec::new();
+        }
+        let draw = |light: &FrameReference, drawing: BlobModel| {
+            render_lit_scene(scene, light, drawing, self.pixels, PixelSample::CENTER, listener)
+        };
+        chain.add(Link::computed("drawing", "f32", "f64"), draw(&by_device, BlobModel::Thin));
+        if scene.n_particles() > 0 && !self.is_stopped() {
+            let link = Link::computed("thin sprites", "sprites", "volume");
+            chain.add(link, draw(&by_device, BlobModel::Volume));
+        }
+        if !is_lit || self.is_stopped() {
+            return Ok(());
+        }
+        // The reference of the light on surfaces has no density grid.
+        let link = if scene.n_particles() > 0 && !scene.surfaces.is_empty() {
+            Link::computed("first reflection", "f32, grid", "f64, closed form on surfaces")
+        } else {
+            Link::computed("first reflection", "f32", "f64")
+        };
+        let (second, second_error) = (by_device.second, Vec::new());
+        let first = FrameReference { second, second_error, ..exact.clone() };
+        chain.add(link, draw(&first, BlobModel::Volume));
+        if n_reflections(scene) > 1 {
+            let link = Link::computed("second reflection", "pairs in f32", "areas in f64");
+            chain.add(link, draw(&exact, BlobModel::Volume));
+        }
+        self.add_models(scene, chain, listener)
+    }
+
+    /// Adds the pictures that are lit by the model itself.
+    fn add_models(&self, scene: &Scene, chain: &mut Chain, listener: OnProgress) -> Result<()> {
+        let mut add = |link: Link, is_by_facet: bool, n: u32| -> Result<()> {
+            if !self.is_stopped() {
+                let (time_s, pixels) = (self.frames.time_s, self.pixels);
+                let how = ModelDrawing { n_reflections: n, by_facet: is_by_facet };
+                chain.add(link, render_model(how, scene, time_s, pixels, listener)?);
+            }
+            Ok(())
+        };
+        let (k, n) = (n_reflections(scene), self.n_reflections);
+        if scene.n_particles() > 0 {
+            add(Link::computed("density grid", "grid and march", "closed form"), true, k)?;
+        }
+        if !scene.surfaces.is_empty() {
+            add(Link::computed("facets of surfaces", "between facets", "every pixel"), false, k)?;
+        }
+        if n > k {
+            add(Link::computed("reflections", &k.to_string(), &n.to_string()), false, n)?;
+        }
+        Ok(())
+    }
+
+    /// Times rounds of one block for each configuration, every second round in reverse order.
+    /// Returns the blocks of each round by configuration.
+    fn time(&self, runner: &mut DeviceRunner<'_>, n: usize) -> Result<Vec<Vec<TimedBlock>>> {
+        let mut rounds = Vec::new();
+        for i_round in 0..if n > 1 { self.n_rounds } else { 0 } {
+            if self.is_stopped() {
+                break;
+            }
+            let order = (0..n).map(|i| if i_round % 2 == 1 { n - 1 - i } else { i });
+            let mut blocks: Vec<TimedBlock> =
+                order.map(|i| runner.block(i, i_round)).collect::<Result<_>>()?;
+            blocks.sort_by_key(|block| block.i_configuration);
+            rounds.push(blocks);
+        }
+        Ok(rounds)
+    }
+
+    fn summarize(
+        &self,
+        made: Provenance,
+        chain: &Chain,
+        rounds: &[Vec<TimedBlock>],
+    ) -> Result<Ledger> {
+        let compare = |a: &ChainPicture, b: &ChainPicture| {
+            let own_error = a.own_error + b.own_error;
+            let error = picture_error(self.pixels, &a.rgba, &b.rgba, own_error);
+            let what = "a picture of the scene holds values that are no finite numbers";
+            error.map(|e| (e.rmse, own_error)).ok_or_else(|| Error::usage(what))
+        };
+        let (Some(first), Some(last)) = (chain.pictures.first(), chain.pictures.last()) else {
+            return Err(Error::usage("a ledger without pictures"));
+        };
+        let magnitude = magnitude(&last.rgba);
+        let pairs = chain.pictures.windows(2).map(|pair| compare(&pair[0], &pair[1]));
+        let errors: Vec<(Figure, f64)> = pairs.collect::<Result<_>>()?;
+        let sum: f64 = errors.iter().map(|(error, _)| error.value).sum();
+        let share = |value: f64, of: f64| if of > 0.0 { value / of } else { 0.0 };
+        let row = |(i, (link, (error, own_error))): (usize, (&Link, &(Figure, f64)))| Row {
+            name: link.name.clone(),
+            from: link.from.clone(),
+            to: link.to.clone(),
+            error: *error,
+            relative: share(error.value, magnitude),
+            share: share(error.value, sum),
+            own_error: *own_error,
+            is_resolved: own_error * RESOLVED <= error.value,
+            time_ratio: if link.is_on_device { time_ratio(rounds, i) } else { None },
+        };
+        let (total, _) = compare(first, last)?;
+        Ok(Ledger {
+            made,
+            frame: self.frames.i_frame,
+            time_s: self.frames.time_s,
+            width: self.pixels.width,
+            height: self.pixels.height,
+            n_pixels: self.pixels.at.len(),
+            magnitude,
+            rows: chain.links.iter().zip(&errors).enumerate().map(row).collect(),
+            total,
+            sum,
+            quadrature: errors.iter().map(|(error, _)| error.value.powi(2)).sum::<f64>().sqrt(),
+            // The root mean square is a norm, so that the triangle inequality holds but for the
+            // rounding of both sides.
+            holds: total.value <= sum * (1.0 + 1e-9) + 1e-15,
+            interrupted: self.is_stopped(),
+        })
+    }
+}
+
+/// Returns the time of configuration `i` divided by that of configuration `i + 1`, which has one
+/// approximation less. In every round the two are neighbours.
+fn time_ratio(rounds: &[Vec<TimedBlock>], i: usize) -> Option<Figure> {
+    let ms = |block: &TimedBlock| median(&block.gpu_ms).or_else(|| median(&block.frame_ms));
+    let of = |round: &Vec<TimedBlock>| {
+        ms(round.get(i)?).zip(ms(round.get(i + 1)?)).filter(|(_, b)| *b > 0.0).map(|(a, b)| a / b)
+    };
+    Figure::median(&rounds.iter().filter_map(of).collect::<Vec<f64>>())
+}

@@ -46,7 +46,7 @@ fn render_writes_png_and_exr_without_a_validation_message() {
 }
 
 #[test]
-fn the_driver_s_threads_and_a_second_run_change_no_byte() {
+fn driver_threads_and_a_second_run_change_no_byte() {
     let dir = temp();
     let mut pictures = Vec::new();
     for threads in ["0", "1", "2", "3", "3"] {
@@ -220,7 +220,7 @@ fn bench_prints_its_table_and_writes_its_results_once() {
 }
 
 #[test]
-fn several_scenes_get_a_folder_each_and_a_bad_one_none() {
+fn each_scene_has_a_folder_unless_it_is_faulty() {
     let dir = temp();
     let out = path(&dir, "runs");
     let short = ["--frames", "2", "--warmup", "0", "--repeat", "1", "--out", &out];
@@ -396,7 +396,7 @@ fn an_interrupted_render_ends_at_once_and_leaves_nothing() {
 }
 
 #[test]
-fn render_says_what_it_drew() {
+fn render_describes_the_picture() {
     let dir = temp();
     let out = path(&dir, "a.exr");
     let (code, json, stderr) =
@@ -428,7 +428,7 @@ fn render_says_what_it_drew() {
 }
 
 #[test]
-fn inspect_says_more_on_stderr_when_asked() {
+fn inspect_verbose_prints_more_on_stderr() {
     for more in [&[][..], &["--reference"]] {
         let (code, quiet, nothing) = run(&[&["inspect", "scenes/cubes-615.toml"], more].concat());
         assert_eq!((code, nothing.as_str()), (0, ""));
@@ -495,7 +495,7 @@ fn devices_lists_at_least_the_one_that_is_used() {
 }
 
 #[test]
-fn help_teaches() {
+fn help_lists_commands_and_exit_codes() {
     let (code, help, _) = run(&["--help"]);
     assert_eq!(code, 0);
     for word in

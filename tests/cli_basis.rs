@@ -79,7 +79,7 @@ fn values_and_errors_are_tables_of_their_own() {
 }
 
 #[test]
-fn json_holds_all_of_it() {
+fn json_holds_all_tables() {
     let (_dir, scene) = scene("bases = 8\nexponents = [1, 64]");
     let (code, text, stderr) = run(&["inspect", &scene, "--basis", "--json"]);
     assert_eq!((code, stderr.as_str()), (0, ""));
@@ -105,14 +105,14 @@ fn json_holds_all_of_it() {
 }
 
 #[test]
-fn fewer_bases_than_asked_for_are_said() {
+fn fewer_bases_than_asked_for_are_noted() {
     let (_dir, scene) = scene("bases = 32\nexponents = [49, 51]");
     let (code, table, stderr) = run(&["inspect", &scene, "--basis"]);
     assert_eq!(code, 0);
     let n_bases = table.lines().next().map_or(0, |header| header.split(',').count() - 2);
     let expected = format!(
-        "note: 32 bases asked for, {n_bases} kept: the lobes of n_s from 49 to 51 have no more \
-         that differ\n"
+        "note: 32 bases asked for, {n_bases} kept: the lobes of n_s from 49 to 51 differ in \
+         no more\n"
     );
     assert!(n_bases < 32 && stderr == expected, "{stderr}");
     let (_, again, nothing) = run(&["inspect", &scene, "--basis", "-q"]);
@@ -120,7 +120,7 @@ fn fewer_bases_than_asked_for_are_said() {
 }
 
 #[test]
-fn what_does_not_fit_together_is_refused() {
+fn contradicting_arguments_are_refused() {
     for more in [&["--plan"][..], &["--reference"], &["--frame", "3"], &["--particles"]] {
         let (code, stdout, stderr) =
             run(&[&["inspect", "scenes/hello.toml", "--basis"], more].concat());

@@ -100,7 +100,7 @@ fn one_step_as_json() {
 }
 
 #[test]
-fn what_is_diagnosed_and_what_is_clear_says_so() {
+fn diagnosed_clouds_and_clear_steps_are_marked() {
     let dir = tempfile::tempdir().expect("a folder");
     let write =
         |name: &str, made: &Made| fs::write(path(&dir, name), made.bytes()).expect("written");
@@ -141,7 +141,7 @@ fn bad_files_exit_with_2_and_one_message() {
 }
 
 #[test]
-fn help_teaches() {
+fn help_names_the_format_and_shows_examples() {
     let (code, help, _) = said(&["weather", "--help"]);
     assert_eq!(code, Some(0));
     for word in

@@ -69,7 +69,7 @@ fn temp() -> tempfile::TempDir {
 }
 
 #[test]
-fn a_run_and_itself_and_a_slower_one() {
+fn a_run_does_not_differ_from_itself_and_a_slower_one_is_slower() {
     let dir = temp();
     let a = written(&dir, "a", 10.0, &run());
     let b = written(&dir, "b", 10.5, &run());
@@ -98,7 +98,7 @@ fn a_run_and_itself_and_a_slower_one() {
 }
 
 #[test]
-fn a_machine_that_was_not_steady_is_remarked_on() {
+fn an_unsteady_machine_is_remarked_on() {
     let dir = temp();
     let a = written(&dir, "a", 10.2, &run());
     let drifting = dir.path().join("b");
@@ -117,7 +117,7 @@ fn a_machine_that_was_not_steady_is_remarked_on() {
 }
 
 #[test]
-fn json_says_what_the_table_says() {
+fn json_has_the_figures_of_the_table() {
     let dir = temp();
     let (a, b) = (written(&dir, "a", 10.0, &run()), written(&dir, "b", 10.5, &run()));
     let (code, text, _) = compare(&[&a, &b, "--json"]);
@@ -177,7 +177,7 @@ const CHANGES: [Change; 8] = [
 ];
 
 #[test]
-fn what_differs_is_refused_by_name_unless_allowed() {
+fn a_difference_is_refused_by_name_unless_allowed() {
     let dir = temp();
     let a = written(&dir, "a", 10.0, &run());
     for (i, (change, kind, shown)) in CHANGES.into_iter().enumerate() {
@@ -202,7 +202,7 @@ fn what_differs_is_refused_by_name_unless_allowed() {
 }
 
 #[test]
-fn the_flag_to_add_names_all_that_differs_and_what_was_allowed() {
+fn the_suggested_flag_names_all_differences() {
     let dir = temp();
     let a = written(&dir, "a", 10.0, &run());
     let other = Run { scene_hash: "cd".repeat(32), nimbus: "0.2.0".to_owned(), ..run() };
@@ -219,7 +219,7 @@ fn the_flag_to_add_names_all_that_differs_and_what_was_allowed() {
 }
 
 #[test]
-fn runs_that_may_be_compared_but_are_not_quite_alike_are_remarked_on() {
+fn small_differences_between_comparable_runs_are_remarked_on() {
     let dir = temp();
     let dirty = Run { revision: "0123456789ab-dirty".to_owned(), ..run() };
     let mut asked = Run { interrupted: true, ..dirty.clone() };
@@ -308,7 +308,7 @@ fn whole_lines(text: &str, n: usize) -> String {
 }
 
 #[test]
-fn what_is_not_whole_or_not_ours_is_one_message_with_its_path() {
+fn damaged_or_foreign_files_give_one_message_with_their_path() {
     let dir = temp();
     let a = written(&dir, "a", 10.0, &run());
     for (damage, file, fault) in DAMAGES {
@@ -331,7 +331,7 @@ fn what_is_not_whole_or_not_ours_is_one_message_with_its_path() {
 }
 
 #[test]
-fn a_folder_of_folders_is_explained() {
+fn a_folder_of_results_folders_is_explained() {
     let dir = temp();
     let a = written(&dir, "hello", 10.0, &run());
     let (code, _, stderr) = compare(&[dir.path().to_str().expect("UTF-8"), &a]);
@@ -342,7 +342,7 @@ fn a_folder_of_folders_is_explained() {
 }
 
 #[test]
-fn what_bench_wrote_is_read_back_whole_and_does_not_differ_from_itself() {
+fn results_of_bench_are_read_back_and_do_not_differ_from_themselves() {
     let dir = temp();
     let out = dir.path().join("run");
     let mut bench = Command::cargo_bin("nimbus").expect("the program is built");
@@ -385,7 +385,7 @@ fn what_bench_wrote_is_read_back_whole_and_does_not_differ_from_itself() {
 }
 
 #[test]
-fn help_teaches() {
+fn help_explains_intervals_and_shows_examples() {
     let (code, help, _) = compare(&["--help"]);
     assert_eq!(code, 0);
     for word in [

@@ -107,7 +107,7 @@ fn pngs_of_8_and_16_bits_are_compared_as_display_values() {
 }
 
 #[test]
-fn what_is_not_finite_is_counted_and_does_not_spread() {
+fn values_that_are_not_finite_are_counted_and_left_out() {
     let dir = Folder::new();
     let a = dir.exr("a.exr", 16, 16, |x, y| {
         [0.5, 0.5, if (x, y) == (3, 3) { f32::NAN } else { 0.5 }, 1.0]
@@ -172,7 +172,7 @@ fn the_map_is_written_once() {
 }
 
 #[test]
-fn all_else_is_one_clear_error() {
+fn other_arguments_give_one_clear_error() {
     let dir = Folder::new();
     let a = dir.exr("a.exr", 16, 12, |_, _| [0.5; 4]);
     let wide = dir.exr("wide.exr", 17, 12, |_, _| [0.5; 4]);

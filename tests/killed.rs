@@ -133,7 +133,7 @@ fn a_process_killed_at_any_moment_leaves_results_of_one_run() {
 
 /// Files that are replaced one after the other do not stand this.
 #[test]
-fn the_kills_would_find_a_mixture() {
+fn the_kills_find_a_mixture_of_two_runs() {
     let (_dir, folder) = prepared();
     let mut k = 1;
     for i in 0..N_KILLS {
@@ -147,7 +147,7 @@ fn the_kills_would_find_a_mixture() {
 }
 
 #[test]
-fn a_mixture_is_noticed() {
+fn a_mixture_of_two_runs_is_rejected() {
     let (_dir, folder) = prepared();
     assert_eq!(generation(&folder), Ok(1));
     // As many rows: only the times tell.

@@ -151,14 +151,14 @@ fn a_full_and_a_bare_run_satisfy_the_schema() {
 }
 
 #[test]
-fn a_run_of_one_process_says_nothing_of_parts() {
+fn a_run_of_one_process_has_no_parts() {
     let value = serde_json::to_value(Run { parts: Vec::new(), ..sample() }).unwrap();
     assert!(value.get("parts").is_none());
     assert!(serde_json::from_value::<Run>(value).unwrap().parts.is_empty());
 }
 
 #[test]
-fn the_schema_refuses_what_is_wrong() {
+fn the_schema_rejects_wrong_values() {
     let good = serde_json::to_value(sample()).unwrap();
     for (pointer, wrong) in [
         ("/schema", json!(1)),
@@ -223,7 +223,7 @@ fn resolve<'a>(described: &'a Value, root: &'a Value) -> &'a Value {
 }
 
 #[test]
-fn keys_and_their_order_are_the_schema_s() {
+fn keys_and_their_order_match_the_schema() {
     let mut n_compared = 0;
     compare_keys(
         &serde_json::to_value(sample()).unwrap(),
@@ -239,7 +239,7 @@ fn keys_and_their_order_are_the_schema_s() {
 }
 
 #[test]
-fn a_run_comes_back_as_it_was_written() {
+fn a_run_is_read_as_it_was_written() {
     let folder = tempfile::tempdir().unwrap();
     let out_dir = folder.path().join("a/b");
     prepare_out_dir(&out_dir, false).unwrap();
@@ -268,7 +268,7 @@ fn sample_at(date: &str) -> Run {
 }
 
 #[test]
-fn what_exists_is_refused_unless_forced() {
+fn an_existing_folder_is_refused_unless_forced() {
     let folder = tempfile::tempdir().unwrap();
     let refused = prepare_out_dir(folder.path(), false).unwrap_err();
     assert!(refused.to_string().contains("--force"), "{refused}");
@@ -282,7 +282,7 @@ fn what_exists_is_refused_unless_forced() {
 }
 
 #[test]
-fn another_schema_and_another_file_are_named_as_such() {
+fn another_schema_version_and_another_file_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(RUN_FILE);
     write(&path, &Run { schema: 7, ..sample() }).unwrap();
@@ -295,7 +295,7 @@ fn another_schema_and_another_file_are_named_as_such() {
 }
 
 #[test]
-fn a_row_with_too_few_pass_times_is_no_row() {
+fn a_row_with_too_few_pass_times_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let table = FrameTable { pass_names: vec!["sort".to_owned()], rows: vec![row(0)] };
     assert!(write_results(folder.path(), &sample(), &table, &Attachments::default()).is_err());
@@ -309,7 +309,7 @@ fn one_value_has_no_standard_deviation() {
 }
 
 #[test]
-fn the_revision_is_one() {
+fn the_revision_is_a_git_hash_or_unknown() {
     let digits = revision().trim_end_matches("-dirty");
     assert!(
         revision() == "unknown"

@@ -35,7 +35,7 @@ fn pixels(tiny: &Tiny, name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn a_study_is_one_in_all_its_files() {
+fn the_files_of_a_study_agree() {
     let tiny = Tiny::new();
     let budgets =
         ["--budget-ms=1e-9", "--budget-ms=1e9", "--budget-error=1e-9", "--budget-error=9"];
@@ -206,7 +206,7 @@ fn check_rows(tiny: &Tiny, json: &Value) {
 /// The error of a study is the one that `compare` finds between the picture and the reference, each
 /// drawn alone.
 #[test]
-fn an_error_is_what_compare_finds() {
+fn the_error_of_a_study_is_that_of_compare() {
     let tiny = Tiny::new();
     let unlit = ["--set", "lighting.mode=\"none\""];
     tiny.good(
@@ -259,7 +259,7 @@ fn a_grid_has_all_combinations() {
 }
 
 #[test]
-fn a_study_is_gone_on_with_and_nothing_is_run_twice() {
+fn a_resumed_study_measures_nothing_twice() {
     let tiny = Tiny::new();
     let first = [&SHORT[..], &OUT, &["--grid", "--knob", "draw.cutoff=2,3"]].concat();
     tiny.good(&first);
@@ -405,7 +405,7 @@ fn a_ledger_sums_up() {
 }
 
 #[test]
-fn ctrl_c_keeps_a_study_that_can_be_gone_on_with() {
+fn a_study_ended_by_ctrl_c_can_be_resumed() {
     let tiny = Tiny::new();
     let knob = [
         "error",
@@ -459,7 +459,7 @@ fn ctrl_c_keeps_a_study_that_can_be_gone_on_with() {
 
 /// However early: the folder holds a study before its first configuration is drawn.
 #[test]
-fn a_killed_study_can_be_gone_on_with() {
+fn a_killed_study_can_be_resumed() {
     let tiny = Tiny::new();
     let knob = [&SHORT[..], &OUT, &["--grid", "--knob", "draw.cutoff=2"]].concat();
     let mut child = tiny.start(&knob);

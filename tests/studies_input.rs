@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use tiny::{OUT, SHORT, Tiny, study};
 
 #[test]
-fn what_cannot_be_studied_is_refused_before_anything_is_done() {
+fn faulty_arguments_are_refused_before_any_work() {
     let tiny = Tiny::new();
     let knobs: [(&[&str], &str); 15] = [
         (
@@ -116,7 +116,7 @@ fn what_cannot_be_studied_is_refused_before_anything_is_done() {
 }
 
 #[test]
-fn textures_are_left_out_where_that_is_asked_for() {
+fn plain_removes_textures() {
     let textured = Tiny::with("texture = \"0\"\n");
     let same = [
         "error",
@@ -140,7 +140,7 @@ fn textures_are_left_out_where_that_is_asked_for() {
 }
 
 #[test]
-fn a_reference_is_kept_and_a_broken_one_made_again() {
+fn a_reference_is_cached_and_a_damaged_one_computed_again() {
     let tiny = Tiny::new();
     let run = |more: &[&str]| -> (Value, Value) {
         let args = [&SHORT[..], &["--json", "--grid", "--knob", "draw.cutoff=2"], more].concat();

@@ -92,7 +92,7 @@ fn check_nesting(track: &str, mut zones: Vec<([f64; 2], &str)>) -> Result<(), St
 }
 
 #[test]
-fn crossing_zones_would_be_noticed() {
+fn the_nesting_check_finds_crossing_zones() {
     assert!(
         check_nesting("x", vec![([0.0, 5.0], "a"), ([1.0, 2.0], "b"), ([2.0, 5.0], "c")]).is_ok()
     );
@@ -127,7 +127,7 @@ fn check_passes(trace: &Value, slack_us: f64) {
 }
 
 #[test]
-fn zones_nest_and_passes_lie_in_their_frames() {
+fn zones_are_nested_and_passes_lie_in_their_frames() {
     let zones = Zones::default();
     tracing::subscriber::set_global_default(tracing_subscriber::registry().with(zones.clone()))
         .expect("the first");
@@ -181,7 +181,7 @@ fn zones_nest_and_passes_lie_in_their_frames() {
 }
 
 #[test]
-fn a_calibrated_clock_lays_the_passes_where_they_were() {
+fn a_calibrated_clock_places_the_passes_exactly() {
     let (samples, stage, _) = benched(&Zones::default());
     let real = ClockFit::from_samples(&stage.device.read_clocks(4).expect("readings"));
     assert_eq!(real.is_some(), stage.info().calibrated_timestamps.is_some());

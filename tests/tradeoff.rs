@@ -116,7 +116,7 @@ fn named<'a>(found: &'a StudyResults, name: &str) -> &'a Configuration {
 }
 
 #[test]
-fn a_knob_of_known_law_has_the_front_it_must_have() {
+fn a_knob_of_known_law_has_the_expected_front() {
     let (mut law, mut found) = (Law::default(), StudyResults::default());
     // The scene as it stands has q = 3 and no waste. Four qualities that nobody beats, the same
     // with waste, one too great.
@@ -165,7 +165,7 @@ fn a_knob_of_known_law_has_the_front_it_must_have() {
 }
 
 #[test]
-fn what_saves_time_is_put_together() {
+fn settings_that_save_time_are_combined() {
     let (mut law, mut found) = (Law::default(), StudyResults::default());
     // From q = 3 to 2.5 saves a sixth, to 2 a third; waste saves nothing.
     assert!(study(
@@ -180,7 +180,7 @@ fn what_saves_time_is_put_together() {
 }
 
 #[test]
-fn what_is_there_is_not_run_again() {
+fn results_of_an_earlier_run_are_not_measured_again() {
     let (mut law, mut found) = (Law::default(), StudyResults::default());
     let stopped = AtomicBool::new(false);
     let first = plan(&["draw.cutoff=2.0,2.5"], Design::Alone, 4);

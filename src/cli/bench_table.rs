@@ -1,15 +1,17 @@
-//! What `nimbus bench` prints for people.
+//! The tables that `nimbus bench` prints.
 
 use std::path::Path;
 
-use super::output;
+use super::bench_remarks::{
+    clocks_line, drawn_line, latency_line, ms, overlap_lines, skipping_line, spread_lines,
+};
+use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
-use crate::timing::machine::Clocks;
-use crate::timing::overlap::Overlap;
-use crate::timing::records::{Block, Case, Measured, Mode, Ratio, Run, Skipping};
+use crate::timing::names::loop_name;
+use crate::timing::records::{Block, Case, Measured, Mode, Ratio, Run};
 
-/// The whole of it. `same`: of each case whether all its last frames are the same, to the byte.
-/// `verbose`: every table of every case.
+/// Returns the whole text. `same` says for each case whether the last frames of its blocks have the
+/// same bytes; with `verbose` every table of every case is printed.
 pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> String {
     let threads = run
         .environment
@@ -31,7 +33,7 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
     );
     if run.cases.len() > 1 {
         for rows in [case_rows(run), pass_by_case_rows(run)] {
-            out += &output::table(&rows);
+            out += &table(&rows);
             out.push('\n');
         }
     }
@@ -54,14 +56,14 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
 
 const DIFFER: &str = "THE LAST FRAMES DIFFER between the blocks\n";
 
-/// All that is said of one case.
+/// Returns the tables and remarks of one case.
 fn case_report(case: &Case, same: Option<bool>) -> String {
     let mut out = String::new();
     if !case.name().is_empty() {
         out += &format!("{}\n", case.name());
     }
     for rows in [time_rows(case), low_rows(case), pass_rows(case)] {
-        out += &output::table(&rows);
+        out += &table(&rows);
         out.push('\n');
     }
     if let Some(ratio) = case.ratio {
@@ -85,9 +87,9 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
     out
 }
 
-/// How the blocks took turns.
+/// Returns the order of the blocks in words.
 fn blocks_line(run: &Run) -> String {
-    /// Two full turns show the pattern.
+    /// Blocks that are shown: two rounds there and back of three loops.
     const N_SHOWN: usize = 12;
     let order = &run.block_order;
     let mut kinds: Vec<&Block> = Vec::new();
@@ -98,8 +100,7 @@ fn blocks_line(run: &Run) -> String {
     }
     let n = order.len();
     let n_rounds = n / kinds.len().max(1);
-    // There and back: a steady drift adds up to the same for all; of an odd number of rounds one is
-    // left over.
+    // A steady drift cancels over a round and its reverse; an odd number of rounds leaves one over.
     let is_balanced = n_rounds.is_multiple_of(2) && n == n_rounds * kinds.len();
     let balance = if is_balanced {
         ""
@@ -131,22 +132,14 @@ fn blocks_line(run: &Run) -> String {
     }
 }
 
-fn loop_name(threading: &str, skip: bool) -> String {
-    if skip { threading.to_owned() } else { format!("{threading} no-skip") }
-}
-
-fn name_of(mode: &Mode) -> String {
-    loop_name(&mode.threading, mode.skip)
-}
-
 fn ratio_text(r: Ratio) -> String {
     let interval =
         r.low.zip(r.high).map_or(String::new(), |(low, high)| format!(" ({low:.3}-{high:.3})"));
     format!("{:.3}{interval}", r.parallel_by_serial)
 }
 
-/// What a case is called, in columns: its phase where there are phases, then the values of the
-/// sweep's keys.
+/// Returns the columns that name a case: its phase, if there are phases, and the values of the
+/// sweep.
 fn case_columns(run: &Run) -> (Vec<String>, impl Fn(&Case) -> Vec<String>) {
     let has_phases = run.cases.iter().any(|c| c.phase.is_some());
     let mut header: Vec<String> = if has_phases { vec!["phase".to_owned()] } else { vec![] };
@@ -162,8 +155,8 @@ fn case_columns(run: &Run) -> (Vec<String>, impl Fn(&Case) -> Vec<String>) {
     (header, of)
 }
 
-/// A row a case: the median of every pass that ran in some case, where nothing is skipped or else
-/// in the first loop.
+/// Returns a row a case with the median of every pass that ran in some case, in the loop without
+/// skipping, or else in the first loop.
 fn pass_by_case_rows(run: &Run) -> Vec<Vec<String>> {
     let (mut header, columns) = case_columns(run);
     let whole = |case: &Case| case.modes.iter().position(|m| !m.skip).unwrap_or_default();
@@ -180,14 +173,14 @@ fn pass_by_case_rows(run: &Run) -> Vec<Vec<String>> {
     let mut rows = vec![header];
     for case in &run.cases {
         let mut row = columns(case);
-        row.push(case.modes.get(whole(case)).map_or("-".to_owned(), name_of));
-        row.extend(ran.iter().map(|i| p50(case, *i).map_or("-".to_owned(), ms)));
+        row.push(or_dash(case.modes.get(whole(case)), Mode::name));
+        row.extend(ran.iter().map(|i| or_dash(p50(case, *i), ms)));
         rows.push(row);
     }
     rows
 }
 
-/// A row a case and loop.
+/// Returns a row a case and loop.
 fn case_rows(run: &Run) -> Vec<Vec<String>> {
     let (mut header, columns) = case_columns(run);
     let figures = [
@@ -214,32 +207,25 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
             let is_parallel =
                 mode.threading == "parallel" && case.modes.iter().all(|m| m.skip <= mode.skip);
             let mut row = columns(case);
-            let p50 = |m: &Option<Measured>| m.map_or("-".to_owned(), |m| ms(m.of.p50));
-            let end = |of: fn(&Measured) -> Option<f64>| {
-                mode.frame_ms.as_ref().and_then(of).map_or("-".to_owned(), ms)
-            };
+            let p50 = |m: &Option<Measured>| or_dash(*m, |m| ms(m.of.p50));
+            let end =
+                |of: fn(&Measured) -> Option<f64>| or_dash(mode.frame_ms.as_ref().and_then(of), ms);
             row.extend([
                 case.particles.to_string(),
-                mode.drawn.map_or("-".to_owned(), |[_, mean, _]| format!("{mean:.0}")),
+                or_dash(mode.drawn, |[_, mean, _]| format!("{mean:.0}")),
                 format!("{}x{}", case.width, case.height),
-                name_of(mode),
+                mode.name(),
                 mode.frames.to_string(),
                 p50(&mode.frame_ms),
                 end(|m| m.p50_low),
                 end(|m| m.p50_high),
-                mode.frame_ms.map_or("-".to_owned(), |m| format!("{:.1}", fps(m.of.p50))),
+                or_dash(mode.frame_ms, |m| format!("{:.1}", fps(m.of.p50))),
                 p50(&mode.game_ms),
                 p50(&mode.gpu_ms),
                 p50(&mode.latency_ms),
-                if is_parallel {
-                    case.ratio.map_or("-".to_owned(), ratio_text)
-                } else {
-                    "-".to_owned()
-                },
-                reached
-                    .filter(|_| is_parallel)
-                    .map_or("-".to_owned(), |r| format!("{:.0}%", 100.0 * r.share)),
-                saved.filter(|_| !mode.skip).map_or("-".to_owned(), ms),
+                or_dash(case.ratio.filter(|_| is_parallel), ratio_text),
+                or_dash(reached.filter(|_| is_parallel), |r| format!("{:.0}%", 100.0 * r.share)),
+                or_dash(saved.filter(|_| !mode.skip), ms),
             ]);
             rows.push(row);
         }
@@ -247,131 +233,10 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
     rows
 }
 
-/// The bound of what overlap can do, and how near the parallel loop came.
-fn overlap_lines(o: &Overlap, case: &Case) -> String {
-    let (game, render, bound, serial) =
-        (ms(o.game_ms), ms(o.render_ms), ms(o.bound_ms), ms(o.serial_ms));
-    let share = o.bound_ms / o.serial_ms;
-    let mut out = format!(
-        "perfect overlap = max(game {game}, render {render}) = {bound} ms, {share:.3} of the \
-         serial {serial} ms\n"
-    );
-    if let Some(r) = o.reached {
-        let [share, low, high] = [r.share, r.low, r.high].map(|s| 100.0 * s);
-        let possible = ms(o.serial_ms - o.bound_ms);
-        out += &format!(
-            "of the possible {possible} ms the parallel loop gained {share:.1} % (95 % interval \
-             {low:.1} to {high:.1})\n"
-        );
-        if r.share > 1.0 {
-            out += "that is more than overlapping game and render alone can give: recording \
-                overlapped, too, or the \
-                    machine changed from block to block\n";
-        }
-        if r.share < 0.9 {
-            out += &slowed_line(o, case).unwrap_or_default();
-        }
-    } else if o.parallel_ms.is_some() {
-        out += "that is next to nothing, or not certain: what share of it was reached \
-            cannot be said\n";
-    }
-    out
-}
-
-/// Why overlap gains less than it could: steps that slow one another down.
-fn slowed_line(o: &Overlap, case: &Case) -> Option<String> {
-    let skip = case.modes.iter().any(|m| m.skip);
-    let parallel = case.modes.iter().find(|m| m.threading == "parallel" && m.skip == skip)?;
-    let (game, render) = (parallel.game_ms?.of.p50, parallel.render_ms?.of.p50);
-    // As much as the intervals of short runs leave open says nothing.
-    let is_slower = game > 1.05 * o.game_ms || render > 1.05 * o.render_ms;
-    is_slower.then(|| {
-        format!(
-            "side by side the game step takes {} in place of {}, the render step {} in place of {} \
-             ms: they share cores\n",
-            ms(game),
-            ms(o.game_ms),
-            ms(render),
-            ms(o.render_ms)
-        )
-    })
-}
-
-/// Where blocks of one loop lie as far apart as the two loops do, or a tenth.
-fn spread_lines(case: &Case) -> String {
-    let effect = case.ratio.map_or(f64::INFINITY, |r| r.parallel_by_serial.ln().abs());
-    let of = |m: &Mode| {
-        let spread = m.block_spread.filter(|s| s.ln() >= effect || *s >= 1.1)?;
-        Some(format!(
-            "{}: blocks lie a factor of {spread:.3} apart: the machine was not steady\n",
-            name_of(m)
-        ))
-    };
-    case.modes.iter().filter_map(of).collect()
-}
-
-/// What overlap costs: the picture's age.
-fn latency_line(case: &Case) -> Option<String> {
-    let skip = case.modes.iter().any(|m| m.skip);
-    let of =
-        |threading: &str| case.modes.iter().find(|m| m.threading == threading && m.skip == skip);
-    let (serial, parallel) = (of("serial")?, of("parallel")?);
-    let (a, b) = (serial.latency_ms?.of.p50, parallel.latency_ms?.of.p50);
-    let frame = serial.frame_ms?.of.p50;
-    let depth = parallel.queue_depth.map_or(String::new(), |n| format!(", {n:.2} frames queued"));
-    Some(format!(
-        "latency, game step to picture: serial {}, parallel {} ms: {:+.2} frames of the serial \
-         loop{depth}\n",
-        ms(a),
-        ms(b),
-        (b - a) / frame
-    ))
-}
-
-/// How many particles were drawn, where that were not all in every frame.
-fn drawn_line(case: &Case) -> Option<String> {
-    let [least, mean, most] = case.modes.iter().find(|m| m.skip)?.drawn?;
-    let n = case.particles;
-    (mean < n as f64)
-        .then(|| format!("drawn: {mean:.0} of {n} particles a frame, {least:.0} to {most:.0}\n"))
-}
-
-fn skipping_line(s: &Skipping) -> String {
-    let saved = s.gpu_no_skip_ms - s.gpu_ms;
-    let times = if s.gpu_ms > 0.0 {
-        format!("{:.1} times less", s.gpu_no_skip_ms / s.gpu_ms)
-    } else {
-        "nothing is left to do".to_owned()
-    };
-    let bytes = match s.same_bytes {
-        Some(true) => "; same bytes",
-        Some(false) => "; NOT THE SAME BYTES",
-        None => "",
-    };
-    format!(
-        "skipping saves {} of {} ms of GPU time a frame ({times}){bytes}\n",
-        ms(saved),
-        ms(s.gpu_no_skip_ms)
-    )
-}
-
-/// The host's clock and the device's: a time near these says nothing.
-fn clocks_line(clocks: &Clocks) -> String {
-    let device =
-        clocks.timestamp_period_ns.map_or("none".to_owned(), |ns| format!("{ns} ns a tick"));
-    let empty = clocks
-        .timestamp_overhead_ns
-        .map_or(String::new(), |ns| format!(", {ns:.0} ns for an empty pass"));
-    format!(
-        "host clock: resolution {} ns, {:.0} ns a reading; device timestamps: {device}{empty}\n",
-        clocks.resolution_ns, clocks.overhead_ns
-    )
-}
-
-/// Frame rates: the median's, and that of the slowest frames by each of the three definitions,
-/// beside how much frame times vary.
+/// Returns the frame rates of the median and of the slowest frames, by three definitions, and the
+/// relative spread of frame times.
 fn low_rows(case: &Case) -> Vec<Vec<String>> {
-    let header = [
+    let mut rows = header([
         "fps",
         "loop",
         "p50",
@@ -379,28 +244,24 @@ fn low_rows(case: &Case) -> Vec<Vec<String>> {
         "mean of slowest 1 %",
         "1 % of the time",
         "sd / mean",
-    ];
-    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    ]);
     for mode in case.modes.iter() {
         let (Some(frame), Some(lows)) = (&mode.frame_ms, &mode.frame_lows) else { continue };
         let rates = [fps(frame.of.p50), lows.p99_fps, lows.slowest_mean_fps, lows.slowest_time_fps];
-        let mut row = vec!["frame".to_owned(), name_of(mode)];
+        let mut row = vec!["frame".to_owned(), mode.name()];
         row.extend(rates.map(|rate| format!("{rate:.1}")));
-        row.push(
-            frame.of.sd.map_or("-".to_owned(), |sd| format!("{:.1}%", 100.0 * sd / frame.of.mean)),
-        );
+        row.push(or_dash(frame.of.sd, |sd| format!("{:.1}%", 100.0 * sd / frame.of.mean)));
         rows.push(row);
     }
     rows
 }
 
-/// The median of each time with its 95 % interval, and how the times spread.
+/// Returns the median of each time with its 95 % interval, and the spread of the times.
 fn time_rows(case: &Case) -> Vec<Vec<String>> {
-    let header = [
+    let mut rows = header([
         "ms", "loop", "n", "p50", "low", "high", "mean", "sd", "min", "p1", "p5", "p95", "p99",
         "max",
-    ];
-    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    ]);
     for (what, of) in [
         ("frame", (|m| m.frame_ms.as_ref()) as fn(&Mode) -> Option<&Measured>),
         ("game", |m| m.game_ms.as_ref()),
@@ -411,60 +272,42 @@ fn time_rows(case: &Case) -> Vec<Vec<String>> {
         ("gpu", |m| m.gpu_ms.as_ref()),
         ("latency", |m| m.latency_ms.as_ref()),
     ] {
-        // Of frames that skip nothing only what skipping is measured by.
+        // The loop without skipping only shows the times that skipping is measured by.
         let is_shown = |m: &&Mode| {
             m.skip || what == "frame" || what == "gpu" || case.modes.iter().all(|m| !m.skip)
         };
         for mode in case.modes.iter().filter(is_shown) {
             let Some(m) = of(mode) else { continue };
             let s = &m.of;
-            let mut row = vec![what.to_owned(), name_of(mode), s.n.to_string(), ms(s.p50)];
-            row.extend([m.p50_low, m.p50_high].map(|end| end.map_or("-".to_owned(), ms)));
-            let sd = s.sd.map_or("-".to_owned(), ms);
-            row.extend([
-                ms(s.mean),
-                sd,
-                ms(s.min),
-                ms(s.p1),
-                ms(s.p5),
-                ms(s.p95),
-                ms(s.p99),
-                ms(s.max),
-            ]);
+            let mut row = vec![what.to_owned(), mode.name(), s.n.to_string(), ms(s.p50)];
+            let [mean, min, p1, p5] = [s.mean, s.min, s.p1, s.p5].map(Some);
+            let [p95, p99, max] = [s.p95, s.p99, s.max].map(Some);
+            let times = [m.p50_low, m.p50_high, mean, s.sd, min, p1, p5, p95, p99, max];
+            row.extend(times.map(|time| or_dash(time, ms)));
             rows.push(row);
         }
     }
     rows
 }
 
-/// A row a pass: its median in every loop, and of the first loop how often it ran and why not.
+/// Returns a row a pass: its median in every loop, and, for the first loop, its share of the device
+/// time, the frames that ran and skipped it, the device time a frame that skipping it saved, and
+/// the reason of the last skip.
 fn pass_rows(case: &Case) -> Vec<Vec<String>> {
     let Some(first) = case.modes.first() else { return vec![] };
     let mut header = vec!["pass, p50 ms".to_owned()];
-    header.extend(case.modes.iter().map(name_of));
+    header.extend(case.modes.iter().map(Mode::name));
     header.extend(["share", "run", "skipped", "saved", "why"].map(str::to_owned));
     let mut rows = vec![header];
     for (i, pass) in first.passes.iter().enumerate() {
-        let share = pass
-            .share
-            .filter(|_| pass.n_run > 0)
-            .map_or("-".to_owned(), |s| format!("{:.1}%", 100.0 * s));
+        let share = pass.share.filter(|_| pass.n_run > 0);
+        let share = or_dash(share, |s| format!("{:.1}%", 100.0 * s));
         let mut row = vec![pass.name.clone()];
-        row.extend(
-            case.modes
-                .iter()
-                .map(|m| m.passes.get(i).and_then(|p| p.p50_ms).map_or("-".to_owned(), ms)),
-        );
+        let in_loop = |m: &Mode| or_dash(m.passes.get(i).and_then(|p| p.p50_ms), ms);
+        row.extend(case.modes.iter().map(in_loop));
         row.extend([share, pass.n_run.to_string(), pass.n_skipped.to_string()]);
-        row.extend([
-            pass.saved_ms.map_or("-".to_owned(), ms),
-            pass.reason.clone().unwrap_or_default(),
-        ]);
+        row.extend([or_dash(pass.saved_ms, ms), pass.reason.clone().unwrap_or_default()]);
         rows.push(row);
     }
     rows
-}
-
-fn ms(value: f64) -> String {
-    format!("{value:.3}")
 }

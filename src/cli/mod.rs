@@ -6,6 +6,7 @@ mod attach;
 mod bench;
 mod bench_cases;
 mod bench_plot;
+mod bench_remarks;
 mod bench_table;
 mod compare;
 mod compare_pictures;

@@ -1,32 +1,42 @@
-//! A scene's air as a row: what it holds, and where it condenses.
+//! A scene's air as a row: temperature, humidity, and the level at which it condenses.
 
 use serde::Serialize;
 
 use crate::model::moisture::T0_K;
 use crate::model::scene::Scene;
 
+/// The air of a scene.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AirRow {
+    /// Law of the saturation pressure.
     pub saturation: String,
+    /// Whether the saturation is over ice.
     pub ice: bool,
-    /// At the ground.
+    /// Temperature at the ground in °C.
     pub temperature_c: f64,
+    /// Pressure at the ground in hPa.
     pub pressure_hpa: f64,
+    /// Relative humidity at the ground, 0 to 1.
     pub humidity: f64,
+    /// Dew point at the ground in °C.
     pub dew_point_c: f64,
-    /// E and e.
+    /// Saturation pressure E in hPa.
     pub saturation_hpa: f64,
+    /// Vapour pressure e in hPa.
     pub vapour_hpa: f64,
-    /// Where a parcel that is lifted becomes saturated, over the ground.
+    /// Height over the ground, in m, at which a lifted parcel becomes saturated.
     pub base_m: f64,
+    /// Temperature there in °C.
     pub base_c: f64,
+    /// Pressure there in hPa.
     pub base_hpa: f64,
-    /// Scene units: that height, and by how much it is higher for a parcel that is warmer by a
-    /// kelvin.
+    /// That height in scene units.
     pub base: f64,
+    /// Rise of that height, in scene units, for a parcel that is warmer by 1 K.
     pub lift: f64,
 }
 
+/// Returns the air of a scene as a row.
 pub fn row(scene: &Scene) -> AirRow {
     let (air, parcel, law) = (&scene.air, &scene.air.parcel, scene.air.law);
     let level = air.condensation();

@@ -1,4 +1,4 @@
-//! The scene's BRDF basis as rows, and where it is too small for the scene's materials.
+//! The scene's BRDF basis as rows, and warnings about materials that it represents badly.
 
 use std::f64::consts::FRAC_1_PI;
 
@@ -9,61 +9,74 @@ use crate::model::basis::{Basis, N_NODES, Sampling, node, node_t};
 use crate::model::material::{Material, MaterialKey};
 use crate::model::scene::{LightingMode, Scene};
 
-/// A lobe that the basis misses by more than this share of it is warned of.
+/// Relative error of a material's lobe above which a warning is printed.
 const WARN_ABOVE: f64 = 0.01;
-/// Exponents over the range whose errors are shown, ends included.
+/// Exponents over the range whose errors are listed, ends included.
 const N_SHOWN: usize = 17;
 /// Exponents tried between two keys of an edited material.
 const N_BETWEEN_KEYS: u32 = 8;
 
-/// All that `nimbus inspect --basis --json` prints.
+/// The output of `nimbus inspect --basis --json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BasisReport {
-    /// N_b of the scene, and how many bases its range of exponents has: fewer where its lobes
-    /// differ too little.
+    /// N_b of the scene, the number of bases that it asks for.
     pub asked: u32,
+    /// Number of bases; fewer if the lobes over the range of exponents differ too little.
     pub kept: u32,
+    /// Sampling of the exponents.
     pub sampling: &'static str,
+    /// Range of the exponents n_s.
     pub exponents: [f64; 2],
+    /// The singular values.
     pub singular_values: Vec<ValueRow>,
+    /// The errors of lobes.
     pub errors: Vec<ErrorRow>,
+    /// The basis functions.
     pub table: NodeTable,
 }
 
+/// A singular value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ValueRow {
-    /// Of the basis: 1 is the first after the diffuse one.
+    /// Number of the basis; 1 is the first after the diffuse one.
     pub basis: usize,
+    /// The value.
     pub singular_value: f64,
+    /// Whether the basis is used.
     pub kept: bool,
 }
 
-/// How far the basis misses the lobe of an exponent.
+/// The error of the basis for the lobe of an exponent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorRow {
-    /// `range`: one of a set over the range; `worst`: the range's worst; `material`: the worst of a
-    /// material over time.
+    /// `range`: one of a set over the range; `worst`: the worst of the range; `material`: the worst
+    /// of a material over time.
     pub of: &'static str,
+    /// Name of the material.
     pub material: Option<String>,
+    /// The exponent n_s.
     pub ns: f64,
     /// Relative, L2 under the weight 4 cos γ sin γ dγ.
     pub error: f64,
 }
 
-/// Column by column.
+/// The basis functions at the nodes, column by column.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NodeTable {
+    /// Parameter of the nodes.
     pub t: Vec<f64>,
+    /// Angle γ of the nodes in degrees.
     pub gamma_deg: Vec<f64>,
-    /// The diffuse one first.
+    /// Values of the bases, the diffuse one first.
     pub bases: Vec<Vec<f64>>,
 }
 
-/// The basis of the scene's settings.
-pub fn of_scene(scene: &Scene) -> Basis {
+/// Returns the basis of the scene's settings.
+fn of_scene(scene: &Scene) -> Basis {
     Basis::new(scene.lighting.exponents, scene.lighting.bases, scene.lighting.sampling)
 }
 
+/// Returns everything about the scene's basis.
 pub fn report(scene: &Scene) -> BasisReport {
     let basis = of_scene(scene);
     let name = |s: Sampling| Sampling::NAMES.iter().find(|n| n.1 == s).map_or("", |n| n.0);
@@ -85,20 +98,20 @@ pub fn report(scene: &Scene) -> BasisReport {
     }
 }
 
-/// What is worth saying of the basis beside its rows.
+/// Returns a note if the basis has fewer functions than the scene asks for.
 pub fn note(report: &BasisReport) -> Option<String> {
     let [low, high] = report.exponents;
     let (asked, kept) = (report.asked, report.kept);
     (kept < asked).then(|| {
         format!(
-            "{asked} bases asked for, {kept} kept: the lobes of n_s from {low} to {high} have \
-            no more that differ"
+            "{asked} bases asked for, {kept} kept: the lobes of n_s from {low} to {high} differ in \
+             no more"
         )
     })
 }
 
-/// A line for every glossy material that the scene's basis misses by more than one in a hundred at
-/// some time.
+/// Returns a warning for every glossy material whose lobe the basis represents with an error above
+/// 1 % at some time.
 pub fn basis_warnings(scene: &Scene) -> Vec<String> {
     let is_lit = scene.lighting.mode != LightingMode::None;
     if !is_lit || !scene.materials.iter().any(Material::is_glossy) {
@@ -118,8 +131,7 @@ fn warning(basis: &Basis, material: &Material, (ns, error): (f64, f64)) -> Strin
         ),
         n => format!(
             "material `{name}`: {n} bases represent n_s = {} only to {:.2} %; raise lighting.bases \
-             or narrow \
-             lighting.exponents",
+             or narrow lighting.exponents",
             (ns * 100.0).round() / 100.0,
             error * 100.0
         ),
@@ -140,8 +152,8 @@ fn errors(basis: &Basis, materials: &[Material]) -> Vec<ErrorRow> {
     rows
 }
 
-/// The exponent, of those that the material has while it has a lobe, that the basis misses most,
-/// and by how much.
+/// Returns the exponent with the greatest error among those that the material has while it has a
+/// lobe, and this error.
 fn worst_of(basis: &Basis, material: &Material) -> Option<(f64, f64)> {
     let has_lobe = |k: &MaterialKey| k.brdf.ks != DVec3::ZERO;
     let at_keys = material.keys.iter().filter(|k| has_lobe(k)).map(|k| k.brdf.ns);
@@ -167,13 +179,13 @@ fn table(basis: &Basis) -> NodeTable {
 }
 
 impl NodeTable {
-    /// Names of the columns: t, gamma_deg, b0, b1, ...
+    /// Returns the names of the columns: t, gamma_deg, b0, b1, ...
     pub fn names(&self) -> Vec<String> {
         let bases = (0..self.bases.len()).map(|b| format!("b{b}"));
         ["t", "gamma_deg"].map(str::to_owned).into_iter().chain(bases).collect()
     }
 
-    /// A row for every node.
+    /// Returns a row for every node.
     pub fn rows(&self) -> impl Iterator<Item = Vec<f64>> {
         let columns = [&self.t, &self.gamma_deg].into_iter().chain(&self.bases).collect::<Vec<_>>();
         (0..self.t.len()).map(move |i| columns.iter().map(|c| c[i]).collect())
@@ -194,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_material_is_as_bad_as_its_worst_time_with_a_lobe() {
+    fn the_error_of_a_material_is_the_worst_while_it_has_a_lobe() {
         let basis = Basis::new([1.0, 256.0], 4, Sampling::Log);
         assert_eq!(worst_of(&basis, &material(&[(0.0, 0.0, 256.0)])), None);
         assert_eq!(worst_of(&basis, &material(&[(0.0, 0.1, 9.0)])), Some((9.0, basis.error(9.0))));
@@ -210,12 +222,11 @@ mod tests {
     }
 
     #[test]
-    fn warnings_say_how_far_and_what_to_do() {
+    fn warnings_state_the_error_and_the_remedy() {
         let basis = Basis::new([1.0, 10000.0], 8, Sampling::Log);
         let text = warning(&basis, &material(&[(0.0, 0.1, 1e4)]), (1e4, 0.048));
         let expected = "material `m`: 8 bases represent n_s = 10000 only to 4.80 %; raise \
-            lighting.bases or narrow \
-                        lighting.exponents";
+                        lighting.bases or narrow lighting.exponents";
         assert_eq!(text, expected);
         let alone = Basis::new([1.0, 10000.0], 1, Sampling::Log);
         assert!(

@@ -1,4 +1,5 @@
-//! The rows that `nimbus inspect` prints: what each stage of a frame holds, the air, and the basis.
+//! The rows that `nimbus inspect` prints: the buffers of each stage of a frame ([`stages`]), the
+//! [`air`] and the BRDF [`basis`].
 
 pub mod air;
 pub mod basis;

@@ -1,4 +1,4 @@
-//! A stage's buffer as rows: what the device holds, or what the f64 reference says.
+//! The buffers of each stage of a frame as rows, from the device or from the reference in f64.
 
 use glam::{DVec3, Vec3};
 use serde::Serialize;
@@ -14,71 +14,116 @@ use crate::passes::generate::FOLDED;
 use crate::reference::generate::Generated;
 use crate::reference::picture::{FrameReference, colors};
 
-/// A particle in the scene's coordinates.
+/// A particle, in scene coordinates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParticleRow {
+    /// Number of the particle.
     pub index: usize,
+    /// Number of its cloud.
     pub cloud: usize,
+    /// Centre, x.
     pub x: f64,
+    /// Centre, y.
     pub y: f64,
+    /// Centre, z.
     pub z: f64,
+    /// Radius.
     pub radius: f64,
+    /// Standard deviation σ of its density.
     pub sigma: f64,
+    /// Extinction at its centre.
     pub kappa: f64,
+    /// Colour, red.
     pub r: f64,
+    /// Colour, green.
     pub g: f64,
+    /// Colour, blue.
     pub b: f64,
 }
 
-/// A facet in the scene's coordinates. I_d, I_i: irradiance; L1, L2: radiance toward the camera,
-/// which a surface's back does not have. I_i and L2 are zero where lighting.mode is "first".
+/// A facet, in scene coordinates, with direct and indirect irradiance I_d and I_i, and the radiance
+/// toward the camera of the first and second reflection, L1 and L2. The back of a surface has no
+/// radiance; I_i and L2 are zero if lighting.mode is "first".
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FacetRow {
+    /// Number of the facet.
     pub index: usize,
+    /// Number of its region.
     pub region: u32,
+    /// Centre, x.
     pub x: f64,
+    /// Centre, y.
     pub y: f64,
+    /// Centre, z.
     pub z: f64,
+    /// Normal, x.
     pub nx: f64,
+    /// Normal, y.
     pub ny: f64,
+    /// Normal, z.
     pub nz: f64,
+    /// Area.
     pub area: f64,
+    /// Direct irradiance, red.
     pub id_r: f64,
+    /// Direct irradiance, green.
     pub id_g: f64,
+    /// Direct irradiance, blue.
     pub id_b: f64,
+    /// Indirect irradiance, red.
     pub ii_r: f64,
+    /// Indirect irradiance, green.
     pub ii_g: f64,
+    /// Indirect irradiance, blue.
     pub ii_b: f64,
+    /// Radiance of the first reflection, red.
     pub l1_r: f64,
+    /// Radiance of the first reflection, green.
     pub l1_g: f64,
+    /// Radiance of the first reflection, blue.
     pub l1_b: f64,
+    /// Radiance of the second reflection, red.
     pub l2_r: f64,
+    /// Radiance of the second reflection, green.
     pub l2_g: f64,
+    /// Radiance of the second reflection, blue.
     pub l2_b: f64,
 }
 
-/// What a box made of its particles.
+/// The generation of a box's particles.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BoxRow {
+    /// Number of the cloud.
     pub cloud: usize,
+    /// Number of the box in its cloud.
     pub r#box: usize,
+    /// Particles.
     pub particles: u32,
+    /// Random points that were tried.
     pub attempts: u64,
-    /// Particles over attempts; none for an empty box.
+    /// Particles divided by attempts; none for an empty box.
     pub acceptance: Option<f64>,
+    /// Particles that were folded into the box after the last attempt.
     pub folded: u32,
 }
 
-/// One pass of one frame.
+/// The decision about one pass of one frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlanRow {
+    /// Frame number.
     pub frame: u32,
+    /// Name of the pass.
     pub pass: &'static str,
+    /// Whether it runs.
     pub run: bool,
+    /// Why.
     pub reason: String,
 }
 
-/// Particles of `i_frame` as the device has them.
+/// Returns the particles of a frame from the device.
+///
+/// # Errors
+/// Fails if drawing the frame fails.
 pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
     let packet = stage.game.step(i_frame)?;
     let time_s = packet.time_s;
@@ -102,7 +147,10 @@ pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
     Ok(rows.collect())
 }
 
-/// The same from the reference.
+/// Returns the particles of a frame from the reference.
+///
+/// # Errors
+/// Fails if the scene has no such reference.
 pub fn particles_reference(scene: &Scene, i_frame: u32) -> Result<Vec<ParticleRow>> {
     let mut unlit = scene.clone();
     unlit.lighting.mode = LightingMode::None;
@@ -115,7 +163,10 @@ pub fn particles_reference(scene: &Scene, i_frame: u32) -> Result<Vec<ParticleRo
     Ok(rows.collect())
 }
 
-/// Facets of `i_frame` as the device has them.
+/// Returns the facets of a frame from the device.
+///
+/// # Errors
+/// Fails if the scene is not lit or drawing the frame fails.
 pub fn facets(stage: &mut Stage, i_frame: u32) -> Result<Vec<FacetRow>> {
     check_lit(&stage.scene)?;
     let packet = stage.game.step(i_frame)?;
@@ -135,7 +186,10 @@ pub fn facets(stage: &mut Stage, i_frame: u32) -> Result<Vec<FacetRow>> {
     Ok(rows.collect())
 }
 
-/// The same from the reference.
+/// Returns the facets of a frame from the reference.
+///
+/// # Errors
+/// Fails if the scene is not lit or has no such reference.
 pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
     check_lit(scene)?;
     let truth = FrameReference::new(scene, scene.time.at(i_frame))?;
@@ -154,8 +208,8 @@ pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
     Ok(rows.collect())
 }
 
-/// The area means of the facets of each surface and ground, a row each; its index, region, centre,
-/// normal and whole area.
+/// Returns a row for each surface and ground, with its centre, normal and area, and the means of its
+/// facets weighted by their areas.
 pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
     let of_ground = |t: &Terrain| {
         let (low, high) = t.bounds();
@@ -184,7 +238,10 @@ pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
     surfaces.chain(scene.terrains.iter().map(of_ground)).enumerate().map(mean).collect()
 }
 
-/// Attempts and folded particles of every box, from the device.
+/// Returns the attempts and folded particles of every box from the device.
+///
+/// # Errors
+/// Fails if generating the particles fails.
 pub fn boxes(stage: &mut Stage) -> Result<Vec<BoxRow>> {
     let status = stage.renderer.generate_now(&stage.device)?.1;
     let tries =
@@ -192,7 +249,7 @@ pub fn boxes(stage: &mut Stage) -> Result<Vec<BoxRow>> {
     Ok(box_rows(&stage.scene, &tries))
 }
 
-/// The same from the reference.
+/// Returns the attempts and folded particles of every box from the reference.
 pub fn boxes_reference(scene: &Scene) -> Vec<BoxRow> {
     let tried = |g: Generated| (u64::from(g.n_attempts), g.folded);
     let tries: Vec<_> = scene
@@ -233,7 +290,10 @@ fn box_rows(scene: &Scene, tries: &[(u64, bool)]) -> Vec<BoxRow> {
     rows
 }
 
-/// What frames `0..n_frames` run and leave out, and why.
+/// Returns the passes that frames `0..n_frames` run and skip, with the reasons.
+///
+/// # Errors
+/// Fails if drawing a frame fails.
 pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
     let mut rows = Vec::new();
     let on_frame = &mut |times: crate::frame::FrameTimes, _: &mut _| {
@@ -262,8 +322,8 @@ fn check_lit(scene: &Scene) -> Result<()> {
     }
 }
 
-/// Groups are in order of their particles, so the last that begins at or before i holds it (empty
-/// ones begin where the next does, and come before it).
+/// Returns the cloud of particle `i`: that of the last group that begins at or before it. Groups are
+/// in the order of their particles, and an empty one precedes the group that begins at its place.
 fn cloud_of(groups: &[Group], i: usize) -> usize {
     let after = groups.partition_point(|g| g.i_first as usize <= i);
     groups[after.saturating_sub(1)].i_cloud
@@ -293,7 +353,7 @@ fn particle_row(
     }
 }
 
-/// L1 and L2 (the last two) are zero where the camera sees a surface's or the ground's back.
+/// Sets L1 and L2, the last two of `lit`, to zero if the camera sees the back of a surface or ground.
 fn toward_camera(
     scene: &Scene,
     region: u32,

@@ -1,46 +1,50 @@
-//! How sure a median, a ratio of medians, or any figure of lists of frames is.
+//! Confidence intervals of a median, a ratio of medians, or any statistic of lists of frames.
 
 use super::random::SplitMix64;
 use super::stats::{finite, median_by_selection, percentile};
 
-/// A figure and its 95 % interval.
+/// An estimate and its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
+    /// The statistic of the lists themselves.
     pub estimate: f64,
+    /// Lower end of the interval.
     pub low: f64,
+    /// Upper end of the interval.
     pub high: f64,
 }
 
-/// The percentile bootstrap (Efron 1979), deterministic in its seed. Neighbouring frames are alike,
-/// and resampling them one by one would give an interval that is too narrow; so runs of `block_len`
-/// neighbours are resampled together (circular block bootstrap, Politis and Romano 1992). A
-/// `block_len` of 1 is the ordinary bootstrap, right for values that do not depend on one another.
+/// The percentile bootstrap (Efron 1979), deterministic in its seed.
 ///
-/// Its percentiles are then moved away from the estimate by two factors, both of which a bootstrap
-/// of k = n/ℓ blocks of ℓ lacks, and without which it holds the truth too rarely:
+/// Neighbouring frames are correlated, and resampling them one by one would give an interval that
+/// is too narrow. Therefore runs of `block_len` neighbours are resampled together (circular block
+/// bootstrap, Politis and Romano 1992). A `block_len` of 1 is the ordinary bootstrap, which suits
+/// independent values.
 ///
-/// - √(k/(k − 1)). A resample's mean is that of k block means B drawn from all n circular ones, so
-///   that its variance is
-///   (1/k) · mean (B − x̄)². That mean square is taken about the sample's own mean, not the true
-///   one: mean (B − x̄)² =
-///   mean (B − μ)² − (x̄ − μ)², in expectation var B − var x̄. Where values further apart than ℓ
-///   depend little on one
-///   another, var B = k var x̄, and what comes out is (1/k)(k − 1) var x̄, too small by 1 − 1/k. A
-///   median is for many
-///   values the mean of their influences, and inherits it.
-/// - t/z: the 97.5th percentile of Student's distribution by that of the normal one. The spread is
-///   itself estimated from k
-///   blocks, and dividing by an estimate of k − 1 degrees of freedom makes Student's t of a normal
-///   deviate. Several lists
-///   bring the degrees of freedom of all, which is Welch's number where they vary alike.
+/// The percentiles are then moved away from the estimate by two factors. Without them a bootstrap
+/// of k = n/ℓ blocks of length ℓ contains the true value too rarely:
+///
+/// - √(k/(k − 1)). The mean of a resample is that of k block means B drawn from all n circular
+///   ones; its variance is (1/k) · mean (B − x̄)². That mean square is about the sample's own mean
+///   and not the true one: mean (B − x̄)² = mean (B − μ)² − (x̄ − μ)², in expectation var B − var x̄.
+///   If values further apart than ℓ are nearly independent, var B = k var x̄, and the result is
+///   (1/k)(k − 1) var x̄, too small by 1 − 1/k. The median of many values is the mean of their
+///   influences, so that the same holds for it.
+/// - t/z, the 97.5th percentile of Student's distribution divided by that of the normal one. The
+///   spread is itself estimated from k blocks, and a normal deviate divided by an estimate with
+///   k − 1 degrees of freedom follows Student's t. The degrees of freedom of several lists add up,
+///   which is Welch's number if they vary alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bootstrap {
+    /// Number of resamples.
     pub n_resamples: usize,
+    /// Neighbours that are resampled together.
     pub block_len: usize,
+    /// Seed of the random numbers.
     pub seed: u64,
 }
 
-/// 2000 resamples leave 50 beyond each end of the interval, so that an end is known to about a
+/// 2000 resamples leave 50 beyond each end of the interval, which determines an end to about a
 /// tenth of its width.
 impl Default for Bootstrap {
     fn default() -> Self {
@@ -52,10 +56,12 @@ const INTERVAL_LOW: f64 = 0.025;
 const INTERVAL_HIGH: f64 = 0.975;
 
 impl Bootstrap {
-    /// For frames in the order they ran, `n` of them: blocks of ⌈√n⌉. n^(1/3), which is best for
-    /// faint correlation, is too short for a strong one. Of runs with realistic frame times
-    /// (lognormal with 3 % noise under a first-order autoregression, one frame in twenty late) the
-    /// interval of the ratio of medians held the truth, in % of 4000 trials:
+    /// Returns the bootstrap for `n` frames in the order in which they ran, with blocks of ⌈√n⌉.
+    ///
+    /// Blocks of n^(1/3), which suit a weak correlation best, are too short for a strong one. For
+    /// runs with realistic frame times (lognormal with 3 % noise under a first-order autoregression
+    /// with coefficient ρ, one frame in twenty late) the interval of the ratio of medians contained
+    /// the true value in this percentage of 4000 trials:
     ///
     /// | n | ρ = 0 | 0.3 | 0.6 |
     /// |---|---|---|---|
@@ -64,17 +70,19 @@ impl Bootstrap {
     /// | 120 | 96.4 | 95.9 | 94.2 |
     /// | 240 | 96.1 | 95.5 | 94.1 |
     ///
-    /// and that of one median 92.8 to 96.4 (`coverage_in_thousands_of_trials`).
+    /// The interval of one median contained it in 92.8 to 96.4 %
+    /// (`coverage_in_thousands_of_trials`).
     pub fn of_neighbours(n: usize) -> Self {
         let block_len = (n as f64).sqrt().ceil().max(1.0) as usize;
         Bootstrap { block_len, ..Bootstrap::default() }
     }
 
-    /// Of any `statistic` of N lists of `n_rows`, each resampled on its own: it is handed the rows
-    /// drawn from each, which are as many as there are. Columns of one list stay together that way.
-    /// None when no resample was asked for, or the statistic is not finite for the lists themselves
-    /// or for a single resample: what has no bound must not seem to have one. None as well where a
-    /// list is no longer than a block: all its resamples are itself.
+    /// Returns the interval of any `statistic` of N lists with `n_rows` rows.
+    ///
+    /// Each list is resampled independently; the statistic receives the numbers of the rows drawn
+    /// from each, so that the columns of one list stay together. None without resamples, if the
+    /// statistic is not finite for the lists or one of their resamples, or if a list is no longer
+    /// than a block, so that all its resamples are equal.
     pub fn interval<const N: usize>(
         &self,
         n_rows: [usize; N],
@@ -103,8 +111,8 @@ impl Bootstrap {
         })
     }
 
-    /// What the interval of lists of `n_rows` is widened by (see [`Bootstrap`]); of lists of
-    /// different lengths by what the shortest needs. None where one is no longer than a block.
+    /// Returns the factor that widens the interval (see [`Bootstrap`]), for lists of different
+    /// lengths that of the shortest. None if a list is no longer than a block.
     fn widening(&self, n_rows: &[usize]) -> Option<f64> {
         let n_blocks = n_rows.iter().map(|&n| n as f64 / self.block_len.max(1) as f64);
         let least = n_blocks.clone().fold(f64::INFINITY, f64::min);
@@ -112,31 +120,30 @@ impl Bootstrap {
         (least > 1.0).then(|| (least / (least - 1.0)).sqrt() * student_by_normal(degrees))
     }
 
-    /// The median of the finite values. None when there is none or no resample was asked for.
+    /// Returns the interval of the median of the finite values; None if there are none.
     pub fn median(&self, values: &[f64]) -> Option<Interval> {
         let values = finite(values);
         self.interval([values.len()], |[rows]| median_of_rows(&values, rows))
     }
 
-    /// median(numerator) / median(denominator), each resampled on its own. None when either holds
-    /// no finite value. A denominator whose median is not above zero, as it is or in a resample,
-    /// has no ratio: None as well.
+    /// Returns the interval of median(numerator) / median(denominator), each resampled
+    /// independently. None if either has no finite value, or if the denominator's median is not
+    /// above zero, as it is or in a resample.
     pub fn ratio_of_medians(&self, numerator: &[f64], denominator: &[f64]) -> Option<Interval> {
         let (numerator, denominator) = (finite(numerator), finite(denominator));
         let mut ratio = self.interval([numerator.len(), denominator.len()], |[top, bottom]| {
             let bottom = median_of_rows(&denominator, bottom);
             if bottom > 0.0 { median_of_rows(&numerator, top) / bottom } else { f64::NAN }
         })?;
-        // Of very few values the widened interval may reach below what any ratio of such values can
-        // be.
+        // The widened interval of very few values can reach below 0, which no ratio of positive
+        // values does.
         if numerator.iter().all(|value| *value >= 0.0) {
             ratio.low = ratio.low.max(0.0);
         }
         Some(ratio)
     }
 
-    /// `n` rows of 0 … n − 1, which are in the order of time: blocks are runs of it, and wrap
-    /// around.
+    /// Draws `n` of the rows 0 … n − 1, which are in the order of time, in blocks that wrap around.
     fn draw(&self, n: usize, rows: &mut Vec<usize>, random: &mut SplitMix64) {
         let block_len = self.block_len.clamp(1, n);
         rows.clear();
@@ -148,8 +155,10 @@ impl Bootstrap {
     }
 }
 
-/// The 97.5th percentile of Student's distribution by that of the normal one: Abramowitz and Stegun
-/// 26.7.5, which is within 1 % from two degrees of freedom on and within 0.05 % from four.
+/// Returns the 97.5th percentile of Student's distribution divided by that of the normal one.
+///
+/// *Source*: Abramowitz and Stegun 26.7.5, accurate to 1 % from two degrees of freedom on and to
+/// 0.05 % from four.
 fn student_by_normal(degrees: f64) -> f64 {
     const Z: f64 = 1.959_963_984_540_054;
     let (z2, v) = (Z * Z, degrees);
@@ -162,7 +171,7 @@ fn student_by_normal(degrees: f64) -> f64 {
     1.0 + terms.iter().rev().fold(0.0, |sum, term| (sum + term) / v)
 }
 
-/// The median of `values` at `rows`; NaN for no row. The values are finite.
+/// Returns the median of the finite `values` at `rows`; NaN for no row.
 pub fn median_of_rows(values: &[f64], rows: &[usize]) -> f64 {
     let mut drawn: Vec<f64> = rows.iter().map(|&row| values[row]).collect();
     if drawn.is_empty() { f64::NAN } else { median_by_selection(&mut drawn) }

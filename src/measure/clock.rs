@@ -1,29 +1,28 @@
-//! The host's monotonic clock, which all host times are taken with (`std::time::Instant`): what it
-//! costs and how fine it is, measured on this machine. A time shorter than a few resolutions or
-//! overheads says nothing, and the results carry both.
+//! The precision of the host's monotonic clock (`std::time::Instant`), measured on this machine. A
+//! time of a few resolutions or overheads is meaningless; the results therefore record both.
 
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Readings taken to find the resolution. 20 000 readings of 20–50 ns take about a millisecond.
+/// Readings that determine the resolution. 20 000 readings of 20–50 ns take about a millisecond.
 const N_RESOLUTION_READINGS: usize = 20_000;
-/// The overhead is the median over batches, so that a batch that was interrupted by the scheduler
-/// does not count, of the mean within a batch, so that the resolution does not show.
+/// Batches of readings. The overhead is the median over batches, which leaves out those that the
+/// scheduler interrupted, of the mean within a batch, which averages the resolution out.
 const N_OVERHEAD_BATCHES: usize = 101;
 const N_OVERHEAD_CALLS: u32 = 64;
 
-/// Both in nanoseconds.
+/// The precision of a clock.
 #[derive(Debug, Clone, Copy)]
 pub struct ClockQuality {
-    /// The smallest step ever seen between two readings: an upper bound of the tick, since a clock
-    /// that is read more slowly than it ticks cannot show its tick.
+    /// Smallest step between two readings, in ns: an upper bound of the tick, which stays hidden if
+    /// a reading takes longer.
     pub resolution_ns: u64,
-    /// What one reading costs. An interval between two readings holds about one of them.
+    /// Time of one reading, in ns. An interval between two readings contains about one of them.
     pub overhead_ns: f64,
 }
 
 impl ClockQuality {
-    /// Takes a few milliseconds.
+    /// Measures both, which takes a few milliseconds.
     pub fn measure() -> Self {
         let epoch = Instant::now();
         ClockQuality {
@@ -47,7 +46,7 @@ fn measure_resolution_ns(epoch: Instant) -> u64 {
             last = now;
         }
     }
-    // A clock so coarse that it never ticked during the readings: one more tick is waited for.
+    // A coarse clock may not tick during the readings; wait for one more tick.
     while smallest == u64::MAX {
         let now = elapsed_ns(epoch);
         if now > last {
@@ -64,7 +63,7 @@ fn measure_overhead_ns(epoch: Instant) -> f64 {
         for _ in 0..N_OVERHEAD_CALLS {
             black_box(elapsed_ns(black_box(epoch)));
         }
-        // The closing reading is one more call.
+        // The last reading is one more call.
         *batch = (elapsed_ns(epoch) - start) as f64 / f64::from(N_OVERHEAD_CALLS + 1);
     }
     batches.sort_by(f64::total_cmp);

@@ -1,32 +1,33 @@
-//! "1 % low": three figures go by that name, and on the same frames they differ. All three, each by
-//! its own name.
+//! "1 % low" frame rates. Three definitions have that name and differ on the same frames; all
+//! three are computed.
 
 use serde::{Deserialize, Serialize};
 
 use super::stats::{mean, percentile_of_sorted, sorted_finite};
 
-/// Of all frames, and of all time, what counts as the slowest.
+/// The share of frames that counts as the slowest is one in this many.
 const N_FRAMES_PER_SLOW_ONE: usize = 100;
+/// The share of the time, or of the frames by percentile, that counts as the slowest.
 const SLOW_SHARE: f64 = 0.01;
 
-/// Frame rates of the slowest frames, in frames a second.
+/// Frame rates of the slowest frames, in frames per second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Lows {
-    /// "p99": 1000 by the 99th percentile of the frame times (`Summary::p99`, interpolated). Says
-    /// nothing of how slow the frames beyond it are.
+    /// "p99": 1000 divided by the 99th percentile of the frame times (`Summary::p99`). It does not
+    /// depend on how slow the frames beyond the percentile are.
     pub p99_fps: f64,
-    /// "Mean of slowest 1 %": 1000 by the mean of the ⌈n/100⌉ longest frame times, which is the
-    /// longest alone up to n = 100.
+    /// "Mean of slowest 1 %": 1000 divided by the mean of the ⌈n/100⌉ longest frame times, which is
+    /// the longest one up to n = 100.
     pub slowest_mean_fps: f64,
-    /// "1 % of the time": 1000 by the frame time that the slowest frames reach, taken from the
-    /// longest on, where they first make up 1 % of the total time. Long frames weigh by their
-    /// length (CapFrameX's "1 % low integral").
+    /// "1 % of the time": the longest frames are added up until they make 1 % of the total time;
+    /// the figure is 1000 divided by the last one added. Frames weigh by their length (CapFrameX's
+    /// "1 % low integral").
     pub slowest_time_fps: f64,
 }
 
 impl Lows {
-    /// `frame_ms` in ms, in any order; what is not finite is left out. None when nothing is left,
-    /// or where a frame took no time, which no clock measures.
+    /// Computes the rates from frame times in ms, in any order, without those that are not finite.
+    /// None if none is left, or a frame took no time.
     pub fn of(frame_ms: &[f64]) -> Option<Lows> {
         let sorted = sorted_finite(frame_ms);
         if sorted.first().is_none_or(|shortest| *shortest <= 0.0) {
@@ -41,13 +42,13 @@ impl Lows {
     }
 }
 
-/// Frames a second at `ms` a frame.
+/// Returns the frame rate in frames per second at `ms` a frame.
 pub fn fps(ms: f64) -> f64 {
     1000.0 / ms
 }
 
-/// The frame time at which the slowest frames first make up their share of the total. None for no
-/// frame.
+/// Returns the frame time at which the slowest frames first make up their share of the total; None
+/// for no frame.
 fn reached_by_slowest(sorted: &[f64]) -> Option<f64> {
     let share = SLOW_SHARE * sorted.iter().sum::<f64>();
     let mut sum = 0.0;
@@ -57,7 +58,7 @@ fn reached_by_slowest(sorted: &[f64]) -> Option<f64> {
             return Some(ms);
         }
     }
-    // Rounding alone: a hundredth of the sum is reached long before its end.
+    // Unreachable but for rounding: a hundredth of the sum is reached before its end.
     sorted.first().copied()
 }
 

@@ -1,4 +1,7 @@
-//! Clocks, zones and statistics; knows nothing of clouds or Vulkan.
+//! Clocks, zones and statistics, independent of clouds and Vulkan.
+//!
+//! [`clock`] measures the host's clock, [`zones`] collects the spans of threads, [`stats`],
+//! [`bootstrap`] and [`lows`] summarize lists of times, and [`picture`] compares pictures.
 
 pub mod bootstrap;
 pub mod clock;

@@ -1,30 +1,31 @@
-//! How far two pictures of one size are apart: errors of numbers in f64, SSIM of what an eye takes
-//! for structure ([`ssim`]), FLIP of what it would see flicker ([`flip`]). Pictures come as they
-//! are, linear or for display; who calls knows which.
+//! Metrics of the difference between two pictures of one size: errors of their numbers, structural
+//! similarity ([`ssim`]) and visible flicker ([`flip`]). The caller knows whether values are linear
+//! or for display.
 
 pub mod flip;
 pub mod map;
 pub mod ssim;
 
-/// ε of relMSE: below its root, a tenth, errors count by their size and not by the value's. As in
-/// Rousselle et al. 2011.
+/// ε of relMSE (Rousselle et al. 2011): for values below √ε, a tenth, errors count absolutely and
+/// not relative to the value.
 pub const RELATIVE_EPSILON: f64 = 0.01;
-/// What PSNR is relative to: a display's white.
+/// Peak of PSNR, the white of a display.
 pub const PEAK: f64 = 1.0;
 
-/// Errors over numbers.
+/// Errors over all numbers of two pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// Root of the mean square.
+    /// Root mean square.
     pub rmse: f64,
+    /// Greatest absolute difference.
     pub max_abs: f64,
-    /// Mean of (b − a)²/(a² + ε), a being what is measured by, ε [`RELATIVE_EPSILON`].
+    /// Mean of (b − a)²/(a² + ε), with the reference a and ε = [`RELATIVE_EPSILON`].
     pub rel_mse: f64,
     /// −10 log₁₀(mean square/[`PEAK`]²), in dB; infinite for equal pictures.
     pub psnr_db: f64,
 }
 
-/// Of pairs (a, b) of finite numbers, a what is measured by; none of no pairs.
+/// Returns the errors of pairs (a, b) of finite numbers, with the reference a; none for no pair.
 pub fn errors(pairs: impl Iterator<Item = (f64, f64)>) -> Option<Errors> {
     let (mut n, mut squares, mut relative, mut max_abs) = (0u64, 0.0, 0.0, 0f64);
     for (a, b) in pairs {
@@ -42,11 +43,12 @@ pub fn errors(pairs: impl Iterator<Item = (f64, f64)>) -> Option<Errors> {
     Some(Errors { rmse: mean.sqrt(), max_abs, rel_mse: relative / n as f64, psnr_db })
 }
 
-/// Pixels of which some channel is no finite number.
+/// Returns the number of pixels with a channel that is not finite.
 pub fn n_not_finite(rgba: &[[f64; 4]]) -> usize {
     rgba.iter().filter(|p| !is_finite(p)).count()
 }
 
+/// Returns whether all channels of a pixel are finite.
 pub fn is_finite(pixel: &[f64; 4]) -> bool {
     pixel.iter().all(|v| v.is_finite())
 }

@@ -1,6 +1,6 @@
 //! Pseudo-random numbers for resampling.
 
-/// Steele, Lea and Flood 2014. Its own, because this room imports nothing of ours.
+/// The generator of Steele, Lea and Flood 2014.
 pub(crate) struct SplitMix64(pub(crate) u64);
 
 impl SplitMix64 {
@@ -12,7 +12,7 @@ impl SplitMix64 {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [0, n) by the high half of a product; the bias is below n / 2⁶⁴.
+    /// Returns a uniform number in [0, n), the high half of a product; its bias is below n / 2⁶⁴.
     pub(super) fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.next()) * n as u128) >> 64) as usize
     }
@@ -20,26 +20,26 @@ impl SplitMix64 {
 
 #[cfg(test)]
 impl SplitMix64 {
-    /// In [0, 1).
+    /// Returns a uniform number in [0, 1).
     fn uniform(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// By Box and Muller.
+    /// Returns a standard normal number (Box and Muller 1958).
     fn normal(&mut self) -> f64 {
         (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
     }
 }
 
-/// Standard normal values.
+/// Returns standard normal values.
 #[cfg(test)]
 pub(crate) fn normal(random: &mut SplitMix64, n: usize) -> Vec<f64> {
     (0..n).map(|_| random.normal()).collect()
 }
 
-/// Frame times as a machine gives them: about `median`, lognormal with `sd` of the logarithm under
-/// a first-order autoregression with `rho`, and one in twenty late by an exponential tenth on top.
-/// (The median so lies 0.1 `sd` higher.)
+/// Returns realistic frame times: about `median`, lognormal with standard deviation `sd` of the
+/// logarithm under a first-order autoregression with coefficient `rho`; one frame in twenty is late
+/// by an exponential tenth on average. (Late frames raise the median by 0.1 `sd`.)
 #[cfg(test)]
 pub(crate) fn frame_times(
     random: &mut SplitMix64,

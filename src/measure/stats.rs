@@ -1,32 +1,40 @@
-//! What a list of times says. How sure that is: [`super::bootstrap`]; frame rates of the slowest:
-//! [`super::lows`].
+//! Statistics of a list of times.
 //!
 //! Percentiles are linear interpolations between order statistics ("type 7" of Hyndman and Fan
-//! 1996, the default of NumPy and R): the p-th of n sorted values lies at position (n − 1) p
-//! counted from 0. Values that are not finite are counted and left out, never averaged in.
+//! 1996, the default of NumPy and R): the p-th percentile of n sorted values lies at position
+//! (n − 1) p, counted from 0. Values that are not finite are counted and left out.
 
 use serde::{Deserialize, Serialize};
 
-/// All in the unit of the values. `sd` divides by n − 1; a single value has none.
+/// Statistics of a list of values, in the unit of the values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
-    /// Finite values.
+    /// Number of finite values.
     pub n: usize,
-    /// Values left out because they are NaN or infinite.
+    /// Number of values that are NaN or infinite and left out.
     pub n_not_finite: usize,
+    /// Mean.
     pub mean: f64,
+    /// Standard deviation with the divisor n − 1; none for a single value.
     pub sd: Option<f64>,
+    /// Least value.
     pub min: f64,
+    /// 1st percentile.
     pub p1: f64,
+    /// 5th percentile.
     pub p5: f64,
+    /// Median.
     pub p50: f64,
+    /// 95th percentile.
     pub p95: f64,
+    /// 99th percentile.
     pub p99: f64,
+    /// Greatest value.
     pub max: f64,
 }
 
 impl Summary {
-    /// None when no value is finite.
+    /// Computes the statistics; None if no value is finite.
     pub fn of(values: &[f64]) -> Option<Summary> {
         let sorted = sorted_finite(values);
         let (&min, &max) = (sorted.first()?, sorted.last()?);
@@ -48,18 +56,19 @@ impl Summary {
     }
 }
 
-/// The `p`-th percentile, p in [0, 1], of the finite values; None when there is none.
+/// Returns the percentile `p`, in [0, 1], of the finite values; None if there are none.
 pub fn percentile(values: &[f64], p: f64) -> Option<f64> {
     let sorted = sorted_finite(values);
     if sorted.is_empty() { None } else { Some(percentile_of_sorted(&sorted, p)) }
 }
 
+/// Returns the median of the finite values; None if there are none.
 pub fn median(values: &[f64]) -> Option<f64> {
     percentile(values, 0.5)
 }
 
-/// The median by selection, which thousands of resamples need, and a sort would make slow. `values`
-/// is not empty and all finite; its order is lost.
+/// Returns the median by selection, which is faster than a sort for thousands of resamples.
+/// `values` are finite and not empty; their order is lost.
 pub(super) fn median_by_selection(values: &mut [f64]) -> f64 {
     let n = values.len();
     let (lower_part, &mut upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
@@ -70,7 +79,7 @@ pub(super) fn median_by_selection(values: &mut [f64]) -> f64 {
     lower + 0.5 * (upper - lower)
 }
 
-/// In the order they came in.
+/// Returns the finite values in their order.
 pub(super) fn finite(values: &[f64]) -> Vec<f64> {
     values.iter().copied().filter(|value| value.is_finite()).collect()
 }
@@ -81,7 +90,7 @@ pub(super) fn sorted_finite(values: &[f64]) -> Vec<f64> {
     sorted
 }
 
-/// `sorted` holds at least one value.
+/// Returns the percentile `p` of sorted values, of which there is at least one.
 pub(super) fn percentile_of_sorted(sorted: &[f64], p: f64) -> f64 {
     let position = (sorted.len() - 1) as f64 * p.clamp(0.0, 1.0);
     let below = position.floor() as usize;
@@ -89,12 +98,13 @@ pub(super) fn percentile_of_sorted(sorted: &[f64], p: f64) -> f64 {
     sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
 }
 
+/// Returns the mean; NaN for no value.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Two passes: E[x²] − E[x]² loses every digit when the spread is small beside the mean, as frame
-/// times are.
+/// Returns the standard deviation in two passes: E[x²] − E[x]² loses all digits if the spread is
+/// small beside the mean, as with frame times.
 fn standard_deviation(values: &[f64], mean: f64) -> f64 {
     let sum_of_squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     if values.len() < 2 { f64::NAN } else { (sum_of_squares / (values.len() - 1) as f64).sqrt() }
@@ -140,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_counted_and_left_out() {
+    fn values_that_are_not_finite_are_counted_and_left_out() {
         let summary = Summary::of(&[1.0, f64::NAN, 3.0, f64::INFINITY]).unwrap();
         assert_eq!((summary.n, summary.n_not_finite, summary.mean, summary.max), (2, 2, 2.0, 3.0));
     }
@@ -153,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn normal_percentiles_are_where_they_should_be() {
+    fn percentiles_of_normal_values_are_those_of_the_distribution() {
         let summary = Summary::of(&normal(&mut SplitMix64(3), 100_000)).unwrap();
         // Five standard errors: sqrt(p (1 − p) / n) / density, 0.0040 at the median and 0.0118 at
         // p1 and p99.

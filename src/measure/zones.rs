@@ -1,10 +1,8 @@
-//! What every thread did when: the spans of the `tracing` crate, collected while a time line is
-//! asked for.
+//! Zones: the spans of the `tracing` crate by thread, collected for a time line.
 //!
-//! A span is a zone from when a thread enters it to when it leaves; zones of a thread so lie one in
-//! another or side by side. What is known of a zone is 24 bytes, and at most [`MAX_ZONES`] are
-//! kept, the first ones: a time line's begin is worth more than a torn end. How many came after
-//! that is counted.
+//! A zone lasts from entering a span to leaving it, so that the zones of a thread are nested or
+//! disjoint. A zone takes 24 bytes. At most [`MAX_ZONES`] are kept, the first ones, so that the
+//! beginning of the time line is complete; further ones are counted.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -15,39 +13,42 @@ use tracing::{Metadata, Subscriber};
 use tracing_subscriber::layer::{Context, Layer};
 use tracing_subscriber::registry::LookupSpan;
 
-/// 24 MiB of zones: some 50 000 frames of 20.
+/// Most zones that are kept: 24 MiB, or some 50 000 frames with 20 zones.
 pub const MAX_ZONES: usize = 1 << 20;
-/// The field that names a zone beside its span's own name: "pass first".
+/// Field of a span that is appended to its name: "pass first".
 const NAME_FIELD: &str = "name";
-/// Only spans of this program.
+/// Target of the spans of this program; others are ignored.
 const TARGET: &str = env!("CARGO_CRATE_NAME");
 
-/// One stay of a thread in a span.
+/// The time between a thread's entering a span and leaving it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Zone {
-    /// Into [`Collected::names`].
+    /// Index into [`Collected::names`].
     pub i_name: u16,
-    /// Into [`Collected::threads`].
+    /// Index into [`Collected::threads`].
     pub i_thread: u16,
-    /// From [`Collected::epoch`].
+    /// Beginning, in ns from [`Collected::epoch`].
     pub begin_ns: u64,
+    /// End, in ns from [`Collected::epoch`].
     pub end_ns: u64,
 }
 
-/// All there is so far.
+/// The zones so far.
 #[derive(Debug, Clone)]
 pub struct Collected {
+    /// Zero of the zones' times.
     pub epoch: Instant,
+    /// Names of zones.
     pub names: Vec<String>,
-    /// Threads of one name, of which nimbus runs one at a time, are one.
+    /// Names of threads. Threads of the same name, of which nimbus runs one at a time, count as one.
     pub threads: Vec<String>,
-    /// In the order in which they ended.
+    /// Zones, in the order in which they ended.
     pub zones: Vec<Zone>,
-    /// Zones that came when [`MAX_ZONES`] were there.
+    /// Number of zones that were dropped because [`MAX_ZONES`] were there.
     pub n_dropped: u64,
 }
 
-/// Where zones are collected; clones are the same place.
+/// A collector of zones; clones share the same zones.
 #[derive(Clone)]
 pub struct Zones {
     collected: Arc<Mutex<Collected>>,
@@ -72,7 +73,7 @@ impl Zones {
         Zones { collected: Arc::new(Mutex::new(nothing)), max_zones }
     }
 
-    /// Takes what was collected, and begins anew.
+    /// Takes the collected zones; the collector is empty afterwards.
     pub fn take(&self) -> Collected {
         let mut collected = self.lock();
         Collected {
@@ -83,22 +84,22 @@ impl Zones {
     }
 
     fn lock(&self) -> MutexGuard<'_, Collected> {
-        // Nothing that is pushed here can panic halfway.
+        // A poisoned lock is harmless: no change of the data can panic halfway.
         self.collected.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// What a span carries from its making to its end.
-struct Carried {
+/// The data that is attached to a span.
+struct SpanData {
     i_name: u16,
     begin: Option<Instant>,
 }
 
-/// The value of the field that names a zone.
+/// Reads the field [`NAME_FIELD`].
 #[derive(Default)]
-struct NameOf(Option<String>);
+struct NameVisitor(Option<String>);
 
-impl Visit for NameOf {
+impl Visit for NameVisitor {
     fn record_str(&mut self, field: &Field, value: &str) {
         if field.name() == NAME_FIELD {
             self.0 = Some(value.to_owned());
@@ -114,21 +115,21 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Zones {
     }
 
     fn on_new_span(&self, attributes: &Attributes<'_>, id: &Id, context: Context<'_, S>) {
-        let mut name = NameOf::default();
+        let mut name = NameVisitor::default();
         attributes.record(&mut name);
         let of_span = attributes.metadata().name();
         let name = name.0.map_or(of_span.to_owned(), |name| format!("{of_span} {name}"));
         let i_name = index_of(&mut self.lock().names, &name);
         if let Some(span) = context.span(id) {
-            span.extensions_mut().insert(Carried { i_name, begin: None });
+            span.extensions_mut().insert(SpanData { i_name, begin: None });
         }
     }
 
     fn on_enter(&self, id: &Id, context: Context<'_, S>) {
         let Some(span) = context.span(id) else { return };
-        if let Some(carried) = span.extensions_mut().get_mut::<Carried>() {
-            // Last, so that what was done here lies outside.
-            carried.begin = Some(Instant::now());
+        if let Some(data) = span.extensions_mut().get_mut::<SpanData>() {
+            // The clock is read last, so that the work of this function is outside the zone.
+            data.begin = Some(Instant::now());
         }
     }
 
@@ -137,8 +138,8 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Zones {
         let Some(span) = context.span(id) else { return };
         let Some((i_name, begin)) = span
             .extensions_mut()
-            .get_mut::<Carried>()
-            .and_then(|carried| Some((carried.i_name, carried.begin.take()?)))
+            .get_mut::<SpanData>()
+            .and_then(|data| Some((data.i_name, data.begin.take()?)))
         else {
             return;
         };
@@ -155,13 +156,13 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Zones {
     }
 }
 
-/// Where `name` stands in a list of a few dozen, which it joins where it is new.
+/// Returns the index of `name` in a list of a few dozen, which it is added to if it is new.
 fn index_of(list: &mut Vec<String>, name: &str) -> u16 {
     let found = list.iter().position(|known| known == name).unwrap_or_else(|| {
         list.push(name.to_owned());
         list.len() - 1
     });
-    // Names are those in the source, threads those that it starts.
+    // The source has far fewer names and threads.
     u16::try_from(found).unwrap_or(u16::MAX)
 }
 
@@ -178,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn zones_nest_and_are_named_and_threads_are_apart() {
+    fn zones_are_nested_and_named_by_thread() {
         let work = || {
             let _outer = info_span!("step").entered();
             for name in ["first", "second"] {
@@ -212,13 +213,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_many_is_counted() {
+    fn zones_beyond_the_limit_are_counted() {
         let zones = Zones::at_most(3);
         let ten = || (0..10).for_each(|_| drop(info_span!("zone").entered()));
         let found = collect(&zones, ten);
         assert_eq!((found.zones.len(), found.n_dropped), (3, 7));
         assert!(found.zones.windows(2).all(|w| w[0].end_ns <= w[1].begin_ns), "the first ones");
-        // Taken away, there is room again.
+        // After the zones were taken there is room again.
         let again = collect(&zones, || drop(info_span!("zone").entered()));
         assert_eq!((again.zones.len(), again.n_dropped), (1, 0));
         assert_eq!(size_of::<Zone>(), 24);
@@ -236,7 +237,7 @@ mod tests {
             }
             begin.elapsed().as_nanos() as f64 / f64::from(N)
         };
-        println!("nobody listens: {:.1} ns a span", spans());
+        println!("without a receiver: {:.1} ns a span", spans());
         collect(&Zones::at_most(N as usize), || println!("collected: {:.0} ns a span", spans()));
     }
 }

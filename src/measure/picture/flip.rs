@@ -1,17 +1,20 @@
-//! FLIP (Andersson et al. 2020): what an eye sees that flips between two pictures on a display;
-//! NVIDIA's own code.
+//! FLIP (Andersson et al. 2020): the difference that an eye sees when a display alternates between
+//! two pictures, computed by NVIDIA's code.
 
 use nv_flip::{FlipImageFloat, FlipImageRgb8, magma_lut};
 
-/// Of a display 0.7 m wide with 3840 pixels, seen from 0.7 m, rounded: FLIP's own default.
+/// FLIP's default: a display 0.7 m wide with 3840 pixels, seen from 0.7 m, rounded.
 pub const PIXELS_PER_DEGREE: f64 = 67.0;
 
-/// The error of every pixel, 0 to 1.
+/// The FLIP error of every pixel, 0 to 1.
 pub struct Flip {
     map: FlipImageFloat,
 }
 
-/// Of two pictures of 8-bit sRGB; `a` is what is measured by.
+/// Computes the errors of `b` against the reference `a`, both 8-bit sRGB.
+///
+/// # Panics
+/// Panics if a picture has not three bytes a pixel.
 pub fn flip(width: u32, height: u32, a: &[u8], b: &[u8], pixels_per_degree: f64) -> Flip {
     let n = 3 * u64::from(width) * u64::from(height);
     assert!(a.len() as u64 == n && b.len() as u64 == n, "three bytes a pixel");
@@ -20,13 +23,13 @@ pub fn flip(width: u32, height: u32, a: &[u8], b: &[u8], pixels_per_degree: f64)
 }
 
 impl Flip {
-    /// The mean, which its authors recommend where one number is wanted.
+    /// Returns the mean, which the authors recommend as the single figure.
     pub fn mean(&self) -> f64 {
         let errors = self.map.to_vec();
         errors.iter().map(|e| f64::from(*e)).sum::<f64>() / errors.len() as f64
     }
 
-    /// Every pixel's error in the colours of magma, dark for none: three bytes of sRGB each.
+    /// Returns the errors in the colours of magma, dark for no error: three bytes of sRGB a pixel.
     pub fn shown(&self) -> Vec<u8> {
         self.map.apply_color_lut(&magma_lut()).to_vec()
     }

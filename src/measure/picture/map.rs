@@ -1,15 +1,15 @@
-//! Errors of a picture as colours.
+//! Maps of a picture's error in colours.
 
 use nv_flip::{FlipImageFloat, magma_lut};
 
-/// RMS of a pixel that is shown black, and white, with a decade every third in between.
+/// RMS of a pixel that is shown at the dark and the bright end; each third in between is a decade.
 pub const MAP_RANGE: [f64; 2] = [1e-4, 1e-1];
 
-/// Three bytes of sRGB a pixel in the colours of magma, by the logarithm of `errors` over
-/// [`MAP_RANGE`].
+/// Returns a map in the colours of magma by the logarithm of `errors` over [`MAP_RANGE`]: three
+/// bytes of sRGB a pixel.
 pub fn error_map(width: u32, height: u32, errors: &[f64]) -> Vec<u8> {
     let [low, high] = MAP_RANGE.map(f64::ln);
-    // What is no number is shown as the greatest error.
+    // NaN is shown as the greatest error.
     let place = |e: &f64| {
         if e.is_nan() {
             1.0
@@ -26,7 +26,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_greater_the_brighter() {
+    fn greater_errors_are_brighter() {
         let map = error_map(6, 1, &[0.0, 1e-4, 1e-3, 1e-2, 1.0, f64::NAN]);
         let sums: Vec<u32> = map.chunks(3).map(|c| c.iter().map(|v| u32::from(*v)).sum()).collect();
         assert!(

@@ -1,21 +1,25 @@
-//! Structural similarity, Wang, Bovik, Sheikh and Simoncelli 2004, with the constants of that
-//! paper: of one channel in [0, 1], here the luminance of display values.
+//! Structural similarity of one channel in [0, 1], here the luminance of display values, with the
+//! constants of Wang, Bovik, Sheikh and Simoncelli 2004.
 
-/// The window is a Gaussian of this σ, in pixels …
+/// Standard deviation of the Gaussian window, in pixels.
 const SIGMA: f64 = 1.5;
-/// … of so many pixels a side, its weights adding up to 1.
+/// Pixels a side of the window, whose weights sum to 1.
 pub const WINDOW: usize = 11;
-/// C₁ = (K₁ L)², C₂ = (K₂ L)², L = 1 the range of the values.
+/// C₁ = (K₁ L)², with the range L = 1 of the values.
 const C1: f64 = 0.01 * 0.01;
+/// C₂ = (K₂ L)².
 const C2: f64 = 0.03 * 0.03;
 
-/// Rec. 709 weights, of display values.
+/// Returns the luminance of display values by the weights of Rec. 709.
 pub fn luminance(rgb: [f64; 3]) -> f64 {
     0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
 }
 
-/// Mean of the index over every place where the whole window lies in the picture; none where it
-/// nowhere does.
+/// Returns the mean index over every place of the window inside the pictures; none if they are
+/// smaller than the window.
+///
+/// # Panics
+/// Panics if a picture has not one number a pixel.
 pub fn ssim(width: usize, height: usize, a: &[f64], b: &[f64]) -> Option<f64> {
     assert!(a.len() == width * height && b.len() == a.len(), "a number a pixel");
     if width < WINDOW || height < WINDOW {
@@ -34,7 +38,7 @@ pub fn ssim(width: usize, height: usize, a: &[f64], b: &[f64]) -> Option<f64> {
     Some(sum / mean_a.len() as f64)
 }
 
-/// Weighted means over the window at every place where it lies inside, row by row.
+/// Returns the weighted means over every place of the window inside the picture, row by row.
 fn blurred(width: usize, x: &[f64]) -> Vec<f64> {
     let weights = weights();
     let n_across = width - WINDOW + 1;

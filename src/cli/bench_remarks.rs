@@ -1,0 +1,130 @@
+//! The remarks below the tables of `nimbus bench`.
+
+use crate::timing::machine::Clocks;
+use crate::timing::overlap::Overlap;
+use crate::timing::records::{Case, Mode, Skipping};
+
+/// Returns a time in ms with three decimals.
+pub fn ms(value: f64) -> String {
+    format!("{value:.3}")
+}
+
+/// Returns the frame time of a perfect overlap, and the share of that gain which was reached.
+pub fn overlap_lines(o: &Overlap, case: &Case) -> String {
+    let (game, render, bound, serial) =
+        (ms(o.game_ms), ms(o.render_ms), ms(o.bound_ms), ms(o.serial_ms));
+    let share = o.bound_ms / o.serial_ms;
+    let mut out = format!(
+        "perfect overlap = max(game {game}, render {render}) = {bound} ms, {share:.3} of the \
+         serial {serial} ms\n"
+    );
+    if let Some(r) = o.reached {
+        let [share, low, high] = [r.share, r.low, r.high].map(|s| 100.0 * s);
+        let possible = ms(o.serial_ms - o.bound_ms);
+        out += &format!(
+            "of the possible {possible} ms the parallel loop gained {share:.1} % (95 % interval \
+             {low:.1} to {high:.1})\n"
+        );
+        if r.share > 1.0 {
+            out += "that is more than overlapping game and render alone can give: recording \
+                    overlapped, too, or the machine changed from block to block\n";
+        }
+        if r.share < 0.9 {
+            out += &slowed_line(o, case).unwrap_or_default();
+        }
+    } else if o.parallel_ms.is_some() {
+        out += "that is too little, or too uncertain, for a share of it\n";
+    }
+    out
+}
+
+/// Returns a remark if the steps slow each other down, so that overlap gains less than it could.
+fn slowed_line(o: &Overlap, case: &Case) -> Option<String> {
+    let skip = case.modes.iter().any(|m| m.skip);
+    let parallel = case.modes.iter().find(|m| m.threading == "parallel" && m.skip == skip)?;
+    let (game, render) = (parallel.game_ms?.of.p50, parallel.render_ms?.of.p50);
+    // Smaller changes are within the intervals of short runs.
+    let is_slower = game > 1.05 * o.game_ms || render > 1.05 * o.render_ms;
+    is_slower.then(|| {
+        format!(
+            "side by side the game step takes {} in place of {}, the render step {} in place of {} \
+             ms: they share cores\n",
+            ms(game),
+            ms(o.game_ms),
+            ms(render),
+            ms(o.render_ms)
+        )
+    })
+}
+
+/// Returns remarks on loops whose blocks differ as much as the two loops do, or by a tenth.
+pub fn spread_lines(case: &Case) -> String {
+    let effect = case.ratio.map_or(f64::INFINITY, |r| r.parallel_by_serial.ln().abs());
+    let of = |m: &Mode| {
+        let spread = m.block_spread.filter(|s| s.ln() >= effect || *s >= 1.1)?;
+        Some(format!(
+            "{}: blocks lie a factor of {spread:.3} apart: the machine was not steady\n",
+            m.name()
+        ))
+    };
+    case.modes.iter().filter_map(of).collect()
+}
+
+/// Returns the latency of both loops, which is the cost of overlap.
+pub fn latency_line(case: &Case) -> Option<String> {
+    let skip = case.modes.iter().any(|m| m.skip);
+    let of =
+        |threading: &str| case.modes.iter().find(|m| m.threading == threading && m.skip == skip);
+    let (serial, parallel) = (of("serial")?, of("parallel")?);
+    let (a, b) = (serial.latency_ms?.of.p50, parallel.latency_ms?.of.p50);
+    let frame = serial.frame_ms?.of.p50;
+    let depth = parallel.queue_depth.map_or(String::new(), |n| format!(", {n:.2} frames queued"));
+    Some(format!(
+        "latency, game step to picture: serial {}, parallel {} ms: {:+.2} frames of the serial \
+         loop{depth}\n",
+        ms(a),
+        ms(b),
+        (b - a) / frame
+    ))
+}
+
+/// Returns the number of particles drawn, if a frame left some out.
+pub fn drawn_line(case: &Case) -> Option<String> {
+    let [least, mean, most] = case.modes.iter().find(|m| m.skip)?.drawn?;
+    let n = case.particles;
+    (mean < n as f64)
+        .then(|| format!("drawn: {mean:.0} of {n} particles a frame, {least:.0} to {most:.0}\n"))
+}
+
+/// Returns what skipping saved.
+pub fn skipping_line(s: &Skipping) -> String {
+    let saved = s.gpu_no_skip_ms - s.gpu_ms;
+    let times = if s.gpu_ms > 0.0 {
+        format!("{:.1} times less", s.gpu_no_skip_ms / s.gpu_ms)
+    } else {
+        "nothing is left to do".to_owned()
+    };
+    let bytes = match s.same_bytes {
+        Some(true) => "; same bytes",
+        Some(false) => "; NOT THE SAME BYTES",
+        None => "",
+    };
+    format!(
+        "skipping saves {} of {} ms of GPU time a frame ({times}){bytes}\n",
+        ms(saved),
+        ms(s.gpu_no_skip_ms)
+    )
+}
+
+/// Returns the precision of the clocks: a time of about this size means little.
+pub fn clocks_line(clocks: &Clocks) -> String {
+    let device =
+        clocks.timestamp_period_ns.map_or("none".to_owned(), |ns| format!("{ns} ns a tick"));
+    let empty = clocks
+        .timestamp_overhead_ns
+        .map_or(String::new(), |ns| format!(", {ns:.0} ns for an empty pass"));
+    format!(
+        "host clock: resolution {} ns, {:.0} ns a reading; device timestamps: {device}{empty}\n",
+        clocks.resolution_ns, clocks.overhead_ns
+    )
+}

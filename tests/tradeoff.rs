@@ -18,7 +18,9 @@ use nimbus::studies::error::blocks::{TimeKind, TimedBlock};
 use nimbus::studies::error::design::{Design, best_within};
 use nimbus::studies::error::front::{Front, Metric};
 use nimbus::studies::error::records::{Budget, Configuration};
-use nimbus::studies::error::study::{ErrorStudy, Event, LoadedConfiguration, Runner, StudyPlan, StudyResults};
+use nimbus::studies::error::study::{
+    ErrorStudy, Event, LoadedConfiguration, Runner, StudyPlan, StudyResults,
+};
 use nimbus::timing::names::Setting;
 use nimbus::timing::sweep::Axis;
 

@@ -19,7 +19,8 @@ pub(super) fn study(args: &PlanArgs, set: &[String]) -> Result<(AnyWork, Workloa
     let has_budget = !own.budget_ms.is_empty() || !own.budget_error.is_empty();
     let refused = "--out, --resume, --force, --plot, --json, --csv, --part, --budget-…";
     refuse(args, is_refused || has_budget, &own.options, refused)?;
-    let (configurations, workload) = error_configurations::configurations(&parsed(&of_scene(args, set))?)?;
+    let (configurations, workload) =
+        error_configurations::configurations(&parsed(&of_scene(args, set))?)?;
     let arguments = args.told.clone();
     Ok((AnyWork::Error(Study { arguments, configurations }), workload))
 }

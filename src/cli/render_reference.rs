@@ -64,7 +64,12 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
 }
 
 /// Draws every pixel at its centre.
-fn at_centers(args: &RenderArgs, drawing: BlobModel, scene: &Scene, time_s: f64) -> Result<Computed> {
+fn at_centers(
+    args: &RenderArgs,
+    drawing: BlobModel,
+    scene: &Scene,
+    time_s: f64,
+) -> Result<Computed> {
     let shown = ReferenceProgress::new(args.options.quiet);
     let DrawnPicture { rgba, error, brightest, n_particles, omitted } =
         drawn_as_set(scene, time_s, drawing, &|work, n| shown.advance(work, n))?;

@@ -9,8 +9,8 @@ use super::chart::{Chart, LegendEntry, Tooltip, shortened};
 use super::medium::{INK, MUTED, series};
 use super::number::{number, with_interval};
 use super::plot_area::{Canvas, GridLines, PlotArea};
-use crate::studies::ledger::records::{Ledger, Row};
 use crate::studies::figure::Figure;
+use crate::studies::ledger::records::{Ledger, Row};
 
 /// Bars begin this much below the smallest error, in decades, so that every bar has a length.
 const BELOW: f64 = 0.33;

@@ -14,8 +14,8 @@ use crate::report::charts::number;
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::front::Front;
 use crate::studies::error::records::{Best, Budget, Configuration, Study};
-use crate::studies::picture_error::PictureError;
 use crate::studies::figure::Figure;
+use crate::studies::picture_error::PictureError;
 
 /// File name of the reference's picture.
 const REFERENCE_FILE: &str = "reference.png";

@@ -10,8 +10,8 @@ use crate::model::camera::{Camera, CameraKey};
 use crate::model::film::Film;
 use crate::model::scene::Scene;
 use crate::reference::picture::{Pixels, Reference, ReferenceKind};
-use crate::studies::picture_error::picture_error;
 use crate::studies::picture_error::PictureError;
+use crate::studies::picture_error::picture_error;
 use crate::studies::reference_cache;
 
 /// A view of a scene, and the kind of reference that measures it.

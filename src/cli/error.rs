@@ -15,8 +15,8 @@ use super::scene::{
     check_time, device_choice, load, print_sizes, with_texture_hint, without_textures,
 };
 use crate::error::{Error, Result};
-use crate::frame::limits;
 use crate::frame::GpuContext;
+use crate::frame::limits;
 use crate::io::image;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;

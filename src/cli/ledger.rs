@@ -7,8 +7,8 @@ use super::output::{self, header, interval, or_dash, refuse_existing, scientific
 use super::progress::ReferenceProgress;
 use super::scene::{check_time, device_choice, load, with_texture_hint, without_textures};
 use crate::error::{Error, Result};
-use crate::frame::limits;
 use crate::frame::GpuContext;
+use crate::frame::limits;
 use crate::io::atomic::check_place;
 use crate::reference::picture::Pixels;
 use crate::reference::picture::ReferenceKind;

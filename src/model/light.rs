@@ -6,24 +6,45 @@ use glam::DVec3;
 /// A light of a scene; energies are linear RGB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Light {
-    /// Parallel light: `direction` of travel (unit), irradiance on a plane across it, W m⁻².
-    Directional { direction: DVec3, irradiance: DVec3 },
-    /// The same intensity (power per solid angle, W sr⁻¹) in every direction. Nearer than `radius`
-    /// the irradiance is constant.
-    Point { position: DVec3, intensity: DVec3, radius: f64 },
-    /// A point light in a cone about `direction` (unit): full inside the inner angle, nothing
-    /// outside the outer one.
-    Spot {
-        position: DVec3,
+    /// Parallel light.
+    Directional {
+        /// Unit vector along which light travels.
         direction: DVec3,
+        /// Irradiance on a plane across `direction`, W m⁻².
+        irradiance: DVec3,
+    },
+    /// Light from a point, the same in every direction.
+    Point {
+        /// Place of the light.
+        position: DVec3,
+        /// Power per solid angle, W sr⁻¹.
         intensity: DVec3,
+        /// Distance below which the irradiance is constant.
         radius: f64,
+    },
+    /// Light from a point in a cone.
+    Spot {
+        /// Place of the light.
+        position: DVec3,
+        /// Unit axis of the cone, away from the light.
+        direction: DVec3,
+        /// Power per solid angle within the inner angle, W sr⁻¹.
+        intensity: DVec3,
+        /// Distance below which the irradiance is constant.
+        radius: f64,
+        /// Cosine of the inner angle, within which the intensity is full.
         cos_inner: f64,
+        /// Cosine of the outer angle, beyond which there is no light.
         cos_outer: f64,
     },
-    /// Irradiance E (½ + ½ n·up) e^{−(1−g)τ toward up} + E·constant. Only the diffuse basis
+    /// Sky: irradiance E (½ + ½ n·up) e^{−(1−g)τ toward up} + E·constant. Only the diffuse basis
     /// reflects it.
-    Sky { irradiance: DVec3, constant: f64 },
+    Sky {
+        /// E, W m⁻².
+        irradiance: DVec3,
+        /// Share of E that arrives whatever the normal and the clouds.
+        constant: f64,
+    },
 }
 
 /// The sky's up direction, whatever the camera's.

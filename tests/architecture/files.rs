@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::source::Source;
+use super::source::{Import, Source};
 
 /// Files by number, and for each the files that it imports.
 pub struct Graph {
@@ -21,7 +21,8 @@ impl Graph {
         let mut imports = vec![BTreeSet::new(); sources.len()];
         for (i, source) in sources.iter().enumerate() {
             let of_children = source.paths_into_children();
-            let all = source.imports().into_iter().filter(|import| !import.in_test);
+            let counts = |import: &Import| !import.in_test && !import.is_reexport;
+            let all = source.imports().into_iter().filter(counts);
             let all = all.map(|import| import.path).chain(of_children);
             for path in all {
                 if let Some(to) = file_of(path, &modules, &handed_on).filter(|to| *to != i) {

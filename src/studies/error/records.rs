@@ -1,4 +1,5 @@
-//! The types of `study.json`, the record of `nimbus error`, which docs/study.schema.json describes.
+//! The types of `study.json`, the record of `nimbus error`, which
+//! docs/reference/schemas/study.schema.json describes.
 
 use serde::{Deserialize, Serialize};
 

@@ -92,7 +92,7 @@ fn the_files_of_a_study_agree() {
     assert_eq!(tiny.text("out/times.csv"), times);
 }
 
-/// The figures of times follow from times.csv: those of the scene as it stands are medians, those
+/// The figures of times follow from times.csv: those of the unchanged scene are medians, those
 /// of others medians of ratios to the turns of the scene just before and just after.
 fn check_times(tiny: &Tiny, json: &Value) {
     let table = Table::of(&tiny.text("out/times.csv"));

@@ -33,7 +33,7 @@ fn errors(args: &[&str], knobs: &[&str]) -> Vec<(String, f64)> {
     let mut rows = csv::Reader::from_reader(&output.stdout[..]);
     let rmse = rows.headers().unwrap().iter().position(|h| h == "rmse").unwrap();
     let row = |r: csv::StringRecord| (r[0].to_owned(), r[rmse].parse().unwrap());
-    // What was put together of several is no question here.
+    // Combinations of several knobs are not tested here.
     rows.records().map(|r| row(r.unwrap())).filter(|(name, _)| !name.contains(", ")).collect()
 }
 

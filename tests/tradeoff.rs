@@ -148,14 +148,14 @@ fn a_knob_of_known_law_has_the_expected_front() {
             "{error:?}"
         );
     }
-    // What is as the scene stands is not there twice; what does not fit says why, and is nowhere.
+    // The unchanged scene occurs once; a value that does not fit says why, and is left out.
     assert_eq!(found.configurations[0].front, Front::On);
     assert!(!found.configurations.iter().any(|c| c.name == "draw.cutoff=3.0, draw.sort_bits=32"));
     let beyond = named(&found, "draw.cutoff=7.0, draw.sort_bits=32");
     assert!(
         beyond.front == Front::Unknown && beyond.failure.as_ref().unwrap().contains("too great")
     );
-    // What a budget buys, in ms of the machine's median speed.
+    // The best within a budget, in ms at the machine's median speed.
     let base_ms = found.configurations[0].gpu_ms.unwrap().value;
     let name = |best: Option<usize>| best.map(|i| found.configurations[i].name.as_str());
     let within = |q: f64| best(&found, Budget::Ms, base_ms * q / 3.0);

@@ -7,12 +7,11 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What goes into the binary. Only this makes a build dirty, and only this (and a new HEAD) makes
-/// the question worth asking again: whatever changes here compiles nimbus anew in any case. The
-/// index is not watched: staging a file changes nothing that is built.
+/// The files that the binary is built from. A change of one of them makes a build dirty. This script
+/// runs again when one of them or HEAD changes. Staging a file changes nothing that is built.
 const BUILT_FROM: [&str; 5] = ["src", "shaders", "Cargo.toml", "Cargo.lock", "build.rs"];
 
-/// What f64 references are computed by.
+/// The files that f64 references depend on.
 const REFERENCES_FROM: [&str; 3] = ["Cargo.lock", "src/model", "src/reference"];
 
 fn main() {

@@ -1,5 +1,5 @@
-//! What generating the paper's boxes costs on the GPU, beside a single-thread f64 loop (the
-//! reference) in the same run. `cargo bench --bench generate` prints a table of CPU times first,
+//! CPU time of generating the paper's boxes on the GPU, and of the single-thread f64 reference in the
+//! same run. `cargo bench --bench generate` prints a table of CPU times first,
 //! then divan's wall times.
 
 mod cpu;

@@ -1,5 +1,5 @@
-//! What the gusts of a cloud cost the game thread: for several particles side by side, and one
-//! after the other with the standard library's sine. `cargo bench --bench gusts` prints a table of
+//! Time that the gusts of a cloud take on the game thread: for several particles at once, and one by
+//! one with the standard library's sine. `cargo bench --bench gusts` prints a table of
 //! CPU times first, then divan's wall times.
 
 mod cpu;

@@ -1,4 +1,4 @@
-//! What the radix sort costs, 16 and 32 bits, beside the standard library's stable sort on one
+//! Time of the radix sort with keys of 16 and 32 bits, and of the standard library's stable sort on one
 //! thread. `cargo bench --bench sort` prints a table of CPU times first, then divan's wall times.
 
 mod cpu;

@@ -4,7 +4,7 @@
 #include "each.glsl"
 
 // Reverses the sorted entries to near-to-far order and deals them to chunks of equal size
-// (docs/model.md §11 "chunks").
+// (docs/explanation/passes.md "chunks").
 // In: n entries (key, particle), far to near. Out: the entries by chunk, and one indirect draw a
 // chunk. Exact: it only copies.
 

@@ -7,7 +7,7 @@
 #include "sum.glsl"
 
 // Contracts the tensors T1 and T2 with the lights' energies and the materials' coefficients
-// (docs/model.md §7, §11 "contract").
+// (docs/explanation/model.md §7, §11 "contract").
 // In: facets, lights, regions, coefficients by column, T1 [light][row], T2 (tensor.glsl). Out:
 // irradiance I_d, I_i and radiance L1, L2 of every facet, linear RGB.
 // Law: I = pi sum E T, L = sum E c_b' C T over lights, bases and columns. Source: C (13)-(16).

@@ -3,10 +3,10 @@
 #include "records.glsl"
 #include "cull.glsl"
 
-// Scans the tiles' counts of kept particles (docs/model.md §11 "cull"). One workgroup; each
-// invocation owns a run of tiles.
-// In: kept particles of each tile. Out: kept particles before each tile, and the Kept record with
-// the dispatch and draw sizes of the passes to come. Exact: integers.
+// Scans the tiles' counts of kept particles (docs/explanation/passes.md "cull"). One workgroup;
+// each invocation owns a run of tiles. In: kept particles of each tile. Out: kept particles before
+// each tile, and the Kept record with the dispatch and draw sizes of the passes to come. Exact:
+// integers.
 
 layout(local_size_x = 256) in;
 

@@ -5,9 +5,9 @@
 #include "cull.glsl"
 #include "each.glsl"
 
-// Writes the sort keys of the kept particles, in ascending index and without gaps (docs/model.md
-// §11 "cull").
-// In: cull_test's masks and cull_scan's offsets. Out: entries (key, particle). Key: key.glsl.
+// Writes the sort keys of the kept particles, in ascending index and without gaps
+// (docs/explanation/passes.md "cull"). In: cull_test's masks and cull_scan's offsets. Out: entries
+// (key, particle). Key: key.glsl.
 
 layout(push_constant) uniform Push {
     vec3 forward;

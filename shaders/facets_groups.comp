@@ -4,11 +4,11 @@
 #include "each.glsl"
 #include "functions.glsl"
 
-// Makes one lighting facet for each run of particles in Morton order (docs/model.md §5, §11
-// "facets").
-// In: placed particles, their Morton order, the runs. Out: facets, and the facet of every particle.
-// Law: the run counts as one blob of the members' mean position, spread and colour. Means are taken
-// about the first member, so that a run of one particle gives that particle's facet to the bit.
+// Makes one lighting facet for each run of particles in Morton order (docs/explanation/model.md §5,
+// §11 "facets"). In: placed particles, their Morton order, the runs. Out: facets, and the facet of
+// every particle. Law: the run counts as one blob of the members' mean position, spread and colour.
+// Means are taken about the first member, so that a run of one particle gives that particle's facet
+// to the bit.
 
 layout(push_constant) uniform Push {
     Grid grid;

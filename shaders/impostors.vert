@@ -2,8 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 #include "strip.glsl"
 
-// Covers the rectangle where the shell shows anything, at the shell's depth (docs/model.md §11
-// "impostors").
+// Covers the rectangle where the shell shows anything, at the shell's depth
+// (docs/explanation/passes.md "impostors").
 
 #include "impostors.glsl"
 

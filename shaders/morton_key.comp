@@ -3,9 +3,9 @@
 #include "records.glsl"
 #include "each.glsl"
 
-// Computes keys of a Morton order, region after region (docs/model.md §7, §11 "morton").
-// In: facets or placed particles, and their regions' bounds. Out: entries (key, index); the
-// region's number is in the highest bits. NaN goes to cell 0.
+// Computes keys of a Morton order, region after region (docs/explanation/model.md §7, §11
+// "morton"). In: facets or placed particles, and their regions' bounds. Out: entries (key, index);
+// the region's number is in the highest bits. NaN goes to cell 0.
 
 // 0: facets; 1: placed particles.
 #ifndef POINTS

@@ -3,8 +3,8 @@
 #include "buffers.glsl"
 #include "each.glsl"
 
-// Extracts the indices of sorted entries: place to index (docs/model.md §11 "morton"). Exact: it
-// only copies.
+// Extracts the indices of sorted entries: place to index (docs/explanation/passes.md "morton").
+// Exact: it only copies.
 
 layout(push_constant) uniform Push { uint n_entries; } push;
 READS(0, uvec2, entries)

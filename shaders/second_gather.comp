@@ -8,14 +8,12 @@
 #include "functions.glsl"
 #include "cell_samples.glsl"
 
-// Gathers the second reflection as radiance at once, without tensors (docs/model.md §7, §11
-// "second").
-// A workgroup takes a block of receivers of one region and goes through the regions that it can
-// receive light from.
-// In: facets, regions, lights, sources with their fluxes and cell samples. Out: irradiance I_i and
-// radiance L2 of every facet, linear RGB, and a bound on cells that stayed too wide.
-// Law: I = sum over sources of Lambda G V. Source: C (16).
-// Bound: pair_size and theta limit the form factors' error; `unresolved` bounds the rest.
+// Gathers the second reflection as radiance at once, without tensors (docs/explanation/model.md §7,
+// §11 "second"). A workgroup takes a block of receivers of one region and goes through the regions
+// that it can receive light from. In: facets, regions, lights, sources with their fluxes and cell
+// samples. Out: irradiance I_i and radiance L2 of every facet, linear RGB, and a bound on cells
+// that stayed too wide. Law: I = sum over sources of Lambda G V. Source: C (16). Bound: pair_size
+// and theta limit the form factors' error; `unresolved` bounds the rest.
 
 #ifndef WORKGROUP
 #define WORKGROUP 8
@@ -158,7 +156,8 @@ float nearest_gap(float gap, float turn) {
     return 0.5 * angle * angle;
 }
 
-// Adds a bound on what a cell that stayed too wide may change (docs/model.md §11 "unresolved").
+// Adds a bound on what a cell that stayed too wide may change (docs/explanation/passes.md
+// "unresolved").
 void add_unresolved(
     uint i, LoadedSource source, SourceView view, Region emitter, Receiver receiver, float area
 ) {

@@ -3,9 +3,9 @@
 #include "records.glsl"
 #include "each.glsl"
 
-// Merges sources into clusters, one height of the tree at a time (docs/model.md §7, §11 "tree").
-// In: the clusters or facets below. Out: clusters with mean place, mean normal, radius, flux and
-// second moments. Error: that of plain sums over at most 4 children.
+// Merges sources into clusters, one height of the tree at a time (docs/explanation/model.md §7, §11
+// "tree"). In: the clusters or facets below. Out: clusters with mean place, mean normal, radius,
+// flux and second moments. Error: that of plain sums over at most 4 children.
 
 layout(push_constant) uniform Push {
     uint i_first;

@@ -4,7 +4,7 @@
 #include "sort.glsl"
 
 // Scans table[digit][tile] to an exclusive prefix sum in one workgroup, an invocation a digit
-// (docs/model.md §11 "sort"). Exact: integers.
+// (docs/explanation/passes.md "sort"). Exact: integers.
 
 layout(local_size_x = 1 << DIGIT_BITS) in;
 

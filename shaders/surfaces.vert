@@ -4,7 +4,7 @@
 #include "camera.glsl"
 #include "plane.glsl"
 
-// Draws a screen-aligned quad around the visible part of each rectangle (docs/model.md §11
+// Draws a screen-aligned quad around the visible part of each rectangle (docs/explanation/passes.md
 // "surfaces"). The fragment shader's own test decides which pixels the rectangle covers, so that
 // clipping and snapping of far corners do not.
 // In: regions, the camera. Out: the quad, and the rectangle's plane for surfaces.frag.

@@ -4,11 +4,11 @@
 #include "camera.glsl"
 #include "plane.glsl"
 
-// Draws a cell of the ground: a strip of two triangles over four points (docs/model.md §16). The
-// rasteriser decides which pixels they cover. The fragment shader intersects the pixel's ray with
-// the triangle's plane, which the first vertex of each triangle passes on.
-// In: ground facets relative to their origin, radiance. Out: the strip, and a plane and three
-// radiances a triangle.
+// Draws a cell of the ground: a strip of two triangles over four points (docs/explanation/model.md
+// §16). The rasteriser decides which pixels they cover. The fragment shader intersects the pixel's
+// ray with the triangle's plane, which the first vertex of each triangle passes on. In: ground
+// facets relative to their origin, radiance. Out: the strip, and a plane and three radiances a
+// triangle.
 
 layout(push_constant) uniform Push {
     Camera camera;

@@ -4,8 +4,8 @@
 #include "tiles.glsl"
 #include "each.glsl"
 
-// Clears the state of every pixel where one round is not enough (docs/model.md §11 "tiles"). Out:
-// RGBA floats, all 0.
+// Clears the state of every pixel where one round is not enough (docs/explanation/passes.md
+// "tiles"). Out: RGBA floats, all 0.
 
 layout(push_constant) uniform Push {
     uint n_pixels;

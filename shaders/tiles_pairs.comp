@@ -5,10 +5,10 @@
 #include "variants.glsl"
 #include "tiles.glsl"
 
-// Writes a pair for every bin that a splat of this round can reach (docs/model.md §11 "tiles").
-// In: splats and their rectangles of tiles. Out: pairs: the bin and, above its number, a bit for
-// each of its tiles that the splat can reach; and the splat. In the order of splats.
-// Bound: conservative; distances are widened by 2^-10.
+// Writes a pair for every bin that a splat of this round can reach (docs/explanation/passes.md
+// "tiles"). In: splats and their rectangles of tiles. Out: pairs: the bin and, above its number, a
+// bit for each of its tiles that the splat can reach; and the splat. In the order of splats. Bound:
+// conservative; distances are widened by 2^-10.
 
 layout(local_size_x = 256) in;
 

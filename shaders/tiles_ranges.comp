@@ -4,9 +4,9 @@
 #include "records.glsl"
 #include "tiles.glsl"
 
-// Finds each bin's range of sorted pairs and deals its tiles to workgroups (docs/model.md §11
-// "tiles"). The order of the ranges does not matter: no two share a pixel.
-// In: sorted pairs. Out: ranges (first pair, end, bin, tile bits), and the dispatch sizes of
+// Finds each bin's range of sorted pairs and deals its tiles to workgroups
+// (docs/explanation/passes.md "tiles"). The order of the ranges does not matter: no two share a
+// pixel. In: sorted pairs. Out: ranges (first pair, end, bin, tile bits), and the dispatch sizes of
 // tiles.comp. Exact: integers.
 
 layout(local_size_x = 64) in;

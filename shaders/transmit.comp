@@ -7,7 +7,7 @@
 #include "occlude.glsl"
 
 // Computes how much of every light arrives at every facet, past the surfaces and through the
-// density grid (docs/model.md §8, §11 "transmit").
+// density grid (docs/explanation/model.md §8, §11 "transmit").
 // In: facets, lights, regions, the density grid (1/length). Out: transmittance [facet][light], and
 // the clouds' share of it where the second reflection needs it.
 // Law: V = [nothing hides] e^{-(1-g) tau}, tau by midpoint samples of trilinear density.

@@ -1,5 +1,6 @@
-//! Error of two reflections of facets against the integrals over the surfaces' areas (docs/model.md
-//! §11 "second", "area reference"; docs/measured.md "Lighting accuracy").
+//! Error of two reflections of facets against the integrals over the surfaces' areas
+//! (docs/explanation/passes.md "second", "area reference"; docs/reference/measured.md "Lighting
+//! accuracy").
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -131,7 +132,7 @@ fn random_rooms_are_within_one_percent() {
     }
 }
 
-/// The scene of the timings in docs/measured.md.
+/// The scene of the timings in docs/reference/measured.md.
 #[test]
 fn the_scene_of_rectangles_is_within_one_percent() {
     let gpu = Gpu::new();
@@ -312,7 +313,7 @@ fn corner(n: u32) -> Scene {
 }
 
 #[test]
-#[ignore = "minutes; writes docs/second-convergence.svg"]
+#[ignore = "minutes; writes docs/pictures/second-convergence.svg"]
 fn plot() {
     let gpu = Gpu::new();
     let curves = [

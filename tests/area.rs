@@ -1,5 +1,6 @@
-//! The area reference in random rooms by two methods: quadrature over polygons (docs/model.md §11
-//! "area reference") against random paths. They share only the laws of lights and materials.
+//! The area reference in random rooms by two methods: quadrature over polygons
+//! (docs/explanation/passes.md "area reference") against random paths. They share only the laws of
+//! lights and materials.
 
 #[path = "harness/bounded.rs"]
 mod bounded;

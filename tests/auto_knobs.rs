@@ -55,7 +55,7 @@ fn blobs(n: usize, sigma: [f64; 2], depth: [f64; 2]) -> Vec<([f64; 3], f64, f64)
     (0..n).map(|_| blob()).collect()
 }
 
-/// What the scene's first frame comes to: its bytes and its numbers.
+/// The scene's first frame: its bytes and its numbers.
 struct Frame {
     draw: Draw,
     choices: Vec<Choice>,
@@ -100,7 +100,7 @@ fn check(blobs: &[([f64; 3], f64, f64)], error: f64, more: &[&str]) -> Frame {
     let found = rmse(&auto.values, &exact.values);
     assert!(found <= error, "RMSE {found:e}, {error:e} allowed");
     assert!(exact.values.iter().any(|v| *v > 0.1), "something is drawn");
-    // What the last one says of all together is what is found, and every value was tried.
+    // The last error, of all choices together, is the one found here; every value was tried.
     let n_tried: Vec<(&str, usize)> =
         auto.choices.iter().map(|c| (c.key, c.candidates.len())).collect();
     let of_sprites = if auto.draw.path == DrawPath::Sprites { &[("chunks", 4)][..] } else { &[] };

@@ -188,7 +188,7 @@ fn bench_prints_its_table_and_writes_its_results_once() {
     assert_eq!(json["block_order"].as_array().map(Vec::len), Some(6));
     assert!((0..3).all(|i| case["modes"][i]["image_hash"] == case["modes"][0]["image_hash"]));
     assert_eq!(case["skipping"]["same_bytes"], true);
-    // What skipping saved a frame is what the pass takes where nothing is skipped.
+    // The saving a frame equals the pass's time where nothing is skipped.
     let tiles = |i: usize| {
         let passes = case["modes"][i]["passes"].as_array().expect("passes");
         passes.iter().find(|p| p["name"] == "tiles").expect("tiles")

@@ -7,7 +7,7 @@ use nimbus::inspect::basis::basis_warnings;
 use nimbus::io::scene_file;
 use serde_json::Value;
 
-/// Exit code, stdout, stderr. A device is never asked for: the loader is told of none.
+/// Exit code, stdout, stderr. No device is requested: the loader lists none.
 fn run(args: &[&str]) -> (i32, String, String) {
     let mut command = Command::cargo_bin("nimbus").expect("the program is built");
     let no_driver = [("VK_DRIVER_FILES", "/nowhere"), ("VK_ICD_FILENAMES", "/nowhere")];

@@ -22,7 +22,7 @@ const LIGHT: [&str; 2] = ["lighting.grid=16,24,32", "lighting.step=4,2"];
 /// blurs the rim of the cut at 3 sigma: 1.6 % in study-cloud.)
 const CHANCE: f64 = 0.02;
 
-/// Every error of a scene by name; the scene as it stands first.
+/// Every error of a scene by name; the unchanged scene first.
 fn errors(args: &[&str], knobs: &[&str]) -> Vec<(String, f64)> {
     let mut all =
         vec!["error", "--csv", "-q", "--rounds", "1", "--frames", "1", "--pixels", "4096"];
@@ -33,7 +33,7 @@ fn errors(args: &[&str], knobs: &[&str]) -> Vec<(String, f64)> {
     let mut rows = csv::Reader::from_reader(&output.stdout[..]);
     let rmse = rows.headers().unwrap().iter().position(|h| h == "rmse").unwrap();
     let row = |r: csv::StringRecord| (r[0].to_owned(), r[rmse].parse().unwrap());
-    // What was put together of several is no question here.
+    // Combinations of several knobs are not tested here.
     rows.records().map(|r| row(r.unwrap())).filter(|(name, _)| !name.contains(", ")).collect()
 }
 

@@ -1,4 +1,4 @@
-//! What is drawn of clouds: groups out of view draw nothing and change no byte; counts by distance
+//! The drawn part of clouds: groups out of view draw nothing and change no byte; counts by distance
 //! are those of C (6), and the picture follows them without a step.
 
 mod harness;

@@ -63,7 +63,7 @@ fn off_by(plan: &Plan) -> Option<u32> {
     }
 }
 
-/// What a flight with impostors came to against one without.
+/// A flight with impostors compared with one without.
 struct Flight {
     n_made: usize,
     n_reused: usize,
@@ -116,7 +116,7 @@ fn both(gpu: &Gpu, overrides: &[&str], first: u32) -> [Vec<(Vec<f32>, Plan)>; 2]
         .map(|key| fly(gpu, &[overrides, &[key]].concat(), first, Threading::Serial))
 }
 
-/// What a pixel changes by, beyond what it does anyway, where a shell is so many pixels off; and
+/// The change of a pixel, beyond what it does anyway, where a shell is so many pixels off; and
 /// where it is not off at all, which is what the cubic leaves of specks: radii are spread evenly
 /// down to 0, a blob of half a pixel loses half of its height, its τ is 1/7 of the mean one's where
 /// that is 3.5 pixels, and it is up to twice as bright as white. 0.14 was measured.
@@ -163,7 +163,7 @@ fn a_flight_does_not_pop() {
     );
 }
 
-/// What the flights are compared with is the truth in f64, which impostors are as near to.
+/// The flights are compared with the f64 reference, which impostors are as near to.
 #[test]
 fn the_f64_picture_agrees() {
     let gpu = Gpu::new();

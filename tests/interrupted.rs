@@ -21,7 +21,7 @@ fn nimbus(args: &[&str]) -> Command {
 
 fn bench(threading: &str, out: &str) -> Child {
     let (n_frames, n_warm_up) = (N_FRAMES.to_string(), N_WARM_UP.to_string());
-    // Short frames: nothing lit, no textures made anew.
+    // Short frames: nothing lit, no textures generated again.
     let plain = ["--set", "lighting.mode=none", "--set", "cloud.0.texture=none"];
     let scene = [&["bench", "scenes/hello.toml", "--size", "64x48"], &plain[..]].concat();
     let length = [
@@ -49,7 +49,7 @@ fn await_folder(out: &str) {
     }
 }
 
-/// What a run came to that got Ctrl-C's signal `after` its beginning.
+/// The result of a run that got SIGINT `after` its start.
 fn interrupted(threading: &str, out: &str, after: Duration) -> Output {
     let child = bench(threading, out);
     await_folder(out);
@@ -71,7 +71,7 @@ fn half_time(threading: &str, out: &str) -> Duration {
     whole / 2
 }
 
-/// What `frames.csv` holds: for each mode its name, timed frames and warm-up.
+/// The content of `frames.csv`: for each mode its name, timed frames and warm-up.
 fn counted(out: &str) -> Vec<(String, usize, usize)> {
     let mut reader = csv::Reader::from_path(Path::new(out).join("frames.csv")).expect("frames.csv");
     let header = reader.headers().expect("a header").clone();

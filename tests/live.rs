@@ -201,7 +201,7 @@ fn births_and_deaths_do_not_pop() {
     println!("greatest change of a pixel in a 16th and a 128th of a second: {steps:?}");
     // An eighth of the time is an eighth of the change where all is smooth.
     assert!(steps[0] > 0.01 && steps[1] < steps[0] / 5.0, "{steps:?}");
-    // What does not fade does pop.
+    // Without fading, particles pop.
     for (from, to) in [
         ("smooth_rise(lived * d.inv_fade_in)", "1.0"),
         ("smooth_rise((1.0 - lived) * d.inv_fade_out)", "1.0"),

@@ -220,7 +220,7 @@ fn the_faster_way_is_taken_and_named() {
     let [sprites_ms, tiles_ms] =
         [0, 1].map(|i| choice.candidates[i].ms().expect("both can draw it"));
     let (faster, path) = [("sprites", DrawPath::Sprites), ("tiles", DrawPath::Tiles)][choice.taken];
-    // What comes first is taken also where the other one is faster by noise.
+    // The first value is taken even if the other is faster by noise.
     assert!(path == DrawPath::Sprites || tiles_ms < sprites_ms, "{}", choice.text());
     assert_eq!((choice.key, auto.scene.draw.path), ("path", path));
     assert!(choice.text().contains(&format!("took \"{faster}\"")), "{}", choice.text());

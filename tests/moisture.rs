@@ -1,4 +1,4 @@
-//! Every number in the tables of docs/moisture.md, computed again from the laws.
+//! Every number in the tables of docs/explanation/moisture.md, computed again from the laws.
 
 use nimbus::model::moisture::{Parcel, Saturation, T0_K, Vapour};
 

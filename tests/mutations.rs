@@ -59,7 +59,7 @@ const FAULTS: &[Fault] = &[
         "functions/half-vector",
     ),
     (
-        "no guard for opposite directions, which have no half vector",
+        "no guard where there is no half vector",
         "include/lobe.glsl",
         "max(dot(h, h), 1e-30)",
         "dot(h, h)",
@@ -152,7 +152,7 @@ const FAULTS: &[Fault] = &[
         "brdf/exponent-40",
     ),
     (
-        "the grid's mass uses the square of sigma instead of the cube",
+        "grid mass by the square of sigma",
         "grid_deposit.comp",
         "blob.sigma * blob.sigma * blob.sigma",
         "blob.sigma * blob.sigma",
@@ -187,14 +187,14 @@ const FAULTS: &[Fault] = &[
         "functions/one-minus-exp",
     ),
     (
-        "the guard against short vectors affects longer ones",
+        "a guard that affects long vectors",
         "include/functions.glsl",
         "max(dot(o, o), 1e-30)",
         "max(dot(o, o), 1e-2)",
         "functions/normalize",
     ),
     (
-        "the guard against missing half vectors affects short ones",
+        "a guard that affects existing half vectors",
         "include/lobe.glsl",
         "max(dot(h, h), 1e-30)",
         "max(dot(h, h), 1e-4)",

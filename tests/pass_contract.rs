@@ -116,7 +116,7 @@ impl Case {
     fn run_as(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, sums: Sums) -> Vec<f64> {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let pass = Contract::new(&gpu.device, compiler, N_BASES, &sums.into()).expect("contract");
-        // What second counted must stay.
+        // The counts of `second` must stay.
         let lit: Vec<_> = (0..self.facets.len())
             .map(|j| LitRecord { n_unresolved: j as f32, unresolved: 0.5, ..LitRecord::default() })
             .collect();
@@ -155,7 +155,7 @@ impl Case {
                 (k % tile, k / tile % n_columns, k / tile / n_columns);
             let (l, row) = (tile_of_all * tile / n_rows, tile_of_all * tile % n_rows + lane);
             let value = self.t2[(l * n_columns + column) * n_rows + row];
-            // What lies in no span is not read.
+            // Columns outside all spans are not read.
             if value == 0.0 { f32::NAN } else { value }
         };
         (0..self.t2.len()).map(at).collect()

@@ -23,7 +23,7 @@ use nimbus::reference::view::View;
 
 type Entry = [u32; 2];
 
-/// What no entry is made of.
+/// A value that no entry has.
 const UNTOUCHED: Entry = [7, u32::MAX];
 const RADIUS: f64 = 8.0;
 
@@ -44,7 +44,7 @@ struct Scene {
     n_bits: u32,
 }
 
-/// What the device makes of it.
+/// The device's result.
 #[derive(PartialEq, Debug)]
 struct Found {
     kept: KeptRecord,
@@ -287,7 +287,7 @@ fn keep_what_the_reference_keeps(scenes: fn(u64, usize) -> Scene) {
     assert!(counts[0] > 1000 && counts[1] > 1000 && counts[2] * 8 < counts[0], "{counts:?}");
 }
 
-/// What the reference leaves out no pixel's ray meets: the law's own claim.
+/// No pixel's ray meets a particle that the reference drops: the law's own claim.
 #[test]
 fn no_ray_meets_what_is_left_out() {
     let (mut n_left, mut n_met) = (0, 0);

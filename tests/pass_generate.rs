@@ -401,9 +401,9 @@ fn chi_squared(a: &[u32], b: &[u32]) -> (f64, usize) {
     (met().map(term).sum(), met().count() - 1)
 }
 
-/// What χ² of `n` degrees of freedom exceeds with a chance of 1e-6 (z = 4.753): Wilson and
-/// Hilferty, whose error at n ≥ 30 is far below the distance between 1e-6 and any p that a wrong
-/// law would give.
+/// The value that χ² of `n` degrees of freedom exceeds with a chance of 1e-6 (z = 4.753): Wilson
+/// and Hilferty, whose error at n ≥ 30 is far below the distance between 1e-6 and any p that a
+/// wrong law would give.
 fn critical(n: usize) -> f64 {
     let v = 2.0 / (9.0 * n as f64);
     n as f64 * (1.0 - v + 4.753 * v.sqrt()).powi(3)

@@ -20,7 +20,7 @@ use nimbus::reference::rounding::{DIVISION_ERROR, U_F32, erf_bound};
 const U: f64 = U_F32;
 const LAW: BoxLaw = BoxLaw { radius_scale: 0.6, ..BoxLaw::new(Form::Centred) };
 
-/// What the pass is given, and the f64 numbers that its f32 records stand for.
+/// The input of the pass, and the f64 numbers that its f32 records stand for.
 struct Scene {
     spec: GridSpec,
     record: GridRecord,

@@ -85,7 +85,7 @@ fn shown(shell: &Shell, now: &View, depth: f32) -> LayerView {
     }
 }
 
-/// What each pixel should be, and the bound.
+/// The expected value of each pixel, and the bound.
 ///
 /// Its place: every entry of the homography between pixels is rounded once, each of the three sums
 /// of three terms takes five roundings more at most, the division 2.5 ulp, and two sums of half an
@@ -128,7 +128,7 @@ fn truth(picture: &Picture<'_>, shell: &Shell, now: &View, unit: f64) -> (Vec<f6
     (truths, bounds)
 }
 
-/// What the pass draws, over what `over` has drawn.
+/// The pass's output over that of `over`.
 fn draw(
     gpu: &mut Gpu,
     compiler: Option<&Compiler>,

@@ -102,7 +102,7 @@ fn run(gpu: &mut Gpu, compiler: &Compiler, clouds: &[Cloud], time_s: f64) -> Vec
     gpu.download(&particles, n)
 }
 
-/// What the shader makes of a particle, operation by operation, each with what it rounds: position
+/// The shader's evaluation of a particle, operation by operation, each with its rounding: position
 /// by axis, σ, κ.
 fn bounds(cloud: &Cloud, group: &Group, p: &LiveParticle) -> ([Bounded; 3], Bounded, Bounded) {
     let (d, once, exact) = (disc_of(cloud), Bounded::once, Bounded::exact);
@@ -217,7 +217,7 @@ const TIMES: [f64; 5] = [-1234.5, 0.0, 12.34, 1e6, 1e6 + 17.7];
 
 #[test]
 fn particles_live_as_the_reference_says_at_any_time() {
-    // What the reference counts a division as is what Bounded does.
+    // The reference and Bounded count a division alike.
     assert_eq!(DIVISION_ERROR, 5.0);
     let mut gpu = Gpu::new();
     let compiler = Compiler::new(nimbus::passes::sources(), None).unwrap();

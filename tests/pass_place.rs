@@ -89,7 +89,7 @@ fn scene(gust: Gust, growth: Growth) -> Scene {
     };
     let records = groups.iter().map(record).collect();
     let offsets = offsets(&groups, &clouds, TIME_S, ORIGIN);
-    // What the facets point away from comes from the same origin: the record's own rounding, once.
+    // The point that facets face away from has the same origin: the record's own rounding, once.
     let records: Vec<GroupRecord> = records;
     for (r, g) in records.iter().zip(&groups) {
         let center = cloud_centers(&clouds, TIME_S, ORIGIN)[g.i_cloud];

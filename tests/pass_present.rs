@@ -20,7 +20,7 @@ const SIZE: [u32; 2] = [71, 49];
 const WINDOW: [u32; 2] = [90, 64];
 const CORNER: [i32; 2] = [7, -3];
 
-/// What a code value may be off before it is rounded down. What Vulkan promises: log2 3 ulp of at
+/// The error of a code value before it is rounded down. Vulkan promises: log2 3 ulp of at
 /// most 8.3 (or 2^-21), over 2.4 and times ln 2 a relative 8e-7; exp2 3 + 2 · 3.5 ulp, 1.2e-6; the
 /// composition and the tone map's three quotients some twenty roundings of 2^-24, 1.2e-6: 3.2e-6 of
 /// 255, and twice that for 1.055 v − 0.055 and the sums after it.
@@ -86,7 +86,7 @@ const COMPARED: [(Option<Compare>, Option<Compared>); 8] = [
 ];
 const ALONE: (Option<Compare>, Option<Compared>) = COMPARED[0];
 
-/// What a difference may be off besides: 4 roundings of 2^-24 of what is added up, 5 more of either
+/// The further error of a difference: 4 roundings of 2^-24 of what is added up, 5 more of either
 /// where bytes are read (2.5 ulp of a quotient), 2 of the gains; and 12.92 is the steepest of sRGB.
 fn off_by_differing(film: &Film, gain: f64, [a, b]: [DVec4; 2]) -> DVec3 {
     let size = |p: DVec4| p.truncate().abs() + p.w.abs() * film.background;

@@ -163,7 +163,8 @@ fn a_gather_that_does_not_come_to_its_end_says_so() {
     assert!(
         frame(&gpu, room(0, "")).lit.iter().all(|l| l.n_lost == 0.0 && l.unresolved.is_finite())
     );
-    // Receivers that never begin: all of their sources are told, and none of the light has a bound.
+    // Receivers that never begin: all of their sources are counted as lost, and no light has a
+    // bound.
     let idle = Gpu::wrong_compiler(
         "include/walk.glsl",
         "while (s < end && n_iterations < BATCH_ITERATIONS",

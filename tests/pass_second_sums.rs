@@ -103,7 +103,7 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
 }
 
 #[test]
-#[ignore = "a minute; the table of docs/measured.md"]
+#[ignore = "a minute; the table of docs/reference/measured.md"]
 fn what_every_way_is_off_by() {
     let gpu = Gpu::new();
     for (name, gather) in

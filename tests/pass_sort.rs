@@ -15,7 +15,7 @@ use nimbus::reference::sort::{depths, key32, order};
 
 type Entry = [u32; 2];
 
-/// What the GPU makes of (key, index) entries.
+/// The GPU's order of (key, index) entries.
 fn sorted(gpu: &mut Gpu, sort: &Sort, keys: &[u32], n_bits: u32) -> Vec<Entry> {
     let entries: Vec<Entry> = keys.iter().zip(0..).map(|(&key, i)| [key, i]).collect();
     let buffer = gpu.upload(&entries);
@@ -245,7 +245,7 @@ fn keys_of_16_bits_are_steps_of_depth() {
         let bounds = depth_bounds(&placed, forward);
         let found = keys(&mut gpu, &sort, &placed, forward, radius, 16);
         assert_eq!(wrong_step(&found, &bounds, radius), None, "{radius}");
-        // What a step leaves open is far less than a step.
+        // The uncertainty is far less than a step.
         assert!(bounds.iter().all(|b| steps(*b, radius).error < 0.1));
         let ends = (found.contains(&0), found.contains(&65535));
         assert_eq!(ends, (radius == 5.0, radius == 5.0));

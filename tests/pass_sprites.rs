@@ -67,7 +67,7 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     greatest
 }
 
-/// What users are promised of floats; eight bits are rounded at every layer.
+/// The bound promised for floats; eight bits are rounded at every layer.
 #[test]
 fn blobs_of_all_kinds_are_near_the_truth() {
     let mut gpu = Gpu::new();

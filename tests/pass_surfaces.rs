@@ -46,7 +46,7 @@ fn worst(values: &[f64], candidates: &[Candidates]) -> f64 {
     values.chunks(4).zip(candidates).map(pixel).fold(0.0, f64::max)
 }
 
-/// What a picture of surfaces came to.
+/// The result of a picture of surfaces.
 struct Shown {
     /// Share of the pixels that show a surface, of its front where `lit`.
     covered: f64,
@@ -353,7 +353,7 @@ fn draw_wrong(gpu: &mut Gpu, picture: &Picture, (file, from, to): (&str, &str, &
 #[test]
 fn wrong_pictures_are_noticed() {
     let mut gpu = Gpu::new();
-    // What the near plane cuts, and two more that cross, one of them seen from behind.
+    // A rectangle that the near plane cuts, and two more that cross, one of them seen from behind.
     let mut picture = through_near_plane();
     let scenery = picture.scenery.take().expect("one");
     let scenery = scenery.rectangle(v(-0.5, 0.3, 0.0), v(0.5, 0.2, 1.0), v(-0.2, 0.9, 0.0), [3, 4]);

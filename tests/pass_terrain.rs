@@ -78,7 +78,7 @@ fn draw(
     colors.iter().zip(&depths).map(pixel).collect()
 }
 
-/// What each pixel may show, its depth as rounded as the device keeps it.
+/// The values that each pixel may show, its depth as rounded as the device keeps it.
 fn may_show(gpu: &Gpu, picture: &Picture, relief: &Relief) -> Vec<Vec<Candidate>> {
     let mut candidates = relief.candidates(&picture.view, |i, j| picture.ray(i, j));
     let rounded = if has_depth24(&gpu.device) { 2f64.powi(-24) } else { 0.0 };
@@ -183,7 +183,7 @@ fn grounds_of_kilometres_far_from_the_origin_and_two_at_once() {
     );
     let picture = Picture::new(v(0.3, 1.0, 5.0), v(0.1, 0.3, 0.0), 60.0, 0.1);
     assert!(compare(&mut gpu, "three", &picture, &two)[1] > 0.4);
-    // What has no area draws nothing.
+    // A triangle without area draws nothing.
     let flat = Relief::default().ground(v(0.0, 0.0, 0.0), [3, 3], 0.0, |_, _| 0.0);
     assert_eq!(compare(&mut gpu, "a point", &picture, &flat), [1.0, 0.0]);
 }

@@ -127,7 +127,7 @@ fn workgroups_and_rounds_do_not_show() {
             "{max_tiles:?}, portable"
         );
     }
-    // What one round hands to the next is what the next would have had.
+    // A round hands on the state that a single round would have.
     assert!(draw(&Tiled { max_pairs: Some(1), ..tiled }) == once, "several rounds");
 }
 

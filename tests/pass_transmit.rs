@@ -175,7 +175,7 @@ fn wrong_transmittance_is_noticed() {
         values[k][shaded] += 2.0 * bounds[k][shaded];
         assert!(ratio(&values, k) > 1.0, "one corrupted number");
     }
-    // What is wrong in the transmittance (0), and what in the clouds' part alone (1).
+    // The errors of the transmittance (0), and of the clouds' part alone (1).
     for (k, file, from, to) in [
         (0, "transmit.comp", "(t0 + 0.5 * ds)", "t0"),
         (0, "transmit.comp", "min(step_length, length_total - t0)", "step_length"),

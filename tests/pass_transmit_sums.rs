@@ -120,7 +120,7 @@ fn a_plain_march_of_thousands_of_steps_is_not_within_the_bounds_of_the_others() 
 }
 
 #[test]
-#[ignore = "the table of docs/measured.md"]
+#[ignore = "the table of docs/reference/measured.md"]
 fn what_every_way_is_off_by() {
     let mut gpu = Gpu::new();
     for (what, case, step) in

@@ -40,7 +40,7 @@ fn numbers(format: TargetFormat, words: &[u32]) -> Vec<f64> {
     words.iter().flat_map(of).collect()
 }
 
-/// What of a number's rounding the format adds: faithful, relative above its least normal number,
+/// The rounding that the format adds: faithful, relative above its least normal number,
 /// or absolute.
 fn roundoff(format: TargetFormat, value: f64) -> f64 {
     match format {
@@ -182,7 +182,7 @@ impl Case {
             })
         };
         let bounds = summed.iter().flat_map(bound).collect();
-        // What the format cannot hold is cut.
+        // Values outside the format's range are clamped.
         let cut = |v: f64| if self.format == TargetFormat::Rgba8 { v.clamp(0.0, 1.0) } else { v };
         (summed.iter().flat_map(|(v, _)| v.map(cut)).collect(), bounds)
     }

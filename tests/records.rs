@@ -1,4 +1,4 @@
-//! What is written is what the schema says, and both say the same keys.
+//! Written results follow the schema, and both have the same keys.
 
 #[path = "harness/results.rs"]
 mod results;

@@ -22,7 +22,7 @@ fn scenes() -> Vec<PathBuf> {
     paths
 }
 
-/// What is seen of a scene after hands have been at it.
+/// A scene as a user has changed it in the window.
 fn overrides_of_view(loaded: &LoadedScene) -> Vec<String> {
     let scene = Arc::new(loaded.scene.clone());
     let mut state = ViewState::new(scene.clone(), true).unwrap();

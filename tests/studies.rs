@@ -16,7 +16,7 @@ use tiny::{HEIGHT, N_PIXELS, OUT, SHORT, Table, Tiny, WIDTH, assert_valid, names
 const TWO_KNOBS: [&str; 6] =
     ["--set", "draw.sort_bits=32", "--knob", "draw.cutoff=2,3", "--knob", "draw.sort_bits=16,32"];
 
-/// What follows from the divisions and logarithms of two ways to the same figure.
+/// The rounding of two ways to the same figure, by divisions and logarithms.
 const ROUNDING: f64 = 1e-12;
 
 fn is_near(a: f64, b: f64) -> bool {
@@ -52,8 +52,8 @@ fn the_files_of_a_study_agree() {
         (&json["scene_file"], &json["reference"]["n_pixels"]),
         (&json!("scene.toml"), &json!(N_PIXELS))
     );
-    // The scene's own values are the scene. What is put together depends on what this machine finds
-    // faster.
+    // The scene's own values are the scene. The combinations depend on which values are faster on
+    // this machine.
     assert_eq!(names(&json)[..3], ["as it stands", "draw.cutoff=2", "draw.sort_bits=16"]);
     assert!(
         names(&json)[3..]
@@ -92,7 +92,7 @@ fn the_files_of_a_study_agree() {
     assert_eq!(tiny.text("out/times.csv"), times);
 }
 
-/// The figures of times follow from times.csv: those of the scene as it stands are medians, those
+/// The figures of times follow from times.csv: those of the unchanged scene are medians, those
 /// of others medians of ratios to the turns of the scene just before and just after.
 fn check_times(tiny: &Tiny, json: &Value) {
     let table = Table::of(&tiny.text("out/times.csv"));
@@ -269,7 +269,7 @@ fn a_resumed_study_measures_nothing_twice() {
         pixels(&tiny, "out/picture-1.png"),
     );
     assert_eq!(names(&before), ["as it stands", "draw.cutoff=2"]);
-    // What exists is replaced only where that is asked for.
+    // Existing results are replaced only with --force.
     assert_eq!(tiny.refused(&first), "out: exists; --force replaces it");
     assert_eq!(
         (tiny.json("out/study.json"), tiny.text("out/times.csv")),
@@ -307,7 +307,7 @@ fn a_resumed_study_measures_nothing_twice() {
         (&["--time=gpu"], "the time that decides"),
         (&["--set", "cloud.0.position=[1,0,0]"], "the reference, the scene"),
     ] {
-        // What is said last of one argument holds for it.
+        // The last value of a repeated argument counts.
         let name = more[0].split('=').next().expect("a name");
         let own: Vec<String> = go_on("draw.cutoff=2")
             .into_iter()

@@ -1,4 +1,4 @@
-//! What `nimbus error` and `nimbus ledger` refuse and how they say it; clouds drawn plain;
+//! Input that `nimbus error` and `nimbus ledger` refuse, and their messages; clouds drawn plain;
 //! references that are kept.
 
 #[path = "harness/program.rs"]
@@ -155,7 +155,7 @@ fn a_reference_is_cached_and_a_damaged_one_computed_again() {
         (&second["from_cache"], &second["hash"], &same),
         (&json!(true), &first["hash"], &errors)
     );
-    // What it was made of is kept with it; what counts for it is told apart from what does not.
+    // A kept reference has its own key; only keys that affect it change the key.
     assert_eq!(
         (&second["own_error"], &second["seconds"]),
         (&first["own_error"], &first["seconds"])

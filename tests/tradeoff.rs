@@ -120,7 +120,7 @@ fn named<'a>(found: &'a StudyResults, name: &str) -> &'a Configuration {
 #[test]
 fn a_knob_of_known_law_has_the_expected_front() {
     let (mut law, mut found) = (Law::default(), StudyResults::default());
-    // The scene as it stands has q = 3 and no waste. Four qualities that nobody beats, the same
+    // The unchanged scene has q = 3 and no waste. Four qualities that nobody beats, the same
     // with waste, one too great.
     let plan =
         plan(&["draw.cutoff=2.0,2.5,3.0,4.0,5.0,7.0", "draw.sort_bits=32,16"], Design::Grid, 24);
@@ -148,14 +148,14 @@ fn a_knob_of_known_law_has_the_expected_front() {
             "{error:?}"
         );
     }
-    // What is as the scene stands is not there twice; what does not fit says why, and is nowhere.
+    // The unchanged scene occurs once; a value that does not fit says why, and is left out.
     assert_eq!(found.configurations[0].front, Front::On);
     assert!(!found.configurations.iter().any(|c| c.name == "draw.cutoff=3.0, draw.sort_bits=32"));
     let beyond = named(&found, "draw.cutoff=7.0, draw.sort_bits=32");
     assert!(
         beyond.front == Front::Unknown && beyond.failure.as_ref().unwrap().contains("too great")
     );
-    // What a budget buys, in ms of the machine's median speed.
+    // The best within a budget, in ms at the machine's median speed.
     let base_ms = found.configurations[0].gpu_ms.unwrap().value;
     let name = |best: Option<usize>| best.map(|i| found.configurations[i].name.as_str());
     let within = |q: f64| best(&found, Budget::Ms, base_ms * q / 3.0);
@@ -189,8 +189,8 @@ fn results_of_an_earlier_run_are_not_measured_again() {
     assert!(study(&mut law, &first, &mut found, &stopped));
     let (n_pictures, blocks) = (law.n_pictures, found.blocks.clone());
     assert_eq!(n_pictures, 3);
-    // The same again: nothing to do. With one more value: that one alone, with the scene as it
-    // stands beside it.
+    // The same again: nothing to do. With one more value: that one alone, with the unchanged
+    // scene beside it.
     let mut again = Law::default();
     assert!(study(&mut again, &first, &mut found, &stopped));
     assert_eq!((again.n_pictures, found.blocks.len()), (0, blocks.len()));

@@ -1,4 +1,5 @@
-// A blob as the camera sees it; both draw paths start from it (docs/model.md §11 "sprites").
+// A blob as the camera sees it; both draw paths start from it (docs/explanation/passes.md
+// "sprites").
 
 #include "camera.glsl"
 
@@ -23,7 +24,7 @@ vec2 tangents(float a, float z, float r) {
 }
 
 // An ellipsoid with an axis along y: values that follow from its aspect a and the camera
-// (docs/model.md §14).
+// (docs/explanation/model.md §14).
 struct Shape {
     // The scene's y along the camera's right, up and forward.
     vec3 y;

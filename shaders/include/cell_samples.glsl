@@ -1,6 +1,6 @@
 // A cell of a surface's facet seen at 4 x 4 points. Each point is the middle of a part, whose share
-// in light and shadow is found along straight edges (docs/model.md §11 "second"). Needs light.glsl
-// and occlude.glsl.
+// in light and shadow is found along straight edges (docs/explanation/passes.md "second"). Needs
+// light.glsl and occlude.glsl.
 
 // Places of the points along each half axis.
 const vec4 ALONG = vec4(-0.75, -0.25, 0.25, 0.75);

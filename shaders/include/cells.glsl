@@ -1,5 +1,5 @@
 // How a receiver sees one source: as a whole, or cell by cell where the source is too wide for its
-// distance (docs/model.md §7, §11 "second"). Needs gather.glsl.
+// distance (docs/explanation/model.md §7, §11 "second"). Needs gather.glsl.
 
 // A lobe reaches this many of its widths; beyond it is below e^-8 of its peak.
 const float LOBE_REACH = 4.0;
@@ -9,7 +9,7 @@ const float LOBE_REACH = 4.0;
 const float LOBE_STEP = 3.0;
 // Lobes are evaluated in each quarter of a cell, so that a cell may be this much wider. Its
 // quarters are 3/4 as wide as a whole may be, finer than lobes need; its points are as fine as
-// shadow edges need (docs/measured.md).
+// shadow edges need (docs/reference/measured.md).
 const float LOBE_PARTS = 1.5;
 // The half vector turns by at most this share of a cell's width over its distance between centre
 // and corner. It is half the direction's turn, of half a diagonal of sqrt 2, and twice that where

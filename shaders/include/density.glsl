@@ -1,5 +1,5 @@
-// Trilinear density between cell centres, 0 outside their hull (docs/model.md §11 "sample"). Needs
-// `Grid grid` in the push constants and `samplerBuffer density`.
+// Trilinear density between cell centres, 0 outside their hull (docs/explanation/passes.md
+// "sample"). Needs `Grid grid` in the push constants and `samplerBuffer density`.
 
 // 1: places and weights are doubles.
 #ifndef DEEP

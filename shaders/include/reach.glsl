@@ -1,5 +1,5 @@
-// Whether light reaches a point past all surfaces (docs/model.md §11 "transmit"). Needs light.glsl,
-// occlude.glsl and regions.glsl; the surfaces are the first regions.
+// Whether light reaches a point past all surfaces (docs/explanation/passes.md "transmit"). Needs
+// light.glsl, occlude.glsl and regions.glsl; the surfaces are the first regions.
 
 // Whether no surface but the point's own hides the light from p.
 bool is_clear(vec3 p, Light light, uint i_own, uint n_surfaces) {

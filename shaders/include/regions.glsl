@@ -1,6 +1,6 @@
 // Reads a region by its number, as texels. A device without vectors in memory loads a storage
 // buffer's records invocation by invocation, each in a branch of its own. It loads texels all at
-// once (docs/measured.md). Needs `usamplerBuffer regions`.
+// once (docs/reference/measured.md). Needs `usamplerBuffer regions`.
 
 Region region_at(uint i) {
     int k = int(i) * 7;

@@ -1,5 +1,5 @@
-// The buffers and functions that second_gather.comp and second_tensor.comp share (docs/model.md §7,
-// §11 "second"). The includer declares the push constants first.
+// The buffers and functions that second_gather.comp and second_tensor.comp share
+// (docs/explanation/model.md §7, §11 "second"). The includer declares the push constants first.
 
 READS(0, Block, blocks)
 READS(1, Pairing, pairings)

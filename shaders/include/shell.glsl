@@ -1,4 +1,4 @@
-// The facet on a blob's shell (docs/model.md §11 "facets"). Needs
+// The facet on a blob's shell (docs/explanation/passes.md "facets"). Needs
 // records.glsl, functions.glsl and the push constants' grid.
 
 READS(0, Placed, placed)
@@ -9,7 +9,7 @@ layout(binding = 4) uniform samplerBuffer density;
 
 #include "density.glsl"
 
-// 1: blobs may be ellipsoids (docs/model.md §14).
+// 1: blobs may be ellipsoids (docs/explanation/model.md §14).
 #ifndef ELLIPSOIDS
 #define ELLIPSOIDS 0
 #endif

@@ -1,7 +1,7 @@
-// Stable radix sort, DIGIT_BITS bits a pass (docs/model.md §11 "sort"). A workgroup owns a tile of
-// 1024 entries, each invocation a run of consecutive ones, so that order inside a tile is the order
-// of (invocation, iteration). Fewer invocations have fewer counters to clear and sum: the host asks
-// for one subgroup, 32 at most.
+// Stable radix sort, DIGIT_BITS bits a pass (docs/explanation/passes.md "sort"). A workgroup owns a
+// tile of 1024 entries, each invocation a run of consecutive ones, so that order inside a tile is
+// the order of (invocation, iteration). Fewer invocations have fewer counters to clear and sum: the
+// host asks for one subgroup, 32 at most.
 
 #include "buffers.glsl"
 

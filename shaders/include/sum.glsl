@@ -1,5 +1,5 @@
-// How the long sums of light are formed (docs/model.md §11 "sums"). SUM1 and SUM3 hold a sum, ADD
-// adds to it and TOTAL returns it; plain sums of floats are the numbers themselves. Needs
+// How the long sums of light are formed (docs/explanation/passes.md "sums"). SUM1 and SUM3 hold a
+// sum, ADD adds to it and TOTAL returns it; plain sums of floats are the numbers themselves. Needs
 // GL_EXT_control_flow_attributes.
 
 #define PLAIN 0

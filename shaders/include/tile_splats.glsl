@@ -1,5 +1,6 @@
 // How the invocations of a tile share the splats that they have found and loaded: by subgroup
-// operations, or by shared memory (docs/model.md §11 "tiles"). Needs the buffers of tiles.comp.
+// operations, or by shared memory (docs/explanation/passes.md "tiles"). Needs the buffers of
+// tiles.comp.
 
 // A splat as it lies in the buffers.
 struct Loaded {

@@ -59,8 +59,8 @@ pub enum Command {
     /// Draw one frame to a PNG or EXR file
     ///
     /// With --reference the frame is drawn in f64 on the processor, without a Vulkan device and
-    /// without shaders (docs/model.md §9). There are four references, each without an approximation
-    /// of the one before it.
+    /// without shaders (docs/explanation/model.md §9). There are four references, each without an
+    /// approximation of the one before it.
     ///
     /// "thin" draws the same sprites as the device, sorted by exact depth; it differs from the
     /// device by arithmetic alone. "volume" integrates light through the overlapping blobs, to
@@ -102,7 +102,7 @@ pub enum Command {
     /// Measure run time against error over a scene's knobs: how much error does a millisecond buy?
     ///
     /// Every configuration of the knobs is drawn once and compared with a reference in f64. All are
-    /// timed in alternating blocks with the scene as it stands. The table is sorted by time; "*"
+    /// timed in alternating blocks with the unchanged scene. The table is sorted by time; "*"
     /// marks the front: no other configuration is at least as fast and as exact, and better in one
     /// of the two. "~" marks configurations that others beat, but none that is faster beyond the
     /// 95 % intervals.
@@ -129,9 +129,9 @@ pub enum Command {
     ///
     /// Functions, particles, light, layers, far places and late times are computed with extreme
     /// inputs and compared with f64, or with exact results. The bounds follow from the precision
-    /// that Vulkan guarantees (docs/stability.md). A row a case shows the value that is furthest
-    /// off relative to its bound: the device's, the reference's, error and bound. Exit code 1 says
-    /// that an error is beyond its bound.
+    /// that Vulkan guarantees (docs/explanation/stability.md). A row a case shows the value that is
+    /// furthest off relative to its bound: the device's, the reference's, error and bound. Exit
+    /// code 1 says that an error is beyond its bound.
     Stress(StressArgs),
     /// Make one HTML page of results: conditions, plots, tables, pictures
     ///
@@ -176,7 +176,7 @@ pub enum Command {
     ///
     /// Extinction is 3/2 q ρ/(ρ_x r_x), summed over cloud water (10 µm droplets), ice (30 µm) and
     /// snow (100 µm), without rain and graupel. If a file has none of the three, clouds are
-    /// diagnosed from relative humidity, and the output says so (docs/model.md §15).
+    /// diagnosed from relative humidity, and the output says so (docs/explanation/model.md §15).
     ///
     /// P, PB, T, PH, PHB and the attributes DX and DY are required; notes name what else is
     /// missing. Mixing ratios that are negative, NaN or a fill value are counted and taken as 0; in

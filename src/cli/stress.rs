@@ -12,7 +12,7 @@ use crate::frame::DeviceChoice;
 use crate::stress::{Case, Outcome, StressContext, Verdict, cases};
 use crate::timing::machine::{self, Cpu, Device};
 
-/// The output of `--json`, which docs/stress.schema.json describes.
+/// The output of `--json`, which docs/reference/schemas/stress.schema.json describes.
 #[derive(Debug, Serialize)]
 struct Report {
     schema: u32,

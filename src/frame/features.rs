@@ -144,7 +144,7 @@ pub fn has_glossy(scene: &Scene) -> bool {
 
 /// Returns whether the second reflection is gathered from a tree of clusters.
 pub fn gathers_from_tree(scene: &Scene) -> bool {
-    /// The number of facets from which on the tree is faster (docs/measured.md).
+    /// The number of facets from which on the tree is faster (docs/reference/measured.md).
     const MIN_FACETS: u64 = 1024;
     match scene.lighting.gather {
         Gather::Exact => false,

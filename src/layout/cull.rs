@@ -1,4 +1,5 @@
-//! The record by which `cull` passes on the number of kept particles (docs/model.md §11 "cull").
+//! The record by which `cull` passes on the number of kept particles (docs/explanation/passes.md
+//! "cull").
 
 use crate::layout::record;
 

@@ -194,7 +194,7 @@ impl DrawnRecord {
 }
 
 record! {
-    /// The texture of a group's particles (docs/model.md §11 "texture").
+    /// The texture of a group's particles (docs/explanation/passes.md "texture").
     pub struct TexturedRecord {
         /// Philox key of each particle's rotation and shift: the cloud's seed.
         seed: u32,

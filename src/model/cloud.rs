@@ -35,8 +35,8 @@ pub struct Cloud {
     pub seed: u32,
 }
 
-/// Direction that a cloud's facets face where the density around them has none (docs/model.md §11
-/// "facets").
+/// Direction that a cloud's facets face where the density around them has none
+/// (docs/explanation/passes.md "facets").
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Facing {
     /// Away from the cloud's centre; for a single cloud.

@@ -1,5 +1,5 @@
-//! The gusts' displacement d(x, t) = Σ a sin(k·x + ω t + φ) (docs/model.md §12) for [`LANES`]
-//! particles at once.
+//! The gusts' displacement d(x, t) = Σ a sin(k·x + ω t + φ) (docs/explanation/model.md §12) for
+//! [`LANES`] particles at once.
 //!
 //! The sine has no branch and no call, so that the compiler vectorises the loop over particles.
 //! Multiplications and additions are never fused: every machine gives the same bytes.

@@ -1,4 +1,5 @@
-//! Saturation, relative humidity and the lifted condensation level: C (1)–(3), docs/model.md §4.
+//! Saturation, relative humidity and the lifted condensation level: C (1)–(3),
+//! docs/explanation/model.md §4.
 
 use std::fmt;
 

@@ -1,5 +1,5 @@
 //! The low-resolution picture that blobs may be drawn into, and how its pixels lie under the full
-//! one's (docs/model.md §11 "upsample").
+//! one's (docs/explanation/passes.md "upsample").
 
 use glam::DVec2;
 

@@ -1,4 +1,5 @@
-//! Frustum test of groups of particles (docs/model.md §11 "visibility"). It errs towards visible.
+//! Frustum test of groups of particles (docs/explanation/passes.md "visibility"). It errs towards
+//! visible.
 
 use glam::{DVec2, DVec3};
 

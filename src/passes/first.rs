@@ -1,8 +1,8 @@
 //! first: computes the direct irradiance and the first reflection of every facet.
 //!
 //! In: facets, lights, transmittance, regions (materials). Out: I_d and L1, linear RGB. Law: L1 =
-//! K_d/π Σ E V max(0, n·ω), and the sky. Source: C (15), docs/model.md §7, §8, §11. Error: a few
-//! ulp a light.
+//! K_d/π Σ E V max(0, n·ω), and the sky. Source: C (15), docs/explanation/model.md §7, §8, §11.
+//! Error: a few ulp a light.
 
 use crate::error::Result;
 use crate::gpu::{Compiler, Device, Kernel, Recorder};
@@ -92,7 +92,7 @@ bindings! {
 }
 
 /// The pipeline that fills T1: the first reflection by light and basis function, for `contract` to
-/// sum (docs/model.md §11 "contract").
+/// sum (docs/explanation/passes.md "contract").
 pub struct FirstTensor {
     kernel: Kernel,
 }

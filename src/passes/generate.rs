@@ -2,8 +2,9 @@
 //!
 //! In: boxes (one a group), group of each particle. Out: particles relative to their box's center,
 //! and for each the number of attempts and whether it was folded back. Law: P (1)–(11) with Philox
-//! counters. Source: P §Shape modeling, docs/model.md §1. Error: reference/generate.rs derives the
-//! bound on position and radius; a decision nearer to a face than that bound may differ from f64.
+//! counters. Source: P §Shape modeling, docs/explanation/model.md §1. Error: reference/generate.rs
+//! derives the bound on position and radius; a decision nearer to a face than that bound may differ
+//! from f64.
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};

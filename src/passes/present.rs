@@ -3,9 +3,9 @@
 //! In: a picture's pixels as its target holds them, and a second picture to compare it with. Out:
 //! sRGB code values of 8 bits; black outside the picture. Law: over the background, times the
 //! exposure, tone map, sRGB, ordered dither, as PNG files are written; or the two pictures side by
-//! side, or their difference. Source: docs/model.md §11 "present". Error: 8e-6 of the greatest
-//! value, so that a code value differs only where the exact value is that close to the next; 11
-//! more roundings for a difference.
+//! side, or their difference. Source: docs/explanation/passes.md "present". Error: 8e-6 of the
+//! greatest value, so that a code value differs only where the exact value is that close to the
+//! next; 11 more roundings for a difference.
 
 use crate::error::Result;
 use crate::gpu::TargetFormat;

@@ -3,8 +3,8 @@
 //! In: placed particles, group of each, the drawn part of every group, the camera's forward axis.
 //! Out: key and particle in ascending key, equal keys in ascending index. Law: stable
 //! least-significant-digit radix sort, at most 8 or 9 bits a pass, keys of 16 or 32 bits. Source:
-//! docs/model.md §9, §11. Error: none in the sort; a key holds the depth to an ulp (32 bits) or to
-//! 2⁻¹⁶ of the scene (16 bits).
+//! docs/explanation/model.md §9, §11. Error: none in the sort; a key holds the depth to an ulp (32
+//! bits) or to 2⁻¹⁶ of the scene (16 bits).
 
 use super::blobs::steps_per_depth;
 use crate::error::Result;

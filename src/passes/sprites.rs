@@ -2,8 +2,8 @@
 //!
 //! In: sorted entries and the other buffers of blobs, and the depth of surfaces. Out: premultiplied
 //! linear RGBA in the target's format. Law: α = 1 − exp(−√(2π) κ σ e^{−b²/2σ²}), b the distance to
-//! the pixel's ray. Source: P §Rendering, docs/model.md §9, §11. Error: α to a few 1e-6 relative,
-//! and the target's rounding at each layer.
+//! the pixel's ray. Source: P §Rendering, docs/explanation/model.md §9, §11. Error: α to a few 1e-6
+//! relative, and the target's rounding at each layer.
 
 use super::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
 use crate::error::Result;

@@ -2,8 +2,8 @@
 //!
 //! In: regions, lit facets. Out: linear RGBA in the target's format, and depth near/z. Law: L1 + L2
 //! where the pixel's ray meets the rectangle, interpolated between the facets' centers; the back is
-//! black. Source: docs/model.md §9, §11. Error: the position to 1e-6 of the rectangle's distance
-//! over the cosine, the depth likewise, and the target's rounding.
+//! black. Source: docs/explanation/model.md §9, §11. Error: the position to 1e-6 of the rectangle's
+//! distance over the cosine, the depth likewise, and the target's rounding.
 
 use crate::error::Result;
 use crate::gpu::TargetFormat;

@@ -1,4 +1,4 @@
-//! The types of `run.json`, which docs/run.schema.json describes.
+//! The types of `run.json`, which docs/reference/schemas/run.schema.json describes.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,5 @@
 //! Prediction of how long work takes, division of work into shards of suitable lengths, and the
-//! price (docs/model.md §17).
+//! price (docs/explanation/farm.md).
 //!
 //! [`workload`] counts what takes time in scenes, [`model`] fits a duration to each such count and
 //! predicts with it, [`split`] and [`pack`] divide the work.

@@ -1,7 +1,7 @@
 //! The cost model: the duration of work as a sum over its amounts, fitted to timed runs.
 //!
 //! t = setup + d · steps + a · particles · steps + g · grid cells + b · pixel samples
-//! + c · facet pairs + e · textures (docs/model.md §17).
+//! + c · facet pairs + e · textures (docs/explanation/farm.md).
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! Assignment of shards to nodes, and the price of the nodes' time (docs/model.md §17).
+//! Assignment of shards to nodes, and the price of the nodes' time (docs/explanation/farm.md).
 
 use std::fmt;
 

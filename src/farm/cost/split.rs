@@ -1,4 +1,4 @@
-//! Division of consecutive items into shards (docs/model.md §17). Short shards spend much on
+//! Division of consecutive items into shards (docs/explanation/farm.md). Short shards spend much on
 //! set-ups and on the scheduler; long ones lose much in a failure.
 
 use std::collections::VecDeque;

@@ -1,5 +1,5 @@
 //! Output of WRF: the meaning of its variables, and a step of them as a grid with extinction
-//! (docs/model.md §15).
+//! (docs/explanation/model.md §15).
 
 use std::path::{Path, PathBuf};
 

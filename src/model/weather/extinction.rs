@@ -1,5 +1,5 @@
 //! Extinction of droplets and crystals in m⁻¹ from their mixing ratios, by geometric optics of
-//! spheres, docs/model.md §15.
+//! spheres, docs/explanation/model.md §15.
 
 use crate::model::moisture::T0_K;
 

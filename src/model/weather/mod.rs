@@ -1,6 +1,6 @@
 //! Clouds of a weather model as plain arrays: from pressure, temperature and mixing ratios on WRF's
-//! grid to extinction in m⁻¹, and from extinction to blobs (docs/model.md §15). No files:
-//! `io::weather` reads them.
+//! grid to extinction in m⁻¹, and from extinction to blobs (docs/explanation/model.md §15). No
+//! files: `io::weather` reads them.
 //!
 //! Arrays are ordered as in the files: level by level from the ground, each level row by row from
 //! the south, each row from the west.

@@ -1,8 +1,8 @@
 //! Times of a file's steps: parsing and printing, order, and interpolation between them.
 
 /// Longest interval that is interpolated, s. Blobs on fixed seeds are off by half of their spread
-/// between steps 10 minutes apart, and by three quarters between steps 3 hours apart (docs/model.md
-/// §15).
+/// between steps 10 minutes apart, and by three quarters between steps 3 hours apart
+/// (docs/explanation/model.md §15).
 pub const LONGEST_INTERPOLATED_S: f64 = 600.0;
 
 const SECONDS_A_DAY: f64 = 86_400.0;

@@ -1,4 +1,4 @@
-//! The types of `ledger.json`, which docs/ledger.schema.json describes.
+//! The types of `ledger.json`, which docs/reference/schemas/ledger.schema.json describes.
 
 use serde::{Deserialize, Serialize};
 

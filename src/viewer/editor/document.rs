@@ -53,9 +53,9 @@ impl Document {
     /// Returns the boxes whose particles must be generated again after a change from `before`.
     ///
     /// The particles of a box follow from the cloud's seed, the index of the box, and the box.
-    /// Their places relative to the box's centre do not depend on that centre (docs/model.md §1). A
-    /// box that only moves keeps its particles. A deleted box changes the indices of the later
-    /// ones.
+    /// Their places relative to the box's centre do not depend on that centre
+    /// (docs/explanation/model.md §1). A box that only moves keeps its particles. A deleted box
+    /// changes the indices of the later ones.
     pub fn regenerated_since(&self, before: &Document) -> Vec<usize> {
         let is_kept = |i: &usize| {
             let was = before.boxes.get(*i);

@@ -112,7 +112,7 @@ pub struct Comparison {
     pub differences: Vec<Difference>,
     /// Every loop that both ran.
     pub modes: Vec<ModeComparison>,
-    /// What a reader should know about the runs and their frames.
+    /// Remarks on the runs and their frames.
     pub remarks: Vec<String>,
 }
 

@@ -100,7 +100,7 @@ pub enum Command {
     /// Measure run time against error over a scene's knobs: how much error does a millisecond buy?
     ///
     /// Every configuration of the knobs is drawn once and compared with a reference in f64. All are
-    /// timed in alternating blocks with the scene as it stands. The table is sorted by time; "*"
+    /// timed in alternating blocks with the unchanged scene. The table is sorted by time; "*"
     /// marks the front: no other configuration is at least as fast and as exact, and better in one
     /// of the two. "~" marks configurations that others beat, but none that is faster beyond the
     /// 95 % intervals.

@@ -93,7 +93,7 @@ pub fn load_configuration(
     Ok(LoadedConfiguration { scene: Arc::new(scene), hash })
 }
 
-/// Returns the names of the configurations without the scene as it stands, in the order that
+/// Returns the names of the configurations without the unchanged scene, in the order that
 /// `--part` counts in, and the work in them.
 ///
 /// # Errors

@@ -65,7 +65,7 @@ pub struct ErrorArgs {
     /// Print the fastest configuration within this error (repeatable)
     #[arg(long, value_name = "ERROR", value_parser = parse_positive, help_heading = "Budgets")]
     pub budget_error: Vec<f64>,
-    /// Run only these configurations, counted from 0, and the scene as it stands, without
+    /// Run only these configurations, counted from 0, and the unchanged scene, without
     /// combinations; for the nodes of a farm
     #[arg(long, value_name = "FIRST..END", value_parser = parse_span, requires = "out", hide_short_help = true)]
     pub part: Option<Span>,

@@ -1,4 +1,4 @@
-//! Timed blocks: in every round each configuration runs a few frames, and the scene as it stands
+//! Timed blocks: in every round each configuration runs a few frames, and the unchanged scene
 //! runs between every few of them, so that each is compared with the scene just before and just
 //! after. A drift of a shared machine over minutes affects both alike.
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::measure::stats::median;
 use crate::studies::figure::Figure;
 
-/// Configurations between two blocks of the scene as it stands, which is configuration 0.
+/// Configurations between two blocks of the unchanged scene, which is configuration 0.
 pub const BETWEEN: usize = 4;
 
 /// Consecutive frames of one configuration; a "turn" in `times.csv`.
@@ -88,9 +88,9 @@ fn ratios(blocks: &[TimedBlock], i: usize, time: TimeKind) -> Vec<f64> {
 /// The times of a configuration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockTimes {
-    /// Its time divided by that of the scene as it stands.
+    /// Its time divided by that of the unchanged scene.
     pub by_base: Figure,
-    /// `by_base` times the median of the scene as it stands, in ms. For the scene itself it is its
+    /// `by_base` times the median of the unchanged scene, in ms. For the scene itself it is its
     /// median, whose interval includes the drift.
     pub ms: Figure,
 }

@@ -22,7 +22,7 @@ pub enum Design {
 /// one in forty settings that save nothing has an interval below 1, but hardly by this much.
 const LEAST_SAVING: f64 = 0.02;
 
-/// Returns the settings of all configurations but the scene as it stands; some can result in the
+/// Returns the settings of all configurations but the unchanged scene; some can result in the
 /// same scene as it.
 pub fn settings(axes: &[Axis], design: Design) -> Vec<Vec<Setting>> {
     match design {

@@ -59,7 +59,7 @@ pub enum Front {
 /// The time and the error of a configuration.
 #[derive(Debug, Clone, Copy)]
 pub struct Cost {
-    /// Time divided by that of the scene as it stands, so that a drift cancels.
+    /// Time divided by that of the unchanged scene, so that a drift cancels.
     pub time: Figure,
     /// Error.
     pub error: Figure,

@@ -1,4 +1,4 @@
-//! Joins the parts of a study that several processes made, each with the scene as it stands.
+//! Joins the parts of a study that several processes made, each with the unchanged scene.
 
 use super::blocks::TimedBlock;
 use super::records::{Configuration, Study};
@@ -59,7 +59,7 @@ pub fn differences(parts: &[Part]) -> Vec<String> {
 }
 
 /// Joins parts without [`differences`]: their configurations in order, and their blocks in the
-/// rounds of their parts, each with the blocks of the scene as it stands around it. None for no
+/// rounds of their parts, each with the blocks of the unchanged scene around it. None for no
 /// part.
 pub fn join(parts: &[Part]) -> Option<Joined> {
     let first = parts.first()?;
@@ -69,7 +69,7 @@ pub fn join(parts: &[Part]) -> Option<Joined> {
         let mut numbers = Vec::new();
         for (i, c) in part.results.configurations.iter().enumerate() {
             // Two settings that result in one scene are one configuration; the later one is left
-            // out. The scene as it stands is the first configuration of every part.
+            // out. The unchanged scene is the first configuration of every part.
             let is_known = configurations.iter().any(|other| other.hash == c.hash);
             let k = configurations.len();
             let is_base = i == 0 && i_part > 0;

@@ -30,7 +30,7 @@ pub struct Study {
     pub as_played: bool,
     /// Whether the shaders are those of a folder instead of the build's.
     pub own_shaders: bool,
-    /// All configurations. The first is the scene as it stands, which times are relative to.
+    /// All configurations. The first is the unchanged scene, which times are relative to.
     pub configurations: Vec<Configuration>,
     /// The best configuration for each budget.
     pub best: Vec<Best>,
@@ -43,7 +43,7 @@ impl ResultFile for Study {
     const SCHEMA: u32 = 1;
 }
 
-/// Name of the configuration without settings, the scene as it stands.
+/// Name of the configuration without settings, the unchanged scene.
 pub const BASE: &str = "as it stands";
 
 /// One setting of the knobs.
@@ -51,16 +51,16 @@ pub const BASE: &str = "as it stands";
 pub struct Configuration {
     /// "key=value, key=value", or [`BASE`].
     pub name: String,
-    /// The keys that differ from the scene as it stands.
+    /// The keys that differ from the unchanged scene.
     pub settings: Vec<Setting>,
     /// SHA-256 of its resolved scene and files.
     pub hash: String,
-    /// Device time of a frame in ms: that of the scene as it stands times `by_base`; none if the
+    /// Device time of a frame in ms: that of the unchanged scene times `by_base`; none if the
     /// device has no timestamps.
     pub gpu_ms: Option<Figure>,
     /// Time of a frame in ms, from the game step to the finished picture, computed in the same way.
     pub frame_ms: Option<Figure>,
-    /// Its time (see [`Study::time`]) divided by that of the scene as it stands.
+    /// Its time (see [`Study::time`]) divided by that of the unchanged scene.
     pub by_base: Option<Figure>,
     /// Timed blocks.
     pub n_turns: usize,

@@ -63,7 +63,7 @@ pub struct StudyPlan {
 /// The results of a study so far.
 #[derive(Debug, Clone, Default)]
 pub struct StudyResults {
-    /// All configurations; the first is the scene as it stands.
+    /// All configurations; the first is the unchanged scene.
     pub configurations: Vec<Configuration>,
     /// All blocks, in the order in which they ran.
     pub blocks: Vec<TimedBlock>,
@@ -189,7 +189,7 @@ impl ErrorStudy<'_> {
             self.draw(runner, results, on, i)?;
         }
         late.retain(|&i| results.configurations[i].failure.is_none());
-        // The scene as it stands is timed even if it is alone.
+        // The unchanged scene is timed even if it is alone.
         while !is_stopped() && (is_late(0, results) || late.iter().any(|&i| is_late(i, results))) {
             late.retain(|&i| is_late(i, results));
             for i in order(&late, results.n_rounds) {
@@ -223,7 +223,7 @@ impl ErrorStudy<'_> {
                 let drawn = sampled(self.pixels, &rgba);
                 configuration.error = picture_error(self.pixels, &drawn, reference, *own_error);
                 if configuration.error.is_none() {
-                    // All times and errors are relative to the scene as it stands.
+                    // All times and errors are relative to the unchanged scene.
                     if i == 0 {
                         return Err(Error::usage(format!("{}: {NOT_FINITE}", configuration.name)));
                     }

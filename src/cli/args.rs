@@ -6,19 +6,16 @@ mod farm_plan;
 mod inspect;
 mod render;
 mod results;
+mod scene;
 mod stress;
 mod study;
+mod values;
 #[cfg(feature = "window")]
 mod view;
 mod weather;
 
-use std::path::PathBuf;
+use clap::{ColorChoice, Parser, Subcommand};
 
-use clap::builder::RangedI64ValueParser;
-use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand};
-
-use crate::io::scene_file::MAX_SIDE;
-use crate::reference::picture::MAX_SAMPLES;
 pub use bench::{BenchArgs, ThreadingArg};
 pub use farm::{
     EmitArgs, EngineArg, FarmArgs, FarmCommand, GcArgs, JobArgs, LocalArgs, MergeArgs, RunArgs,
@@ -28,6 +25,7 @@ pub use farm_plan::{CalibrateArgs, FormatArg, PlanArgs, Span};
 pub use inspect::{BasisArg, InspectArgs};
 pub use render::RenderArgs;
 pub use results::{CompareArgs, ReportArgs};
+pub use scene::{DevicesArgs, SceneArgs};
 pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs};
 #[cfg(feature = "window")]
@@ -194,97 +192,6 @@ pub enum Command {
     Farm(FarmArgs),
 }
 
-/// Arguments of every command with a scene.
-#[derive(Debug, Clone, ClapArgs)]
-pub struct SceneArgs {
-    /// Vulkan device, by index or part of its name (see `nimbus devices`)
-    #[arg(long, value_name = "INDEX|NAME", help_heading = "Device")]
-    pub device: Option<String>,
-    /// Folder with shaders that replace those built in
-    #[arg(long, value_name = "DIR", help_heading = "Device")]
-    pub shaders: Option<PathBuf>,
-    /// Run with the validation layers; any message fails the command
-    #[arg(long, help_heading = "Device")]
-    pub validation: bool,
-    /// Fill every new buffer with NaN, which shows where a pass reads what none has written; the
-    /// pictures are the same
-    #[arg(long, help_heading = "Device")]
-    pub poison: bool,
-    /// Seed of the first cloud; each further cloud has the next number
-    #[arg(long, value_name = "N", help_heading = "Scene")]
-    pub seed: Option<u32>,
-    /// Set any key of the scene, e.g. --set lighting.grid=128 or --set cloud.0.seed=7 (repeatable)
-    #[arg(long, value_name = "KEY=VALUE", help_heading = "Scene")]
-    pub set: Vec<String>,
-    /// Picture size in pixels
-    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Scene")]
-    pub size: Option<(u32, u32)>,
-    /// Run every pass in every frame; the pictures are the same, to the byte
-    #[arg(long, help_heading = "Scene")]
-    pub no_skip: bool,
-    /// No warnings, no progress
-    #[arg(short, long)]
-    pub quiet: bool,
-    /// Print device, sizes and passes
-    #[arg(short, long, conflicts_with = "quiet")]
-    pub verbose: bool,
-}
-
-/// Arguments of `nimbus devices`.
-#[derive(Debug, ClapArgs)]
-pub struct DevicesArgs {
-    /// The device to mark as used, by index or part of its name
-    #[arg(long, value_name = "INDEX|NAME")]
-    pub device: Option<String>,
-    /// Print JSON instead of the table
-    #[arg(long)]
-    pub json: bool,
-    /// List the devices under the validation layers; any message fails the command
-    #[arg(long)]
-    pub validation: bool,
-    /// No warnings
-    #[arg(short, long)]
-    pub quiet: bool,
-    /// Print which device is used, and why
-    #[arg(short, long, conflicts_with = "quiet")]
-    pub verbose: bool,
-}
-
-/// Parses a number of at least 1.
-fn at_least_one() -> RangedI64ValueParser<u32> {
-    clap::value_parser!(u32).range(1..)
-}
-
-fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let wrong = || {
-        format!(
-            "expected WIDTHxHEIGHT such as 800x600, each from 1 to {MAX_SIDE}, found \"{text}\""
-        )
-    };
-    let (w, h) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
-    let parse =
-        |t: &str| t.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n)).ok_or_else(wrong);
-    Ok((parse(w)?, parse(h)?))
-}
-
-fn parse_samples(text: &str) -> Result<u32, String> {
-    let n = text.parse().ok().filter(|n| (1..=MAX_SAMPLES).contains(n));
-    n.ok_or_else(|| {
-        format!("expected a number of samples from 1 to {MAX_SAMPLES}, found \"{text}\"")
-    })
-}
-
-fn parse_positive(text: &str) -> Result<f64, String> {
-    let value = text.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0);
-    value.ok_or_else(|| format!("expected a number above 0, found \"{text}\""))
-}
-
-fn parse_limit(text: &str) -> Result<(String, f64), String> {
-    let wrong = || format!("expected METRIC=VALUE such as rmse=1e-3, found \"{text}\"");
-    let (metric, value) = text.split_once('=').ok_or_else(wrong)?;
-    Ok((metric.to_owned(), value.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(wrong)?))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -293,14 +200,5 @@ mod tests {
     fn the_declaration_is_consistent() {
         use clap::CommandFactory;
         Args::command().debug_assert();
-    }
-
-    #[test]
-    fn sizes() {
-        assert_eq!(parse_size("800x600"), Ok((800, 600)));
-        assert_eq!(parse_size("16384x1"), Ok((16384, 1)));
-        for wrong in ["800", "0x5", "ax3", "3x", "-1x2", "16385x1", "1x99999999999"] {
-            assert!(parse_size(wrong).is_err(), "{wrong}");
-        }
     }
 }

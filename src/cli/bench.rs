@@ -30,7 +30,7 @@ use crate::timing::trace;
 /// Readings of the device's clock and the host's, before the frames and again after them.
 const N_CLOCK_READINGS: usize = 8;
 
-/// The state that a bench runs with, apart from its arguments.
+/// The surroundings of a bench, beside its arguments.
 pub struct Context<'a> {
     /// Colours of charts.
     pub color: ColorChoice,

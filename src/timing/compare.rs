@@ -112,7 +112,7 @@ pub struct Comparison {
     pub differences: Vec<Difference>,
     /// Every loop that both ran.
     pub modes: Vec<ModeComparison>,
-    /// Remarks on the runs and their frames that a reader should know.
+    /// Remarks on the runs and their frames.
     pub remarks: Vec<String>,
 }
 

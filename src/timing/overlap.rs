@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn shares_are_those_worked_by_hand() {
-        // 4 + 10 = 14 ms, at best 10: 4 ms to gain. 11 ms gains 3 of them, 10 ms all, 16 ms loses 2.
+        // 4 + 10 = 14 ms, at best 10: 4 ms to gain. 11 ms gains 3 of them, 10 all, 16 loses 2.
         for (parallel_ms, share) in [(11.0, 0.75), (10.0, 1.0), (14.0, 0.0), (16.0, -0.5)] {
             for (game, render) in [(4.0, 10.0), (10.0, 4.0)] {
                 let overlap = Overlap::of(&serial(5, game, render), &[parallel_ms; 7]).unwrap();

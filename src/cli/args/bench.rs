@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::farm_plan::{Span, parse_span};
-use super::{SceneArgs, at_least_one};
+use super::scene::SceneArgs;
+use super::values::at_least_one;
 
 /// Arguments of `nimbus bench`.
 #[derive(Debug, ClapArgs)]

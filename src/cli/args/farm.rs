@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Subcommand, ValueEnum};
 
-use super::at_least_one;
 use super::farm_plan::{CalibrateArgs, PlanArgs};
+use super::values::at_least_one;
 
 /// Arguments of `nimbus farm`.
 #[derive(Debug, ClapArgs)]
@@ -150,7 +150,7 @@ pub struct GcArgs {
     #[arg(long, value_name = "DIR")]
     pub plan: PathBuf,
     /// Also remove unfinished folders of open shards after so many hours without a change
-    #[arg(long, value_name = "HOURS", default_value_t = 24.0, value_parser = super::parse_positive)]
+    #[arg(long, value_name = "HOURS", default_value_t = 24.0, value_parser = super::values::parse_positive)]
     pub idle: f64,
     /// Also remove broken results, and those that differ from the one in place
     #[arg(long)]

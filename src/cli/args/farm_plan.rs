@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
 
-use super::{at_least_one, parse_size};
+use super::values::{at_least_one, parse_size};
 use crate::reference::picture::{MAX_SAMPLES, ReferenceKind};
 
 /// Arguments of `nimbus farm plan`.
@@ -43,7 +43,7 @@ pub struct PlanArgs {
         value_name = "N",
         default_value_t = 1,
         requires = "reference",
-        value_parser = super::parse_samples
+        value_parser = super::values::parse_samples
     )]
     pub samples: u32,
     /// Size of the reference's tiles, pixels [default: 256x256, or by --model]

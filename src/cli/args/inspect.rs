@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
 
-use super::SceneArgs;
+use super::scene::SceneArgs;
 
 /// Arguments of `nimbus inspect`.
 #[derive(Debug, ClapArgs)]

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::{SceneArgs, parse_samples};
+use super::scene::SceneArgs;
+use super::values::parse_samples;
 use crate::reference::picture::ReferenceKind;
 
 /// Arguments of `nimbus render`.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::{parse_limit, parse_positive};
+use super::values::{parse_limit, parse_positive};
 use crate::timing::difference::Condition;
 
 /// Arguments of `nimbus compare`.

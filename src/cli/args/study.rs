@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use super::farm_plan::{Span, parse_span};
-use super::{SceneArgs, at_least_one, parse_positive};
+use super::scene::SceneArgs;
+use super::values::{at_least_one, parse_positive};
 use crate::reference::picture::ReferenceKind;
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::front::Metric;

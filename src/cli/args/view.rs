@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
 
-use super::{SceneArgs, at_least_one};
+use super::scene::SceneArgs;
+use super::values::at_least_one;
 
 /// Arguments of `nimbus view`.
 #[derive(Debug, ClapArgs)]

@@ -1,0 +1,63 @@
+//! The arguments of every command with a scene, and of `nimbus devices`.
+
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+use super::values::parse_size;
+
+/// Arguments of every command with a scene.
+#[derive(Debug, Clone, ClapArgs)]
+pub struct SceneArgs {
+    /// Vulkan device, by index or part of its name (see `nimbus devices`)
+    #[arg(long, value_name = "INDEX|NAME", help_heading = "Device")]
+    pub device: Option<String>,
+    /// Folder with shaders that replace those built in
+    #[arg(long, value_name = "DIR", help_heading = "Device")]
+    pub shaders: Option<PathBuf>,
+    /// Run with the validation layers; any message fails the command
+    #[arg(long, help_heading = "Device")]
+    pub validation: bool,
+    /// Fill every new buffer with NaN, which shows where a pass reads what none has written; the
+    /// pictures are the same
+    #[arg(long, help_heading = "Device")]
+    pub poison: bool,
+    /// Seed of the first cloud; each further cloud has the next number
+    #[arg(long, value_name = "N", help_heading = "Scene")]
+    pub seed: Option<u32>,
+    /// Set any key of the scene, e.g. --set lighting.grid=128 or --set cloud.0.seed=7 (repeatable)
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Scene")]
+    pub set: Vec<String>,
+    /// Picture size in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Scene")]
+    pub size: Option<(u32, u32)>,
+    /// Run every pass in every frame; the pictures are the same, to the byte
+    #[arg(long, help_heading = "Scene")]
+    pub no_skip: bool,
+    /// No warnings, no progress
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Print device, sizes and passes
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+}
+
+/// Arguments of `nimbus devices`.
+#[derive(Debug, ClapArgs)]
+pub struct DevicesArgs {
+    /// The device to mark as used, by index or part of its name
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Print JSON instead of the table
+    #[arg(long)]
+    pub json: bool,
+    /// List the devices under the validation layers; any message fails the command
+    #[arg(long)]
+    pub validation: bool,
+    /// No warnings
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Print which device is used, and why
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+}

@@ -1,0 +1,59 @@
+//! Parsers of argument values that several commands share.
+
+use clap::builder::RangedI64ValueParser;
+
+use crate::io::scene_file::MAX_SIDE;
+use crate::reference::picture::MAX_SAMPLES;
+
+/// Parses a number of at least 1.
+pub fn at_least_one() -> RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(1..)
+}
+
+/// Parses WIDTHxHEIGHT.
+pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let wrong = || {
+        format!(
+            "expected WIDTHxHEIGHT such as 800x600, each from 1 to {MAX_SIDE}, found \"{text}\""
+        )
+    };
+    let (w, h) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
+    let parse =
+        |t: &str| t.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n)).ok_or_else(wrong);
+    Ok((parse(w)?, parse(h)?))
+}
+
+/// Parses a number of samples of a pixel.
+pub fn parse_samples(text: &str) -> Result<u32, String> {
+    let n = text.parse().ok().filter(|n| (1..=MAX_SAMPLES).contains(n));
+    n.ok_or_else(|| {
+        format!("expected a number of samples from 1 to {MAX_SAMPLES}, found \"{text}\"")
+    })
+}
+
+/// Parses a finite number above 0.
+pub fn parse_positive(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0);
+    value.ok_or_else(|| format!("expected a number above 0, found \"{text}\""))
+}
+
+/// Parses METRIC=VALUE.
+pub fn parse_limit(text: &str) -> Result<(String, f64), String> {
+    let wrong = || format!("expected METRIC=VALUE such as rmse=1e-3, found \"{text}\"");
+    let (metric, value) = text.split_once('=').ok_or_else(wrong)?;
+    Ok((metric.to_owned(), value.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(wrong)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_parsed() {
+        assert_eq!(parse_size("800x600"), Ok((800, 600)));
+        assert_eq!(parse_size("16384x1"), Ok((16384, 1)));
+        for wrong in ["800", "0x5", "ax3", "3x", "-1x2", "16385x1", "1x99999999999"] {
+            assert!(parse_size(wrong).is_err(), "{wrong}");
+        }
+    }
+}

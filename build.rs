@@ -7,8 +7,9 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The files that the binary is built from. A change of one of them makes a build dirty. This script
-/// runs again when one of them or HEAD changes. Staging a file changes nothing that is built.
+/// The files that the binary is built from. A change of one of them makes a build dirty. This
+/// script runs again when one of them or HEAD changes. Staging a file changes nothing that is
+/// built.
 const BUILT_FROM: [&str; 5] = ["src", "shaders", "Cargo.toml", "Cargo.lock", "build.rs"];
 
 /// The files that f64 references depend on.
@@ -67,7 +68,8 @@ fn revision(root: &Path) -> Option<String> {
 /// Sources unpacked inside somebody else's repository must not carry that repository's revision.
 fn is_our_checkout(root: &Path) -> bool {
     let Some(top) = git(root, &["rev-parse", "--show-toplevel"]) else { return false };
-    matches!((Path::new(&top).canonicalize(), root.canonicalize()), (Ok(top), Ok(root)) if top == root)
+    let (top, root) = (Path::new(&top).canonicalize(), root.canonicalize());
+    matches!((top, root), (Ok(top), Ok(root)) if top == root)
 }
 
 /// HEAD (another branch), its log (a commit, a reset) and the branch itself (where logs are off).

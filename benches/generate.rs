@@ -1,6 +1,6 @@
-//! CPU time of generating the paper's boxes on the GPU, and of the single-thread f64 reference in the
-//! same run. `cargo bench --bench generate` prints a table of CPU times first,
-//! then divan's wall times.
+//! CPU time of generating the paper's boxes on the GPU, and of the single-thread f64 reference in
+//! the same run. `cargo bench --bench generate` prints a table of CPU times first, then divan's
+//! wall times.
 
 mod cpu;
 

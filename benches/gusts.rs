@@ -1,6 +1,6 @@
-//! Time that the gusts of a cloud take on the game thread: for several particles at once, and one by
-//! one with the standard library's sine. `cargo bench --bench gusts` prints a table of
-//! CPU times first, then divan's wall times.
+//! Time that the gusts of a cloud take on the game thread: for several particles at once, and one
+//! by one with the standard library's sine. `cargo bench --bench gusts` prints a table of CPU times
+//! first, then divan's wall times.
 
 mod cpu;
 

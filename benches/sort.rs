@@ -1,5 +1,6 @@
-//! Time of the radix sort with keys of 16 and 32 bits, and of the standard library's stable sort on one
-//! thread. `cargo bench --bench sort` prints a table of CPU times first, then divan's wall times.
+//! Time of the radix sort with keys of 16 and 32 bits, and of the standard library's stable sort on
+//! one thread. `cargo bench --bench sort` prints a table of CPU times first, then divan's wall
+//! times.
 
 mod cpu;
 

@@ -459,7 +459,8 @@ fn inspect_gives_device_and_reference_in_the_same_columns() {
     }
     let (code, facets, _) = run(&["inspect", "scenes/hello.toml", "--facets"]);
     assert_eq!(code, 0);
-    let header = "index,region,x,y,z,nx,ny,nz,area,id_r,id_g,id_b,ii_r,ii_g,ii_b,l1_r,l1_g,l1_b,l2_r,l2_g,l2_b";
+    let header = "index,region,x,y,z,nx,ny,nz,area,id_r,id_g,id_b,ii_r,ii_g,ii_b,\
+                  l1_r,l1_g,l1_b,l2_r,l2_g,l2_b";
     assert_eq!(facets.lines().next(), Some(header));
 }
 

@@ -33,8 +33,7 @@ fn tables_for_people() {
         "clouds from the file's mixing ratios",
         "note: QICE is missing",
         "note: MP_PHYSICS is 3: QCLOUD is ice below 273.15 K",
-        "note: at step 1 clouds of 302 columns reach the highest level: what is above is \
-         not in the file",
+        "note: at step 1 clouds of 302 columns reach the highest level; the file has nothing above",
         "QCLOUD    float  4 x 14 x 48 x 48",
         "kg kg-1",
     ];

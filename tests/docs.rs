@@ -97,8 +97,8 @@ fn the_page_of_commands_is_what_help_prints() {
     assert!(read(Path::new(page)) == expected, "{page} is out of date: run with NIMBUS_BLESS=1");
 }
 
-/// Options that make a command of the docs small; "" stands for a command without subcommand.
-const SMALL: [(&str, &[(&str, &str)]); 8] = [
+/// Options that make a command of the docs small.
+const SMALL: [(&str, &[(&str, &str)]); 7] = [
     ("render", &[("--size", "64x48")]),
     ("bench", &[("--size", "64x48"), ("--frames", "2"), ("--warmup", "1"), ("--repeat", "2")]),
     ("error", &[("--size", "64x48"), ("--pixels", "64"), ("--rounds", "2"), ("--frames", "1")]),
@@ -106,7 +106,6 @@ const SMALL: [(&str, &[(&str, &str)]); 8] = [
     ("inspect", &[("--size", "64x48")]),
     ("view", &[("--size", "64x48"), ("--frames", "3")]),
     ("farm plan", &[("--size", "64x48")]),
-    ("farm calibrate", &[("--size", "64x48")]),
 ];
 
 /// The arguments of a command, with its small options in place of those that the page shows.
@@ -203,7 +202,8 @@ fn a_command_is_made_small_wherever_its_options_stand() {
 
 #[test]
 fn pages_are_read_as_they_are_shown() {
-    let text = "# A `b` C\n[x](y.md#z) ![p](q.png)\n```sh\ntools/nimbus render \\\n  a # c\nls\n```\n\
+    let text = "# A `b` C\n[x](y.md#z) ![p](q.png)\n```sh\n\
+                tools/nimbus render \\\n  a # c\nls\n```\n\
                 ```toml\n[a](b)\n```\n## A `b` C\n";
     assert_eq!(markdown::links(text), ["y.md#z", "q.png"]);
     assert_eq!(markdown::anchors(text), ["a-b-c", "a-b-c-1"]);

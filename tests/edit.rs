@@ -246,7 +246,7 @@ fn the_window_looks_as_in_the_documentation() {
     window.key("Tab");
     for (key, name) in [("1", "edit-boxes.png"), ("3", "edit-both.png")] {
         window.key(key);
-        let kept = root.join("docs").join(name);
+        let kept = root.join("docs/pictures").join(name);
         let mut last = (0, 0, vec![]);
         if std::env::var_os("NIMBUS_KEEP").is_some() {
             std::thread::sleep(std::time::Duration::from_secs(3));

@@ -259,7 +259,8 @@ fn run_bounds(
         (2.0 * by_mass + (2.0 * n + 8.0 + DIVISION_ERROR) * U) * sigma.powi(2)
             + (2.0 * far * d + d * d)
     };
-    // |√a − √b| ≤ |a − b|/√a, and ≤ √|a − b|. Of balls a third of what the distance is off counts, of ellipsoids half along x and z, and all along y.
+    // |√a − √b| ≤ |a − b|/√a, and ≤ √|a − b|. A third of the distance's error counts for balls; for
+    // ellipsoids half of it counts along x and z, and all of it along y.
     let share = if ellipsoids { 0.5 } else { 1.0 / 3.0 };
     let root = |sigma: f64, square: f64| {
         (square / sigma).min(square.sqrt()) + (4.0 + DIVISION_ERROR) * U * sigma

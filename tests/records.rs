@@ -254,12 +254,13 @@ fn a_run_is_read_as_it_was_written() {
     assert_eq!(names.len(), 2, "nothing temporary is left: {names:?}");
     assert_eq!(
         fs::read_to_string(out_dir.join(FRAMES_FILE)).unwrap(),
-        "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_ms,wait_ms,gpu_ms,latency_ms,\
-         queue_depth,n_drawn,ran,gpu_sort_ms,gpu_first_ms,image_hash\n\
-         0,dense,\"a=1, \
-         b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
-         1,dense,\"a=1, \
-         b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n"
+        "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,\
+         submit_ms,wait_ms,gpu_ms,latency_ms,queue_depth,n_drawn,ran,gpu_sort_ms,gpu_first_ms,\
+         image_hash\n\
+         0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,\
+         1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
+         1,dense,\"a=1, b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,\
+         1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n"
     );
 }
 

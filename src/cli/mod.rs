@@ -112,7 +112,8 @@ fn interrupted() {
         }
     }
     atomic::abandon();
-    // std::process::exit would run exit handlers of the driver, which other threads are still using.
+    // std::process::exit would run exit handlers of the driver, which other threads are still
+    // using.
     unsafe extern "C" {
         fn _exit(code: std::ffi::c_int) -> !;
     }

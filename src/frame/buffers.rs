@@ -113,9 +113,10 @@ fn n_pairs(scene: &Scene) -> u64 {
     scene.n_facets() * scene.lights.len() as u64
 }
 
-/// Returns the rows of the table: the basis has at most as many vectors as the scene asks for.
+/// Returns the rows of the table, none if nothing is lit: the basis has at most as many vectors as
+/// the scene asks for.
 fn n_table_rows(scene: &Scene) -> u64 {
-    scene.materials.len() as u64 + u64::from(scene.lighting.bases) - 1
+    n_if(is_lit(scene), scene.materials.len() as u64 + u64::from(scene.lighting.bases) - 1)
 }
 
 /// Returns the most cells that the density grid has at any time; 0 if nothing is lit.

@@ -115,8 +115,8 @@ fn iteration_budget(scene: &Scene) -> IterationBudget {
     let n_occluders = from.iter().flatten().map(|p| p.occluders.len()).max().unwrap_or(0);
     let n_lights = scene.lights.len();
     let march = if scene.n_particles() > 0 { scene.lighting.pairs.steps } else { 0 };
-    // The longest cell: the loops counted in iterations.glsl, all occluders, and all surfaces before
-    // every light.
+    // The longest cell: the loops counted in iterations.glsl, all occluders, and all surfaces
+    // before every light.
     let of_cell =
         16 + 5 * n_lights + n_occluders + n_lights * scene.surfaces.len() + march as usize;
     let aside = if is_narrow(scene) { 1 } else { COLLECTED };

@@ -40,6 +40,8 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
              expected \"f32\"",
         ));
     }
+    let bytes: Result<Vec<u64>> = specs(scene).iter().map(|spec| spec.bytes(limits)).collect();
+    let total: u64 = bytes?.iter().sum();
     // The last block of each region need not be full.
     let n_blocks = scene.n_facets() / u64::from(MIN_BLOCK) + scene.n_regions() as u64;
     if has_second(scene) && n_blocks > u64::from(limits.max_workgroups_x) {
@@ -49,8 +51,6 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
             limits.max_workgroups_x
         )));
     }
-    let bytes: Result<Vec<u64>> = specs(scene).iter().map(|spec| spec.bytes(limits)).collect();
-    let total: u64 = bytes?.iter().sum();
     if total > limits.device_memory_bytes {
         return Err(Error::limit(format!(
             "the scene needs {total} bytes, this device has {}",

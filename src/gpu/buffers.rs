@@ -86,7 +86,10 @@ macro_rules! __buffers {
             /// # Errors
             /// Fails if the device cannot hold one of them.
             #[allow(unused_variables)]
-            pub fn new(device: &$crate::gpu::Device, $($arg: $Arg),*) -> $crate::error::Result<$name> {
+            pub fn new(
+                device: &$crate::gpu::Device,
+                $($arg: $Arg),*
+            ) -> $crate::error::Result<$name> {
                 use $crate::gpu::DeclaredBuffer;
                 Ok($name {
                     $($field: <$Kind>::allocate::<$Record>(device, $label, $n)?),*

@@ -208,8 +208,8 @@ pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
     Ok(rows.collect())
 }
 
-/// Returns a row for each surface and ground, with its centre, normal and area, and the means of its
-/// facets weighted by their areas.
+/// Returns a row for each surface and ground, with its centre, normal and area, and the means of
+/// its facets weighted by their areas.
 pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
     let of_ground = |t: &Terrain| {
         let (low, high) = t.bounds();
@@ -322,8 +322,9 @@ fn check_lit(scene: &Scene) -> Result<()> {
     }
 }
 
-/// Returns the cloud of particle `i`: that of the last group that begins at or before it. Groups are
-/// in the order of their particles, and an empty one precedes the group that begins at its place.
+/// Returns the cloud of particle `i`: that of the last group that begins at or before it. Groups
+/// are in the order of their particles, and an empty one precedes the group that begins at its
+/// place.
 fn cloud_of(groups: &[Group], i: usize) -> usize {
     let after = groups.partition_point(|g| g.i_first as usize <= i);
     groups[after.saturating_sub(1)].i_cloud
@@ -353,7 +354,8 @@ fn particle_row(
     }
 }
 
-/// Sets L1 and L2, the last two of `lit`, to zero if the camera sees the back of a surface or ground.
+/// Sets L1 and L2, the last two of `lit`, to zero if the camera sees the back of a surface or
+/// ground.
 fn toward_camera(
     scene: &Scene,
     region: u32,

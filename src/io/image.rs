@@ -1,7 +1,7 @@
 //! Images: PNG for looking at, EXR for measuring. Images are written from premultiplied linear RGBA
 //! pixels, row 0 at the top, and read with the numbers of the file.
 
-use std::io::Write;
+use std::io::{Seek, Write};
 use std::path::Path;
 
 use glam::DVec3;
@@ -135,15 +135,35 @@ pub fn encoded(
     height: u32,
     rgba: &[f32],
 ) -> Result<Vec<u8>> {
-    if kind == ImageKind::Png {
-        return png_bytes(width, height, &display_bytes(film, width, height, rgba));
-    }
-    check_size(width, height, rgba);
     let mut bytes = std::io::Cursor::new(Vec::new());
-    OpenExrEncoder::new(&mut bytes)
-        .write_image(bytemuck::cast_slice(rgba), width, height, ExtendedColorType::Rgba32F)
-        .map_err(not_encoded)?;
+    encode(&mut bytes, kind, film, [width, height], rgba).map_err(not_encoded)?;
     Ok(bytes.into_inner())
+}
+
+/// Encodes pixels into `writer`.
+fn encode(
+    writer: impl Write + Seek,
+    kind: ImageKind,
+    film: &Film,
+    [width, height]: [u32; 2],
+    rgba: &[f32],
+) -> image::ImageResult<()> {
+    match kind {
+        ImageKind::Png => {
+            let rgb = display_bytes(film, width, height, rgba);
+            PngEncoder::new(writer).write_image(&rgb, width, height, ExtendedColorType::Rgb8)
+        }
+        ImageKind::Exr => {
+            check_size(width, height, rgba);
+            let bytes = bytemuck::cast_slice(rgba);
+            OpenExrEncoder::new(writer).write_image(
+                bytes,
+                width,
+                height,
+                ExtendedColorType::Rgba32F,
+            )
+        }
+    }
 }
 
 /// Writes pixels to a file of the format that the extension names.
@@ -154,8 +174,9 @@ pub fn encoded(
 /// # Panics
 /// When `rgba` is not width × height pixels.
 pub fn write(path: &Path, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
-    let bytes = encoded(ImageKind::of(path)?, film, width, height, rgba)?;
-    write_atomic(path, |writer| writer.write_all(&bytes))
+    let kind = ImageKind::of(path)?;
+    // The file grows in small pieces. A single write of the whole picture could not be interrupted.
+    write_atomic(path, |writer| encode(writer, kind, film, [width, height], rgba))
 }
 
 /// Returns dithered 8-bit sRGB pixels, three bytes each.

@@ -26,7 +26,8 @@ pub struct Interval {
 ///
 /// - √(k/(k − 1)). The mean of a resample is that of k block means B drawn from all n circular
 ///   ones; its variance is (1/k) · mean (B − x̄)². That mean square is about the sample's own mean
-///   and not the true one: mean (B − x̄)² = mean (B − μ)² − (x̄ − μ)², in expectation var B − var x̄.
+///   and not the true one: mean (B − x̄)² = mean (B − μ)² − (x̄ − μ)², in expectation var B − var
+///   x̄.
 ///   If values further apart than ℓ are nearly independent, var B = k var x̄, and the result is
 ///   (1/k)(k − 1) var x̄, too small by 1 − 1/k. The median of many values is the mean of their
 ///   influences, so that the same holds for it.

@@ -40,7 +40,8 @@ pub struct Collected {
     pub epoch: Instant,
     /// Names of zones.
     pub names: Vec<String>,
-    /// Names of threads. Threads of the same name, of which nimbus runs one at a time, count as one.
+    /// Names of threads. Threads of the same name, of which nimbus runs one at a time, count as
+    /// one.
     pub threads: Vec<String>,
     /// Zones, in the order in which they ended.
     pub zones: Vec<Zone>,

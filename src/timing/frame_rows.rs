@@ -218,11 +218,12 @@ fn pass_fields<S: serde::Serializer>(
 mod tests {
     use super::*;
 
-    const HEADER: &str = "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_ms,wait_ms,\
-                          gpu_ms,latency_ms,queue_depth,n_drawn,ran,gpu_sort_ms,gpu_first_ms,image_hash\n";
-    const ROWS: &str = "0,dense,\"a=1, \
-        b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
-                        1,,,parallel,false,3,4000000000,-0.1,false,0.1,1e-9,,0,3,7.25,1,0,0,,,0.3,0abc\n";
+    const HEADER: &str = "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,\
+        game_ms,record_ms,submit_ms,wait_ms,gpu_ms,latency_ms,queue_depth,n_drawn,ran,gpu_sort_ms,\
+        gpu_first_ms,image_hash\n";
+    const ROWS: &str = "0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,\
+        1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
+        1,,,parallel,false,3,4000000000,-0.1,false,0.1,1e-9,,0,3,7.25,1,0,0,,,0.3,0abc\n";
 
     fn read(text: &str) -> Result<FrameTable> {
         parse_frames(text, Path::new("frames.csv"))

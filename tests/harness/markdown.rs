@@ -1,4 +1,5 @@
-//! Reads Markdown as far as the tests of the documentation need it, and writes the page of commands.
+//! Reads Markdown as far as the tests of the documentation need it, and writes the page of
+//! commands.
 
 /// The lines outside fenced blocks.
 fn prose(text: &str) -> impl Iterator<Item = &str> {

@@ -44,7 +44,13 @@ pub struct BenchArgs {
     pub repeat: u32,
     /// Time only these cases, counted from 0, after the first of all; for the nodes of a farm (one
     /// scene)
-    #[arg(long, value_name = "FIRST..END", value_parser = parse_span, requires = "out", hide_short_help = true)]
+    #[arg(
+        long,
+        value_name = "FIRST..END",
+        value_parser = parse_span,
+        requires = "out",
+        hide_short_help = true
+    )]
     pub part: Option<Span>,
     /// Folder for run.json, frames.csv and the last frame of every case as a PNG (with several
     /// scenes: a folder each in it)

@@ -150,7 +150,12 @@ pub struct GcArgs {
     #[arg(long, value_name = "DIR")]
     pub plan: PathBuf,
     /// Also remove unfinished folders of open shards after so many hours without a change
-    #[arg(long, value_name = "HOURS", default_value_t = 24.0, value_parser = super::values::parse_positive)]
+    #[arg(
+        long,
+        value_name = "HOURS",
+        default_value_t = 24.0,
+        value_parser = super::values::parse_positive
+    )]
     pub idle: f64,
     /// Also remove broken results, and those that differ from the one in place
     #[arg(long)]

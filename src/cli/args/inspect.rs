@@ -8,7 +8,8 @@ use super::scene::SceneArgs;
 
 /// Arguments of `nimbus inspect`.
 #[derive(Debug, ClapArgs)]
-#[command(group = clap::ArgGroup::new("what").args(["boxes", "particles", "facets", "plan", "basis"]))]
+#[command(group = clap::ArgGroup::new("what")
+    .args(["boxes", "particles", "facets", "plan", "basis"]))]
 pub struct InspectArgs {
     /// Scene file
     pub scene: PathBuf,
@@ -32,7 +33,10 @@ pub struct InspectArgs {
     #[arg(conflicts_with_all = ["reference", "frame"])]
     pub basis: Option<BasisArg>,
     /// The scene's air: humidity, dew point and cloud bases; needs no device
-    #[arg(long, conflicts_with_all = ["boxes", "particles", "facets", "plan", "basis", "reference"])]
+    #[arg(
+        long,
+        conflicts_with_all = ["boxes", "particles", "facets", "plan", "basis", "reference"]
+    )]
     pub air: bool,
     /// Print the values of the reference in f64 instead of the device's
     #[arg(long, conflicts_with = "plan")]

@@ -16,8 +16,8 @@ use crate::reference::picture::ReferenceKind;
     nimbus render scenes/cubes-554.toml --size 200x150 --set 'cloud.0.texture=\"none\"' -o \
     volume.exr --reference volume\n  \
     nimbus compare thin.exr drawn.exr\n  nimbus compare volume.exr thin.exr\n\n\
-    The second reflection of a reference is integrated over areas, which takes minutes for hundreds \
-    of facets. \
+    The second reflection of a reference is integrated over areas, which takes minutes for \
+    hundreds of facets. \
     --set 'lighting.mode=\"first\"' leaves it out.")]
 pub struct RenderArgs {
     /// Scene file
@@ -38,7 +38,13 @@ pub struct RenderArgs {
     pub reference: Option<ReferenceKind>,
     /// Samples of every pixel of a reference: the first through its centre, the others spread over
     /// it
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "reference", value_parser = parse_samples)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        requires = "reference",
+        value_parser = parse_samples
+    )]
     pub samples: u32,
     /// Replace an existing file
     #[arg(long)]

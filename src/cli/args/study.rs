@@ -42,7 +42,13 @@ pub struct ErrorArgs {
     #[arg(long, value_enum, default_value = "rmse", help_heading = "Error")]
     pub metric: Metric,
     /// Most pixels that the reference is computed at, spread over the picture; or "all"
-    #[arg(long, value_name = "N", default_value = "16384", value_parser = parse_pixels, help_heading = "Error")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "16384",
+        value_parser = parse_pixels,
+        help_heading = "Error"
+    )]
     pub pixels: usize,
     /// Number of the frame that is drawn and compared, and the first that is timed
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Error")]
@@ -51,10 +57,22 @@ pub struct ErrorArgs {
     #[arg(long, value_enum, help_heading = "Time")]
     pub time: Option<TimeKind>,
     /// Timed blocks of each configuration
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one(), help_heading = "Time")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 10,
+        value_parser = at_least_one(),
+        help_heading = "Time"
+    )]
     pub rounds: u32,
     /// Timed frames of a block
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one(), help_heading = "Time")]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 3,
+        value_parser = at_least_one(),
+        help_heading = "Time"
+    )]
     pub frames: u32,
     /// Let frames skip the work that the scene lets them skip
     #[arg(long, help_heading = "Time")]
@@ -67,7 +85,13 @@ pub struct ErrorArgs {
     pub budget_error: Vec<f64>,
     /// Run only these configurations, counted from 0, and the unchanged scene, without
     /// combinations; for the nodes of a farm
-    #[arg(long, value_name = "FIRST..END", value_parser = parse_span, requires = "out", hide_short_help = true)]
+    #[arg(
+        long,
+        value_name = "FIRST..END",
+        value_parser = parse_span,
+        requires = "out",
+        hide_short_help = true
+    )]
     pub part: Option<Span>,
     /// Folder for study.json, configurations.csv, times.csv, front.svg and pictures
     #[arg(long, value_name = "DIR")]
@@ -111,7 +135,12 @@ pub struct LedgerArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub frame: u32,
     /// Reflections of the last row
-    #[arg(long, value_name = "K", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
+    #[arg(
+        long,
+        value_name = "K",
+        default_value_t = 4,
+        value_parser = clap::value_parser!(u32).range(1..=64)
+    )]
     pub reflections: u32,
     /// Timed blocks of each picture that the device draws
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one())]

@@ -246,7 +246,8 @@ impl Work for ReferenceWork {
     }
 }
 
-/// Returns the name of a piece's file, which holds [`SampleSums::bytes`]. Names sort as the pieces do.
+/// Returns the name of a piece's file, which holds [`SampleSums::bytes`]. Names sort as the pieces
+/// do.
 fn sums_file(k: u32) -> String {
     format!("sums-{k:08}.f64")
 }

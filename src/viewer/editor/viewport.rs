@@ -125,22 +125,6 @@ pub fn corners(b: &CloudBox) -> [DVec3; 8] {
     })
 }
 
-/// Edges as pairs of corners.
-pub const EDGES: [[usize; 2]; 12] = [
-    [0, 1],
-    [2, 3],
-    [4, 5],
-    [6, 7],
-    [0, 2],
-    [1, 3],
-    [4, 6],
-    [5, 7],
-    [0, 4],
-    [1, 5],
-    [2, 6],
-    [3, 7],
-];
-
 /// Faces as cycles of corners: the low and the high side along x, y and z.
 pub(super) const FACES: [[usize; 4]; 6] =
     [[0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4], [2, 3, 7, 6], [0, 1, 3, 2], [4, 5, 7, 6]];

@@ -6,7 +6,7 @@ use super::canvas::{Canvas, Color, OUTLINE, Shape, Stroke, with_alpha};
 use crate::model::boxes::CloudBox;
 use crate::viewer::editor::axis::Axis;
 use crate::viewer::editor::state::Editor;
-use crate::viewer::editor::viewport::{EDGES, FACES, corners};
+use crate::viewer::editor::viewport::{FACES, corners};
 
 /// Largest number of the nearest boxes that are drawn, and of further selected boxes. They take
 /// some milliseconds.
@@ -93,7 +93,12 @@ pub fn draw_edges(editor: &Editor, canvas: &mut Canvas<'_>) {
 
 fn draw_box_edges(b: &CloudBox, canvas: &mut Canvas<'_>, stroke: Stroke) {
     let corners = corners(b);
-    EDGES.iter().for_each(|[i, k]| canvas.draw_line(corners[*i], corners[*k], stroke));
+    // An edge joins two corners whose indices differ in one bit.
+    for (i, bit) in (0..8).flat_map(|i| [1, 2, 4].map(|bit| (i, bit))) {
+        if i & bit == 0 {
+            canvas.draw_line(corners[i], corners[i | bit], stroke);
+        }
+    }
 }
 
 fn contains_camera(b: &CloudBox, canvas: &Canvas<'_>) -> bool {

@@ -129,14 +129,3 @@ fn framed_boxes_are_whole_and_fill_the_picture() {
     assert_eq!(bounds([]), None);
     assert_eq!(framing(DVec3::ONE, DVec3::ONE, -DVec3::Z, 1.0, 1.0).0, DVec3::new(1.0, 1.0, 2.0));
 }
-
-#[test]
-fn edges_join_corners_that_differ_along_one_axis() {
-    for [a, b] in EDGES {
-        assert_eq!((a ^ b).count_ones(), 1);
-    }
-    let mut edges: Vec<_> = EDGES.to_vec();
-    edges.sort_unstable();
-    edges.dedup();
-    assert_eq!(edges.len(), 12);
-}

@@ -1,15 +1,22 @@
 #!/usr/bin/env python3
-"""What Vulkan answers, without any Vulkan package: "devices N", a line "device NAME" each, "validation yes|no".
+"""Asks the Vulkan loader for its devices and prints them, without any other Vulkan package.
 
-Exit code 0 when at least one device answers, 1 otherwise. A loader and a driver file are not enough to know: a driver
-for hardware that is not there is installed everywhere and finds nothing.
+The lines are "devices N", "device NAME" for each device, and "validation yes" or "validation no"
+for the Khronos validation layer. Without a loader the only line is "loader no". The exit code is 0
+if there is at least one device, else 1.
+
+Installed files do not show whether a device exists: Mesa installs the drivers of many devices on
+every machine, and a driver finds no device if its hardware is missing.
 """
 import ctypes
 import sys
 
 
 class InstanceCreateInfo(ctypes.Structure):
-    """VkInstanceCreateInfo; without an application info it asks for Vulkan 1.0, which every driver grants."""
+    """VkInstanceCreateInfo.
+
+    A null application info asks for Vulkan 1.0, which every driver supports.
+    """
 
     _fields_ = [
         ("s_type", ctypes.c_int32),
@@ -27,7 +34,8 @@ VK_SUCCESS = 0
 VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO = 1
 # VkLayerProperties: layerName[256], specVersion, implementationVersion, description[256].
 LAYER_SIZE = 256 + 4 + 4 + 256
-# VkPhysicalDeviceProperties: five 32-bit numbers, then deviceName[256]; 824 bytes in all, some room to spare.
+# VkPhysicalDeviceProperties has 824 bytes and begins with five 32-bit numbers and deviceName[256].
+# The buffer is larger than needed.
 PROPERTIES_SIZE, NAME_AT, NAME_SIZE = 4096, 20, 256
 
 
@@ -48,12 +56,13 @@ def has_validation(vulkan):
 def device_names(vulkan):
     instance = ctypes.c_void_p()
     info = InstanceCreateInfo(s_type=VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO)
-    # Without any driver this is VK_ERROR_INCOMPATIBLE_DRIVER.
+    # Without any driver the result is VK_ERROR_INCOMPATIBLE_DRIVER.
     if vulkan.vkCreateInstance(ctypes.byref(info), None, ctypes.byref(instance)) != VK_SUCCESS:
         return []
     count = ctypes.c_uint32(0)
     names = []
-    if vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None) == VK_SUCCESS and count.value > 0:
+    result = vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None)
+    if result == VK_SUCCESS and count.value > 0:
         devices = (ctypes.c_void_p * count.value)()
         vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), devices)
         for i in range(count.value):

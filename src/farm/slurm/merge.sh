@@ -1,5 +1,6 @@
 #!/bin/bash
-# Merges the results of all shards. Submit: sbatch --dependency=afterany:ARRAY merge.sh
+# Merges the results of all shards. ARRAY is the id of the shards' job array.
+# Submit with: sbatch --dependency=afterany:ARRAY merge.sh
 #SBATCH --job-name=nimbus-merge
 #SBATCH --requeue
 #SBATCH --open-mode=append

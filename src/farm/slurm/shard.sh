@@ -1,5 +1,6 @@
 #!/bin/bash
-# A task is a shard of the plan. Submit: sbatch --array=INDICES shard.sh [OFFSET]; shard = OFFSET + index.
+# Runs one shard of the plan in each task of a job array. The shard is OFFSET + the task's index.
+# Submit with: sbatch --array=INDICES shard.sh [OFFSET]
 #SBATCH --job-name=nimbus-farm
 #SBATCH --requeue
 #SBATCH --open-mode=append
@@ -11,8 +12,9 @@ shard=$((${1:-0} + SLURM_ARRAY_TASK_ID))
 job=${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}
 @requeue@
 
-# Slurm takes the node back by SIGTERM, to this shell alone or to nimbus as well. nimbus counts two signals
-# within a second as one, finishes its frame, keeps what it has and exits with 75.
+# Slurm sends SIGTERM when it needs the node, to this shell only or to nimbus too. This shell passes
+# the signal on. nimbus counts two signals within a second as one signal. It finishes its frame,
+# keeps its results and exits with code 75.
 is_told=0 child=
 trap 'is_told=1; [ -z "$child" ] || kill -TERM "$child" 2> /dev/null' TERM
 @run@ &
@@ -20,12 +22,12 @@ child=$!
 [ "$is_told" -eq 0 ] || kill -TERM "$child" 2> /dev/null
 wait "$child"
 code=$?
-# A signal ends the wait, but not nimbus.
+# A signal ends `wait` but not nimbus, so this shell waits again.
 while [ "$is_told" -eq 1 ]; do
     is_told=0
     wait "$child"
     code=$?
 done
-# 75: another try may succeed, and nimbus has not given up yet.
+# With code 75 another try may succeed, and the number of tries is below its limit.
 [ "$code" -ne 75 ] || requeue
 exit "$code"

@@ -4,6 +4,8 @@
 mod harness;
 #[path = "layout/interfaces.rs"]
 mod interfaces;
+#[path = "emulation/rules.rs"]
+mod rules;
 
 use harness::Gpu;
 use interfaces::{INTERFACES, RECORDS};
@@ -21,7 +23,6 @@ use nimbus::layout::particle::{
 use nimbus::layout::second::{PackedRecord, SourceRecord};
 use nimbus::layout::tiles::SplatRecord;
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::model::pair_rules;
 use nimbus::passes::{self, SHADERS, cull, generate, sort, texture, tiles, transmit};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -256,18 +257,18 @@ fn shared_constants_have_one_value() {
         ("include/shell.glsl", "SMOOTH_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
         ("include/shell.glsl", "CONDITION_LOW", nimbus::reference::facets::CONDITIONING.0),
         ("include/shell.glsl", "CONDITION_HIGH", nimbus::reference::facets::CONDITIONING.1),
-        ("include/cells.glsl", "LOBE_REACH", pair_rules::LOBE_REACH),
-        ("include/cells.glsl", "LOBE_STEP", pair_rules::LOBE_STEP),
-        ("include/cells.glsl", "LOBE_PARTS", pair_rules::LOBE_PARTS),
-        ("include/cells.glsl", "TURN", pair_rules::TURN),
-        ("include/cells.glsl", "NEAR", pair_rules::NEAR),
-        ("include/cells.glsl", "EDGE_WIDTH", pair_rules::EDGE_WIDTH),
-        ("include/cells.glsl", "SINGLE_EDGE_WIDTH", pair_rules::SINGLE_EDGE_WIDTH),
-        ("include/cells.glsl", "CELL_WIDTH", pair_rules::CELL_WIDTH),
-        ("include/cells.glsl", "CLUSTER_EDGE_WIDTH", pair_rules::CLUSTER_EDGE_WIDTH),
-        ("include/cells.glsl", "CLOUD_THETA", pair_rules::CLOUD_THETA),
-        ("include/cells.glsl", "MIXED", pair_rules::MIXED),
-        ("include/cells.glsl", "EVEN", pair_rules::EVEN),
+        ("include/cells.glsl", "LOBE_REACH", rules::LOBE_REACH),
+        ("include/cells.glsl", "LOBE_STEP", rules::LOBE_STEP),
+        ("include/cells.glsl", "LOBE_PARTS", rules::LOBE_PARTS),
+        ("include/cells.glsl", "TURN", rules::TURN),
+        ("include/cells.glsl", "NEAR", rules::NEAR),
+        ("include/cells.glsl", "EDGE_WIDTH", rules::EDGE_WIDTH),
+        ("include/cells.glsl", "SINGLE_EDGE_WIDTH", rules::SINGLE_EDGE_WIDTH),
+        ("include/cells.glsl", "CELL_WIDTH", rules::CELL_WIDTH),
+        ("include/cells.glsl", "CLUSTER_EDGE_WIDTH", rules::CLUSTER_EDGE_WIDTH),
+        ("include/cells.glsl", "CLOUD_THETA", rules::CLOUD_THETA),
+        ("include/cells.glsl", "MIXED", rules::MIXED),
+        ("include/cells.glsl", "EVEN", rules::EVEN),
     ];
     for (file, name, host) in shared {
         assert_eq!(constant(text_of(file), name), Some(host), "{file}: {name}");

@@ -3,6 +3,8 @@
 
 #[path = "harness/bounded.rs"]
 mod bounded;
+#[path = "emulation/mod.rs"]
+mod emulation;
 #[path = "harness/gathers.rs"]
 mod gathers;
 mod harness;

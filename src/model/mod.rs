@@ -25,7 +25,6 @@ pub mod light;
 mod lighting;
 pub mod material;
 pub mod moisture;
-pub mod pair_rules;
 pub mod pairings;
 mod particle;
 pub mod philox;

@@ -3,10 +3,10 @@
 //!
 //! In: surfaces with a material each, lights, blobs, facets of clouds. Out: radiance toward the eye
 //! and irradiance, RGB, with error estimates. [`AreaScene::second`] is the law of the pass
-//! `second`; [`super::emulation`] evaluates that pass's own approximation instead.
+//! `second`, which approximates it.
 
 pub mod adaptive;
-pub(super) mod clip;
+pub mod clip;
 pub mod mean;
 pub mod paths;
 mod resolve;

@@ -1,5 +1,5 @@
 //! The f64 reference of every GPU pass, one module a pass, written from the mathematics (model.md)
-//! and not from a shader. The exception is [`emulation`], which says so.
+//! and not from a shader.
 //!
 //! Every module consists of functions over slices that take their stage's inputs as arguments. A
 //! test can pass exactly what the GPU had, and so measure one stage alone. [`picture`] puts the
@@ -7,13 +7,12 @@
 
 pub mod area;
 pub mod blob;
-mod bounded;
+pub mod bounded;
 pub mod chunks;
 pub mod composite;
 pub mod contract;
 pub mod count;
 pub mod cull;
-pub mod emulation;
 pub mod facet_runs;
 pub mod facets;
 pub mod first;

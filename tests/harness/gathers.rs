@@ -11,12 +11,12 @@ use nimbus::model::grid::DEPOSIT_CUT_SIGMA;
 use nimbus::model::light::Light;
 use nimbus::model::pairings::pairings;
 use nimbus::model::scene::{Gather, Scene};
-use nimbus::reference::emulation::{Exchange, Facet, Gathered, Region};
 use nimbus::reference::occlude::Rectangle;
 use nimbus::reference::parallel::parallel_map;
 use nimbus::reference::transmit::{Obstacles, Receiver};
 use nimbus::reference::{grid, morton, place, sort};
 
+use crate::emulation::{Exchange, Facet, Gathered, Region};
 use crate::harness::{Gpu, assert_within_and_say, check_within};
 use crate::rooms::{Frame, frame_by};
 

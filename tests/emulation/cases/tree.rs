@@ -1,7 +1,7 @@
 //! Clusters by values worked by hand.
 
 use super::*;
-use crate::reference::emulation::cluster_view::positive_part;
+use crate::emulation::cluster_view::positive_part;
 
 /// Gathers from a tree over the facets in their given order.
 fn through_a_tree(exchange: &Exchange, theta: f64) -> Gathered {

@@ -6,15 +6,15 @@ use glam::DVec3;
 
 use super::occluder::{Ball, hides_all, meets};
 use super::roundings::{MARCH, MIN_DISTANCE, ROUNDINGS, U};
-use crate::model::grid::GridSpec;
-use crate::model::light::Light;
-use crate::model::material::Brdf;
-use crate::model::pairings::Pairing;
-use crate::model::scene::Pairs;
-use crate::reference::bounded::{Bounded, Decision};
-use crate::reference::grid::sample;
-use crate::reference::occlude::Rectangle;
-use crate::reference::transmit::crossing;
+use nimbus::model::grid::GridSpec;
+use nimbus::model::light::Light;
+use nimbus::model::material::Brdf;
+use nimbus::model::pairings::Pairing;
+use nimbus::model::scene::Pairs;
+use nimbus::reference::bounded::{Bounded, Decision};
+use nimbus::reference::grid::sample;
+use nimbus::reference::occlude::Rectangle;
+use nimbus::reference::transmit::crossing;
 
 /// Facets of one material: a surface with its rectangle, or a cloud.
 pub struct Region {

@@ -9,10 +9,10 @@ use super::form::{PairGeometry, half_angle, lobe, width};
 use super::gathered::Gathered;
 use super::occluder::{Ball, shadow};
 use super::roundings::{ROUNDINGS, U};
+use super::rules::{LOBE_REACH, TURN};
 use super::source::Sender;
-use crate::model::pair_rules::{LOBE_REACH, TURN};
-use crate::reference::bounded::{Bounded, Decision};
-use crate::reference::occlude::{Rectangle, Source};
+use nimbus::reference::bounded::{Bounded, Decision};
+use nimbus::reference::occlude::{Rectangle, Source};
 
 /// A receiver's view.
 pub(super) struct View<'a> {

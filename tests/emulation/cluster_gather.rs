@@ -7,10 +7,10 @@ use super::form::{PairGeometry, lobe};
 use super::gathered::Gathered;
 use super::occluder::Ball;
 use super::roundings::{MIN_DISTANCE, ROUNDINGS, U};
+use super::rules::{CLOUD_THETA, CLUSTER_EDGE_WIDTH, EVEN, LOBE_STEP};
 use super::source::Sender;
 use super::view::View;
-use crate::model::pair_rules::{CLOUD_THETA, CLUSTER_EDGE_WIDTH, EVEN, LOBE_STEP};
-use crate::reference::bounded::{Bounded, Decision};
+use nimbus::reference::bounded::{Bounded, Decision};
 
 impl Exchange<'_> {
     /// Returns I_i and L2 of facet `j` from clusters.

@@ -7,8 +7,8 @@ use libm::erf;
 use super::cluster::{Cluster, trace};
 use super::form::PairGeometry;
 use super::roundings::{MIN_DISTANCE, ROUNDINGS, U};
-use crate::model::pair_rules::{CLOUD_THETA, MIXED};
-use crate::reference::bounded::{Bounded, Decision};
+use super::rules::{CLOUD_THETA, MIXED};
+use nimbus::reference::bounded::{Bounded, Decision};
 
 /// Least distance of a surface's cluster from its nearest point, as a share of its distance.
 const NEAREST: f64 = 0.01;

@@ -8,8 +8,8 @@ use glam::{DMat3, DVec3};
 use super::exchange::Exchange;
 use super::roundings::{ROUNDINGS, U};
 use super::source::Sender;
-use crate::model::tree::Tree;
-use crate::reference::bounded::Bounded;
+use nimbus::model::tree::Tree;
+use nimbus::reference::bounded::Bounded;
 
 /// The facets below a node as one emitter. Beside each number stands a bound on its error.
 #[derive(Debug, Clone)]

@@ -5,8 +5,8 @@
 use glam::{DVec2, DVec3};
 
 use super::occluder::{OF_UNITS, sides_of};
-use crate::reference::bounded::Bounded;
-use crate::reference::occlude::{IN_PLANE, Rectangle, Source};
+use nimbus::reference::bounded::Bounded;
+use nimbus::reference::occlude::{IN_PLANE, Rectangle, Source};
 
 /// Half a part's side, in the cell's half axes.
 const HALF_PART: f64 = 0.25;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::reference::bounded::Decision;
+use nimbus::reference::bounded::Decision;
 
 /// Light gathered by a receiver.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -10,9 +10,9 @@ use super::exchange::Exchange;
 use super::form::{PairGeometry, half_angle, lobe};
 use super::occluder::shadow;
 use super::roundings::{MARCH, MIN_DISTANCE, ROUNDINGS, U};
-use crate::model::light::{Light, MIN_PENUMBRA};
-use crate::reference::bounded::{Bounded, Decision};
-use crate::reference::occlude::{Rectangle, Source, source_of};
+use nimbus::model::light::{Light, MIN_PENUMBRA};
+use nimbus::reference::bounded::{Bounded, Decision};
+use nimbus::reference::occlude::{Rectangle, Source, source_of};
 
 /// Rounding to 16 bits of a number from 0 to 1, and f32's rounding before.
 const SIXTEEN_BITS: f64 = 0.5 / 65_535.0 + 4.0 * U;

@@ -5,9 +5,9 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use super::roundings::ROUNDINGS;
-use crate::model::basis::evaluate;
-use crate::model::pair_rules::NEAR;
-use crate::reference::bounded::{Bounded, Decision};
+use super::rules::NEAR;
+use nimbus::model::basis::evaluate;
+use nimbus::reference::bounded::{Bounded, Decision};
 
 /// Least length of a half vector's sum; that of opposite directions turns with any rounding.
 const OPPOSITE: f64 = 1e-6;

@@ -1,10 +1,10 @@
 //! Random rooms of rectangles, compared with the area reference and with their mirror images.
 
 use super::*;
-use crate::model::basis::{Basis, Sampling};
-use crate::model::philox::{philox4x32_10, uniform};
-use crate::reference::parallel::parallel_map;
-use crate::reference::transmit::{Obstacles, Receiver as Place};
+use nimbus::model::basis::{Basis, Sampling};
+use nimbus::model::philox::{philox4x32_10, uniform};
+use nimbus::reference::parallel::parallel_map;
+use nimbus::reference::transmit::{Obstacles, Receiver as Place};
 
 const EYE: DVec3 = DVec3::new(2.0, 3.0, 6.0);
 

@@ -1,10 +1,10 @@
 //! Coverage of a cell, compared with areas.
 
-use super::super::coverage::{Coverage, Patch};
 use super::*;
-use crate::model::philox::{philox4x32_10, uniform};
-use crate::reference::area::clip;
-use crate::reference::occlude::Source;
+use crate::emulation::coverage::{Coverage, Patch};
+use nimbus::model::philox::{philox4x32_10, uniform};
+use nimbus::reference::area::clip;
+use nimbus::reference::occlude::Source;
 
 const SLACK: f64 = 8.0 * U * 4.0;
 

@@ -7,10 +7,10 @@ use super::exchange::Exchange;
 use super::form::PairGeometry;
 use super::gathered::Gathered;
 use super::roundings::ROUNDINGS;
+use super::rules::{EDGE_WIDTH, LOBE_STEP, SINGLE_EDGE_WIDTH};
 use super::source::Sender;
 use super::view::View;
-use crate::model::pair_rules::{EDGE_WIDTH, LOBE_STEP, SINGLE_EDGE_WIDTH};
-use crate::reference::bounded::{Bounded, Decision};
+use nimbus::reference::bounded::{Bounded, Decision};
 
 impl Exchange<'_> {
     /// Returns I_i and L2 of facet `j` from `senders`.

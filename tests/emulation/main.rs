@@ -1,24 +1,29 @@
-//! Values worked by hand, and integrals over the areas.
+//! The emulation of the pass `second` against values worked by hand, and integrals over the areas.
 
+#[path = "cases/edges.rs"]
 mod edges;
+#[path = "mod.rs"]
+mod emulation;
+#[path = "cases/rooms.rs"]
 mod rooms;
+#[path = "cases/tree.rs"]
 mod tree;
 
 use std::f64::consts::{FRAC_1_PI, PI};
 
 use glam::{DVec3, UVec3};
 
-use super::roundings::U;
-use super::*;
-use crate::model::basis::N_NODES;
-use crate::model::grid::GridSpec;
-use crate::model::light::Light;
-use crate::model::material::Brdf;
-use crate::model::pairings::{Pairing, pairings};
-use crate::model::scene::Pairs;
-use crate::model::surface::Surface;
-use crate::reference::area::{Accuracy, AreaScene, Receiver};
-use crate::reference::occlude::Rectangle;
+use emulation::roundings::U;
+use emulation::{Exchange, Facet, Gathered, Region};
+use nimbus::model::basis::N_NODES;
+use nimbus::model::grid::GridSpec;
+use nimbus::model::light::Light;
+use nimbus::model::material::Brdf;
+use nimbus::model::pairings::{Pairing, pairings};
+use nimbus::model::scene::Pairs;
+use nimbus::model::surface::Surface;
+use nimbus::reference::area::{Accuracy, AreaScene, Receiver};
+use nimbus::reference::occlude::Rectangle;
 
 const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::ONE, cell: 1.0, low: DVec3::ZERO };
 const PAIRS: Pairs = Pairs { size: 0.5, levels: 6, steps: 16 };

@@ -6,8 +6,8 @@ use std::f64::consts::SQRT_2;
 use glam::DVec3;
 
 use super::roundings::U;
-use crate::reference::bounded::{Bounded, Decision};
-use crate::reference::occlude::{IN_PLANE, Rectangle, Source};
+use nimbus::reference::bounded::{Bounded, Decision};
+use nimbus::reference::occlude::{IN_PLANE, Rectangle, Source};
 
 /// Error of unit vectors, their products and quotients.
 pub const OF_UNITS: f64 = 8.0 * U;

@@ -6,11 +6,11 @@ use glam::DVec2;
 use super::coverage::{Coverage, Patch};
 use super::gathered::Gathered;
 use super::roundings::ROUNDINGS;
+use super::rules::{CELL_WIDTH, LOBE_PARTS, LOBE_STEP};
 use super::source::Sender;
 use super::view::View;
-use crate::model::pair_rules::{CELL_WIDTH, LOBE_PARTS, LOBE_STEP};
-use crate::reference::bounded::{Bounded, Decision};
-use crate::reference::occlude::{Rectangle, Source};
+use nimbus::reference::bounded::{Bounded, Decision};
+use nimbus::reference::occlude::{Rectangle, Source};
 
 /// Area of a part over that of its cell.
 const PART: f64 = 1.0 / 16.0;

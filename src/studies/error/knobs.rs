@@ -12,7 +12,7 @@ struct Knob {
     applies: fn(&Scene) -> bool,
 }
 
-const KNOBS: [Knob; 17] = [
+const KNOBS: &[Knob] = &[
     Knob { key: "draw.path", values: &["sprites", "tiles"], applies: has_particles },
     Knob { key: "draw.resolution", values: &["1.0", "0.5", "0.25"], applies: has_particles },
     Knob { key: "draw.cutoff", values: &["2.0", "2.5", "3.0", "4.0"], applies: has_particles },

@@ -114,7 +114,7 @@ impl Decision {
     }
 
     /// Returns the opposite.
-    pub fn not(self) -> Decision {
+    pub fn negated(self) -> Decision {
         Decision { is_true: !self.is_true, ..self }
     }
 
@@ -126,7 +126,7 @@ impl Decision {
 
     /// Returns whether either is true.
     pub fn or(self, b: Decision) -> Decision {
-        self.not().and(b.not()).not()
+        self.negated().and(b.negated()).negated()
     }
 
     /// Returns whether the decision may come out true.

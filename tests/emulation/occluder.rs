@@ -115,7 +115,7 @@ pub fn shadow(r: &Rectangle, source: Source, ball: &Ball) -> Shadow {
     let off = m.error + reach.error / SQRT_2;
     let share = Bounded::between(ramp(m.value + off), ramp(m.value), ramp(m.value - off));
     Shadow {
-        hidden: apart.and(Decision::greater(m, Bounded::ZERO).not()),
+        hidden: apart.and(Decision::greater(m, Bounded::ZERO).negated()),
         crossed,
         share: share.select(apart, Bounded::ZERO),
     }
@@ -153,7 +153,7 @@ pub fn meets(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
         )
     };
     let out = (0..4).map(outside).fold(Decision::NO, Decision::or);
-    out.not().and(far.iter().map(behind).fold(Decision::NO, Decision::or))
+    out.negated().and(far.iter().map(behind).fold(Decision::NO, Decision::or))
 }
 
 /// Margin of a plane through a point, as a share of the lengths that make it up.

@@ -183,8 +183,7 @@ fn what_a_reference_cannot_do_is_said_and_nothing_written() {
         (&["--reference", "volume", "--no-skip"], "cannot be used with"),
         (
             &["--reference", "thin", "--set", "material.0.ks=[0.01,0,0]"],
-            "cloud 0: its material \"cloud\" has a lobe, and the f64 reference knows clouds that \
-             reflect diffusely alone",
+            "cloud 0: its material \"cloud\" has a lobe, and the f64 reference has diffuse clouds",
         ),
         (&["--reference", "volume"], "cloud 0 is textured"),
         (&["--reference", "volume", "--set", PLAIN, "--time", "nan"], "finite"),

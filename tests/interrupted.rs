@@ -98,13 +98,19 @@ fn check(threading: &str) {
     let dir = tempfile::tempdir().expect("a folder");
     let path = |name: &str| dir.path().join(name).to_str().expect("UTF-8").to_owned();
     // Also compiles the shaders, so that the time below is not theirs.
-    let half = half_time(threading, &path("whole"));
-    for attempt in 0.. {
+    let mut after = half_time(threading, &path("whole"));
+    // How long to wait follows from how fast the machine is at the moment, which the last attempt
+    // tells.
+    for attempt in 0..40 {
         let out = path(&format!("part{attempt}"));
-        let Output { status, stdout, stderr } = interrupted(threading, &out, half);
+        let Output { status, stdout, stderr } = interrupted(threading, &out, after);
         let (stdout, stderr) = (String::from_utf8_lossy(&stdout), String::from_utf8_lossy(&stderr));
-        if status.success() && attempt < 5 {
-            println!("{threading}: ended before half of the time that the run before it took");
+        if status.success() {
+            after /= 2;
+            continue;
+        }
+        if n_timed(&out) == 0 {
+            after = after * 3 / 2;
             continue;
         }
         assert_eq!(status.code(), Some(130), "{stderr}");
@@ -113,6 +119,12 @@ fn check(threading: &str) {
         check_results(threading, &out, &path("whole"));
         return;
     }
+    panic!("{threading}: no run was interrupted between its first timed frame and its last");
+}
+
+/// Returns the number of timed frames in the results.
+fn n_timed(out: &str) -> usize {
+    counted(out).iter().map(|(_, n, _)| n).sum()
 }
 
 /// Marked, valid, counted right, and read by `compare`.

@@ -3,10 +3,10 @@
 
 #[path = "harness/program.rs"]
 mod program;
+#[path = "harness/signals.rs"]
+mod signals;
 
 use std::path::Path;
-use std::process::Command;
-use std::time::{Duration, Instant};
 
 use program::{differ, nimbus, path, run};
 use serde_json::Value;
@@ -206,7 +206,7 @@ fn what_a_reference_cannot_do_is_said_and_nothing_written() {
 fn ctrl_c_leaves_nothing_half_written() {
     let dir = temp();
     let out = path(&dir, "late.exr");
-    // Rendering takes minutes; it has begun when its process runs.
+    // Rendering takes minutes.
     let args = [
         "render",
         "scenes/cubes-554.toml",
@@ -220,12 +220,8 @@ fn ctrl_c_leaves_nothing_half_written() {
         &out,
     ];
     let child = nimbus(&args).spawn().expect("a child");
-    std::thread::sleep(Duration::from_millis(700));
-    let begin = Instant::now();
-    let killed =
-        Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
-    assert!(killed.success());
-    assert_eq!(child.wait_with_output().expect("it ends").status.code(), Some(130));
-    assert!(begin.elapsed() < Duration::from_secs(5));
+    let (output, cpu_s) = signals::interrupt(child, || true);
+    assert_eq!(output.status.code(), Some(130));
+    assert!(cpu_s < 4.0, "{cpu_s} s of work after the signal");
     assert_eq!(std::fs::read_dir(dir.path()).expect("the folder").count(), 0);
 }

@@ -91,12 +91,14 @@ fn faulty_arguments_are_refused_before_any_work() {
         ),
         (
             &["error", "scene.toml", "--set", textured],
-            "cloud 0 is textured, and the volume knows plain blobs alone; expected --set \
+            "cloud 0 is textured, and the volume reference has plain blobs only; expected \
+             --set \
              'cloud.0.texture=\"none\"', or --plain for all clouds, or --against thin",
         ),
         (
             &["ledger", "scene.toml", "--set", textured],
-            "cloud 0 is textured, and the volume knows plain blobs alone; expected --set \
+            "cloud 0 is textured, and the volume reference has plain blobs only; expected \
+             --set \
              'cloud.0.texture=\"none\"', or --plain for all clouds",
         ),
         (

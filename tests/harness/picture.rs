@@ -1,7 +1,7 @@
 //! A picture of sprites, with or without rectangles: inputs in f32 for the GPU and in f64 for the
 //! reference, and the bound between both.
 
-#![allow(dead_code, reason = "each test binary uses its own part")]
+#![allow(dead_code, unused_imports, reason = "each test binary uses its own part")]
 
 #[path = "picture_drawn.rs"]
 mod drawn;
@@ -28,6 +28,7 @@ use crate::bounded::{Bounded, U, dot, exact3};
 use crate::scenery::{Candidates, Scenery};
 use crate::sheets::Paper;
 
+pub use drawn::{Tiled, Way};
 use sprite::{Ellipsoid, Sprite};
 
 /// Error of a view depth relative to the distance: a difference and an f32 axis per term, three
@@ -42,26 +43,6 @@ pub const FORMATS: [(TargetFormat, FilmFormat); 3] = [
     (TargetFormat::Rgba16f, FilmFormat::Rgba16f),
     (TargetFormat::Rgba32f, FilmFormat::Rgba32f),
 ];
-
-/// Parameters of the tile path.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tiled {
-    pub invocations: u32,
-    /// Without subgroup operations.
-    pub portable: bool,
-    pub max_pairs: Option<u64>,
-    pub max_tiles: Option<u32>,
-    pub saturated: f64,
-}
-
-/// A drawing path.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Way {
-    Sprites,
-    Tiles(Tiled),
-    /// Number of chunks, and the saturation beyond which layers are left out.
-    Chunks(u32, f64),
-}
 
 #[derive(Debug, Clone)]
 pub struct Picture {

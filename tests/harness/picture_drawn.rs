@@ -16,9 +16,29 @@ use nimbus::passes::surfaces::Surfaces;
 use nimbus::passes::tiles::{Division, Variant};
 use nimbus::reference::Blob;
 
-use super::{Picture, Tiled, Way};
+use super::{Picture};
 use crate::bounded::U;
 use crate::harness::Gpu;
+
+/// Parameters of the tile path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tiled {
+    pub invocations: u32,
+    /// Without subgroup operations.
+    pub portable: bool,
+    pub max_pairs: Option<u64>,
+    pub max_tiles: Option<u32>,
+    pub saturated: f64,
+}
+
+/// A drawing path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Way {
+    Sprites,
+    Tiles(Tiled),
+    /// Number of chunks, and the saturation beyond which layers are left out.
+    Chunks(u32, f64),
+}
 
 /// Input buffers of the passes.
 struct Uploaded {

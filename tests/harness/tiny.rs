@@ -140,9 +140,9 @@ impl Tiny {
     }
 }
 
-/// Returns the violations of docs/`schema` in `json`.
+/// Asserts that `json` has no violation of a schema in docs/reference/schemas.
 pub fn assert_valid(json: &Value, schema: &str) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(schema);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/schemas").join(schema);
     let schema: Value =
         serde_json::from_str(&fs::read_to_string(path).expect("the schema")).expect("JSON");
     let validator = jsonschema::draft202012::new(&schema).expect("a schema");

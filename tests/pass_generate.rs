@@ -1,8 +1,8 @@
 //! The pass generate against its f64 reference: whole buffers, every particle at its own bound.
 
-mod harness;
 #[path = "pass_generate/distribution.rs"]
 mod distribution;
+mod harness;
 
 use glam::DVec3;
 use harness::{Gpu, assert_within_and_say, check_within};
@@ -393,5 +393,3 @@ fn a_wrong_shader_is_noticed() {
     other.1[300] += 1;
     assert!(!compare(&truth, &other, &law).is_right());
 }
-
-/// Two-sample χ² of equally large samples over the bins that either meets, and its bins less one.

@@ -4,8 +4,6 @@
 
 #[path = "harness/bounded.rs"]
 mod bounded;
-#[path = "pass_surfaces/with_sprites.rs"]
-mod with_sprites;
 mod harness;
 #[path = "harness/picture.rs"]
 mod picture;
@@ -13,6 +11,8 @@ mod picture;
 mod scenery;
 #[path = "harness/sheets.rs"]
 mod sheets;
+#[path = "pass_surfaces/with_sprites.rs"]
+mod with_sprites;
 
 use bounded::greatest_ratio;
 use glam::DVec3;

@@ -6,8 +6,8 @@
 #[path = "harness/bounded.rs"]
 mod bounded;
 mod harness;
-#[path = "tensor/first.rs"]
-mod first;
+#[path = "tensor/t1.rs"]
+mod t1;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -319,6 +319,3 @@ fn a_scene_too_large_for_tensors_is_gathered_at_once() {
     }
     assert!(frames.lit[0] != frames.lit[1]);
 }
-
-/// All inputs of T1, in f32 numbers on both sides: facets of a glossy and of a diffuse region, a
-/// sun and the sky.

@@ -165,7 +165,7 @@ fn bench_json_is_json_and_nothing_else() {
     let json: Value = serde_json::from_str(&stdout).expect("JSON");
     assert!(json["cases"][0]["ratio"]["parallel_by_serial"].as_f64().is_some_and(|r| r > 0.0));
     let schema: Value =
-        serde_json::from_str(include_str!("../docs/reference/schemas/run.schema.json"))
+        serde_json::from_str(include_str!("../../docs/reference/schemas/run.schema.json"))
             .expect("the schema");
     assert!(jsonschema::is_valid(&schema, &json), "{:?}", jsonschema::validate(&schema, &json));
 }

@@ -16,7 +16,7 @@ use nimbus::passes::surfaces::Surfaces;
 use nimbus::passes::tiles::{Division, Variant};
 use nimbus::reference::Blob;
 
-use super::{Picture};
+use super::Picture;
 use crate::bounded::U;
 use crate::harness::Gpu;
 

@@ -40,7 +40,7 @@ fn pause() {
 pub fn interrupt(child: Child, is_begun: impl Fn() -> bool) -> (Output, f64) {
     let pid = child.id();
     let has_ended = || state(pid).0 == 'Z';
-    while !has_ended() && !(catches_interrupt(pid) && is_begun()) {
+    while !(has_ended() || catches_interrupt(pid) && is_begun()) {
         pause();
     }
     let (_, before) = state(pid);

@@ -2,6 +2,7 @@
 
 use super::*;
 
+/// Two-sample χ² of equally large samples over the bins that either meets, and its bins less one.
 fn chi_squared(a: &[u32], b: &[u32]) -> (f64, usize) {
     let (a_total, b_total) = (a.iter().sum::<u32>(), b.iter().sum::<u32>());
     assert_eq!(a_total, b_total);

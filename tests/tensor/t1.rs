@@ -2,6 +2,8 @@
 
 use super::*;
 
+/// All inputs of T1, in f32 numbers on both sides: facets of a glossy and of a diffuse region, a
+/// sun and the sky.
 fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
     const N: u32 = 3000;
     let mut r = Random(9);

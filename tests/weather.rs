@@ -55,8 +55,9 @@ fn pressure_temperature_humidity_and_height_are_those_of_wrf_python() {
         for &(i_step, k, j, i, p, t, humidity, z) in points {
             let step = file.step(i_step).expect("a step");
             let at = file.shape.cell(k, j * file.shape.nx + i);
-            let (p_here, t_here) = (step.pressure_pa[at], step.temperature_k[at]);
-            let humidity_here = 100.0 * relative_humidity(step.vapour[at], p_here, t_here).min(1.0);
+            let (p_here, t_here) = (step.air.pressure_pa[at], step.air.temperature_k[at]);
+            let humidity_here =
+                100.0 * relative_humidity(step.air.vapour[at], p_here, t_here).min(1.0);
             let off =
                 [p_here - p, t_here - t, humidity_here - humidity, step.grid.middle_m(at) - z];
             // 1 Pa, 0.01 K, 0.05 % and 0.5 m are asked for; what is printed ends far before.

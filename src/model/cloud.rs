@@ -8,6 +8,7 @@ use super::disc::Disc;
 pub use super::group::{Group, max_blob_mass, runs};
 use super::growth::Growth;
 use super::gust::Gust;
+use super::named::named;
 pub use super::particle::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
 use super::texture::Texture;
 
@@ -35,20 +36,15 @@ pub struct Cloud {
     pub seed: u32,
 }
 
-/// Direction that a cloud's facets face where the density around them has none
-/// (docs/explanation/passes.md "facets").
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Facing {
-    /// Away from the cloud's centre; for a single cloud.
-    Outward,
-    /// Upward; for layers of clouds, or many clouds.
-    Up,
-}
-
-impl Facing {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Facing); 2] =
-        [("outward", Facing::Outward), ("up", Facing::Up)];
+named! {
+    /// Direction that a cloud's facets face where the density around them has none
+    /// (docs/explanation/passes.md "facets").
+    pub enum Facing {
+        /// Away from the cloud's centre; for a single cloud.
+        Outward = "outward",
+        /// Upward; for layers of clouds, or many clouds.
+        Up = "up",
+    }
 }
 
 /// Depth below the cloud of the point that upward facets face away from. Their directions differ by

@@ -7,7 +7,6 @@
 
 pub mod adaptive;
 pub(super) mod clip;
-pub mod mean;
 pub mod paths;
 mod resolve;
 mod scene;

@@ -342,14 +342,14 @@ mod tests {
 
     #[test]
     fn far_from_the_grid_there_is_no_density() {
-        let spec = GridSpec::fit(DVec3::splat(-3.0), DVec3::splat(3.0), 32);
+        let spec = GridSpec::fit(DVec3::splat(-3.0), DVec3::splat(3.0), 32, 1.0);
         let cells =
             deposit(&spec, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.0, kappa: 1.0 }]);
         let density = cells.iter().sum::<f64>() * spec.cell.powi(3);
         assert!((density / SQRT_TAU.powi(3) - 1.0).abs() < 1e-12);
         assert_eq!(sample(&spec, &cells, DVec3::splat(9.0)), 0.0);
         // Along the grid's diagonal density falls from the centre, so that no facet turns inward.
-        let q = facets::gradient(&spec, &cells, DVec3::ONE, 0.5, 1.0).0;
+        let q = facets::gradient(|x| sample(&spec, &cells, x), DVec3::ONE, 0.5, 1.0).0;
         assert!(q.x < 0.0 && (q.x - q.y).abs() < 1e-12);
     }
 }

@@ -13,7 +13,7 @@ use super::wrf_variables::Fields;
 use crate::error::{Error, Place, Result};
 use crate::model::weather::air::{self, PRESSURES_PA, TEMPERATURES_K};
 use crate::model::weather::diagnosed::{self, Air};
-use crate::model::weather::extinction::{InvalidCounts, add, single_moment_phase};
+use crate::model::weather::extinction::{InvalidCounts, single_moment_phase};
 use crate::model::weather::grid::{Grid, Ground, Shape};
 
 /// Most cells of a step: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more
@@ -23,8 +23,6 @@ pub const MOST_CELLS: u64 = 1 << 24;
 const SPACINGS_M: (f64, f64) = (1.0, 500_000.0);
 /// Range of the heights of levels, m above sea level.
 const HEIGHTS_M: (f64, f64) = (-1000.0, 200_000.0);
-/// Greatest mixing ratio, kg/kg: there is no more water than air.
-const GREATEST_RATIO: f64 = 1.0;
 
 const NEEDED: [&str; 5] = ["P", "PB", "T", "PH", "PHB"];
 
@@ -64,12 +62,8 @@ pub struct Step {
     pub grid: Grid,
     /// Extinction of the clouds, m⁻¹.
     pub extinction: Vec<f64>,
-    /// Pressure.
-    pub pressure_pa: Vec<f64>,
-    /// Temperature.
-    pub temperature_k: Vec<f64>,
-    /// Mixing ratio of vapour, kg/kg.
-    pub vapour: Vec<f64>,
+    /// Pressure, temperature and vapour.
+    pub air: Air,
     /// Latitude and longitude of the domain's middle, radians, which moves where a nest follows a
     /// storm; `None` for an idealised case.
     pub middle: Option<(f64, f64)>,
@@ -256,48 +250,38 @@ impl WeatherFile {
         within(&pressure_pa, PRESSURES_PA, "P + PB", "Pa", shape, i_step)?;
         let mut temperature_k = whole(&fields.t)?;
         temperature_k.iter_mut().zip(&pressure_pa).for_each(|(t, p)| *t = air::temperature(*t, *p));
-        within(
-            &temperature_k,
-            TEMPERATURES_K,
-            "the temperature of T, P and PB",
-            "K",
-            shape,
-            i_step,
-        )?;
+        let what = "the temperature of T, P and PB";
+        within(&temperature_k, TEMPERATURES_K, what, "K", shape, i_step)?;
         let mut oddities = InvalidCounts::default();
+        let mut ratios = |field: &Field| -> Checked<Vec<f64>> {
+            let mut ratios = field.read(file, shape, i_step)?;
+            oddities.clear(&mut ratios);
+            Ok(ratios)
+        };
         let vapour = match &fields.vapour {
-            Some(field) => ratios(field.read(file, shape, i_step)?, &mut oddities),
+            Some(field) => ratios(field)?,
             None => vec![0.0; shape.n_cells()],
         };
-        let dry_density = |i: usize| air::dry_density(pressure_pa[i], temperature_k[i], vapour[i]);
+        let air = Air { pressure_pa, temperature_k, vapour };
         let extinction = match self.clouds {
             Clouds::Given => {
                 let mut extinction = vec![0.0; shape.n_cells()];
                 for (field, phase) in &fields.condensates {
-                    let read = field.read(file, shape, i_step)?;
                     let is_both = fields.is_single_moment && field.name == "QCLOUD";
-                    let phase_of = |i: usize| {
-                        if is_both { single_moment_phase(temperature_k[i]) } else { *phase }
-                    };
-                    let odd = add(&mut extinction, &read, dry_density, phase_of, |ratio| {
-                        ratio > GREATEST_RATIO
-                    });
-                    oddities.n_negative += odd.n_negative;
-                    oddities.n_missing += odd.n_missing;
+                    for (i, ratio) in ratios(field)?.into_iter().enumerate() {
+                        let phase = if is_both {
+                            single_moment_phase(air.temperature_k[i])
+                        } else {
+                            *phase
+                        };
+                        extinction[i] += phase.extinction(ratio, air.dry_density(i));
+                    }
                 }
                 extinction
             }
-            Clouds::Diagnosed => {
-                let air = Air {
-                    pressure_pa: &pressure_pa,
-                    temperature_k: &temperature_k,
-                    vapour: &vapour,
-                };
-                diagnosed::extinction(&grid, air)
-            }
+            Clouds::Diagnosed => diagnosed::extinction(&grid, &air),
         };
-        let middle = self.middle(i_step)?;
-        Ok(Step { grid, extinction, pressure_pa, temperature_k, vapour, middle, oddities })
+        Ok(Step { grid, extinction, air, middle: self.middle(i_step)?, oddities })
     }
 
     fn middle(&self, i_step: usize) -> Checked<Option<(f64, f64)>> {
@@ -338,20 +322,6 @@ impl WeatherFile {
         Grid::new(ground, heights_m)
             .map_err(|what| format!("variables PH, PHB, step {i_step}: {what}"))
     }
-}
-
-/// Replaces each value that is no mixing ratio by 0 and counts it.
-fn ratios(mut read: Vec<f64>, oddities: &mut InvalidCounts) -> Vec<f64> {
-    for ratio in &mut read {
-        if ratio.is_nan() || *ratio > GREATEST_RATIO {
-            oddities.n_missing += 1;
-            *ratio = 0.0;
-        } else if *ratio < 0.0 {
-            oddities.n_negative += 1;
-            *ratio = 0.0;
-        }
-    }
-    read
 }
 
 fn within(

@@ -128,7 +128,7 @@ pub(super) fn volume_at(
     let rows: Vec<&[usize]> = order.chunk_by(|&a, &b| pixels.at[a][1] == pixels.at[b][1]).collect();
     let of_rows = parallel_map(rows.len(), |r| {
         let j = pixels.at[rows[r][0]][1];
-        let row = volume.of_row(j, rows[r].iter().map(|&k| (pixels.at[k][0], opaque[k])));
+        let row = volume.row(j, rows[r].iter().map(|&k| (pixels.at[k][0], opaque[k])));
         on_progress(RenderStage::Drawing, rows.len());
         row
     });

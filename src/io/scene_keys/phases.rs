@@ -30,12 +30,12 @@ pub struct PhaseSpec {
 
 keys! { PHASE: pub(super) fn phase(s) -> PhaseSpec { PhaseSpec;
     /// Name of the phase in results; each name once.
-    name: required_text(), "";
+    name: required_text();
     /// Number of frames of the phase.
-    n_frames ["frames"]: integer(1, 1, u32::MAX).required(), "";
+    n_frames ["frames"]: integer(1, 1, u32::MAX).required();
     /// Keys of the scene that the phase sets, such as `set.lighting.mode = "none"`; not `title` and
     /// `time`.
-    sets ["set"]: described("table of keys"), "" => |_| sets(s);
+    sets ["set"]: described("table of keys") => |_| sets(s);
     resolved => Json::Null;
 }}
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 
 use super::atomic::{folder_of, write_atomic};
-use super::document::overrides::is_word;
+use super::document::overrides::{is_word, parts};
 use super::document::tree::Document;
 use super::scene_keys::{DEFAULT_LIGHTS, DEFAULT_MATERIAL, add_defaults};
 use super::text_file::{SCENE_LIMIT, read_text};
@@ -43,10 +43,8 @@ pub fn text_of(from: &Path, to: &Path, overrides: &[String], seed: Option<u32>) 
         text.parse().map_err(|e: toml_edit::TomlError| fault(e.message().to_owned()))?;
     let seeds = seed.map_or(vec![], |seed| seeds(&mut edited, seed));
     for text in overrides.iter().chain(&seeds) {
-        let (path, value) =
-            text.split_once('=').ok_or_else(|| fault(format!("{text} sets nothing")))?;
-        let segments: Vec<&str> = path.split('.').map(str::trim).collect();
-        set(&mut edited, &segments, &value_of(value.trim()).map_err(fault)?).map_err(fault)?;
+        let (segments, value) = parts(text).ok_or_else(|| fault(format!("{text} sets nothing")))?;
+        set(&mut edited, &segments, &value_of(value).map_err(fault)?).map_err(fault)?;
     }
     let (old, new) = (canonical_folder(from)?, canonical_folder(to)?);
     if old != new {

@@ -50,7 +50,7 @@ impl Scene {
         let low = blobs.iter().map(|b| b.position - reach(b)).reduce(DVec3::min).unwrap();
         let high = blobs.iter().map(|b| b.position + reach(b)).reduce(DVec3::max).unwrap();
         let aspect = blobs.iter().map(|b| b.aspect).sum::<f64>() / blobs.len() as f64;
-        Scene::new(&GridSpec::fit_cells(low, high, n, aspect), blobs)
+        Scene::new(&GridSpec::fit(low, high, n, aspect), blobs)
     }
 
     fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> Vec<f64> {

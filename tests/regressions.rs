@@ -14,6 +14,7 @@ use std::thread;
 use std::time::Duration;
 
 use nimbus::error::Error;
+use nimbus::io::text_file::{DATA_LIMIT, read_text};
 use nimbus::io::weather::wrf;
 use nimbus::io::{box_file, particle_file, scene_file};
 use nimbus::report::pages::source;
@@ -153,7 +154,9 @@ fn read_all(folder: &Path) -> Vec<Error> {
     let others = [
         scene_file::load(&path("scene.toml"), &[], None).err(),
         box_file::read(&path("b.dat")).err(),
-        particle_file::read(&path("p.csv")).err(),
+        read_text(&path("p.csv"), DATA_LIMIT, particle_file::FIRST)
+            .and_then(|text| particle_file::parse(&text, Path::new("p.csv")))
+            .err(),
         read_earlier(folder).err(),
         wrf::open(&path("w.nc")).err(),
     ];

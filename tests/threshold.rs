@@ -181,7 +181,8 @@ fn number_of_layers_bounds_the_omitted_parts() {
         let picture = random(seed, &pool);
         assert!(picture.textured.is_none());
         for pixel in cut_of(&picture) {
-            assert!(pixel.share() <= pixel.share_of_layers(picture.view.threshold));
+            let of_layers = -(-f64::from(pixel.n_layers) * picture.view.threshold).exp_m1();
+            assert!(pixel.share() <= of_layers);
             most = most.most(pixel);
         }
         assert!(cut_of(&without(&picture)).iter().all(|c| *c == Omitted::default()));

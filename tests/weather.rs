@@ -8,7 +8,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use nimbus::io::weather::container::Container;
 use nimbus::io::weather::netcdf;
 use nimbus::io::weather::wrf::{self, Clouds, Step, WeatherFile};
 use nimbus::model::weather::air::{relative_humidity, saturation_pa, saturation_ratio};
@@ -23,7 +22,7 @@ fn scenery(name: &str) -> WeatherFile {
 
 fn made(made: &Made) -> WeatherFile {
     let container = netcdf::from_bytes(made.bytes()).expect("a NetCDF file");
-    wrf::from_container(Box::new(container), Path::new("made.nc")).expect("a WRF file")
+    wrf::from_container(container, Path::new("made.nc")).expect("a WRF file")
 }
 
 /// Step, level, row, column; pressure (Pa), temperature (K), relative humidity (%), height (m).
@@ -55,8 +54,9 @@ fn pressure_temperature_humidity_and_height_are_those_of_wrf_python() {
         for &(i_step, k, j, i, p, t, humidity, z) in points {
             let step = file.step(i_step).expect("a step");
             let at = file.shape.cell(k, j * file.shape.nx + i);
-            let (p_here, t_here) = (step.pressure_pa[at], step.temperature_k[at]);
-            let humidity_here = 100.0 * relative_humidity(step.vapour[at], p_here, t_here).min(1.0);
+            let (p_here, t_here) = (step.air.pressure_pa[at], step.air.temperature_k[at]);
+            let humidity_here =
+                100.0 * relative_humidity(step.air.vapour[at], p_here, t_here).min(1.0);
             let off =
                 [p_here - p, t_here - t, humidity_here - humidity, step.grid.middle_m(at) - z];
             // 1 Pa, 0.01 K, 0.05 % and 0.5 m are asked for; what is printed ends far before.
@@ -169,12 +169,12 @@ fn every_kind_of_netcdf_gives_the_same_step() {
     assert_eq!(first.extinction.iter().filter(|b| **b > 0.0).count(), 6);
     for (version, kind) in kinds {
         let file = made(&Made::wrf(version, 3));
-        assert_eq!((file.container().kind(), file.n_steps), (kind, 3));
+        assert_eq!((file.container.kind, file.n_steps), (kind, 3));
         assert_eq!(file.step(2).expect("a step").extinction, first.extinction, "{kind}");
     }
     // The same file, copied to NetCDF-4 by the C library.
     let four = wrf::open(&data("small-netcdf4.nc")).expect("a WRF file");
-    assert_eq!((four.container().kind(), four.n_steps), ("NetCDF-4 (HDF5)", 3));
+    assert_eq!((four.container.kind, four.n_steps), ("NetCDF-4 (HDF5)", 3));
     assert_eq!(four.step(2).expect("a step").extinction, first.extinction);
     assert_eq!(four.times_s, made(&Made::wrf(1, 3)).times_s);
 }
@@ -186,7 +186,8 @@ fn data(name: &str) -> PathBuf {
 #[test]
 fn a_container_lists_its_variables_and_reads_parts() {
     let file = netcdf::from_bytes(Made::wrf(2, 2).bytes()).expect("a file");
-    assert_eq!(file.dimensions().iter().map(|d| d.length).collect::<Vec<_>>(), [2, 19, 4, 3, 5, 6]);
+    let lengths = |name: &str| file.variable(name).expect("a variable").lengths();
+    assert_eq!((lengths("Times"), lengths("PHB")), (vec![2, 19], vec![2, 6, 3, 4]));
     let variable = file.variable("QCLOUD").expect("cloud water");
     assert_eq!(
         (variable.shape_text(), variable.text("units")),

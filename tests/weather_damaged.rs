@@ -12,8 +12,6 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
-use nimbus::error::Error;
-use nimbus::io::weather::wrf;
 use nimbus::model::philox::philox4x32_10;
 use weather_files::{Made, message_of};
 
@@ -146,51 +144,5 @@ fn declared_sizes_are_checked_before_memory_is_allocated() {
                 || message.starts_with("the file is damaged or cut off"),
             "{message}"
         );
-    }
-    let error: Error =
-        wrf::from_container(Box::new(Huge::new()), Path::new("huge.nc")).err().expect("an error");
-    assert_eq!(
-        error.to_string(),
-        "huge.nc: variable P: 60000 x 60000 x 60000 cells, at most 16777216 can be held"
-    );
-}
-
-/// A container that declares what no memory holds.
-struct Huge(Vec<nimbus::io::weather::container::Variable>);
-
-impl Huge {
-    fn new() -> Self {
-        use nimbus::io::weather::container::{Dimension, Variable};
-        let lengths = [1, 60_000, 60_000, 60_000];
-        let dimensions: Vec<Dimension> =
-            lengths.iter().map(|n| Dimension { name: "d".to_owned(), length: *n }).collect();
-        let variable = |name: &&str| Variable {
-            name: (*name).to_owned(),
-            kind: "float".to_owned(),
-            dimensions: dimensions.clone(),
-            attributes: vec![],
-        };
-        Huge(["P", "PB", "T", "PH", "PHB", "QCLOUD"].iter().map(variable).collect())
-    }
-}
-
-impl nimbus::io::weather::container::Container for Huge {
-    fn kind(&self) -> &'static str {
-        "none"
-    }
-    fn dimensions(&self) -> &[nimbus::io::weather::container::Dimension] {
-        &[]
-    }
-    fn variables(&self) -> &[nimbus::io::weather::container::Variable] {
-        &self.0
-    }
-    fn attributes(&self) -> &[nimbus::io::weather::container::Attribute] {
-        &[]
-    }
-    fn read(&self, _: &str, _: &[u64], _: &[u64]) -> Result<Vec<f64>, String> {
-        panic!("nothing is read")
-    }
-    fn read_rows(&self, _: &str) -> Result<Vec<String>, String> {
-        panic!("nothing is read")
     }
 }

@@ -69,7 +69,7 @@ fn missing_variables_are_named() {
         "no times: expected a variable Times, or XTIME in minutes since a date",
     );
     let file = wrf::from_container(
-        Box::new(netcdf::from_bytes(Made::wrf(1, 1).without("Times").bytes()).expect("a file")),
+        netcdf::from_bytes(Made::wrf(1, 1).without("Times").bytes()).expect("a file"),
         Path::new("one.nc"),
     );
     assert_eq!(file.expect("one step needs no time").times_s, None);
@@ -224,7 +224,7 @@ fn wrong_and_unordered_times_are_refused() {
 #[test]
 fn a_missing_step_is_refused() {
     let file = netcdf::from_bytes(good().bytes()).expect("a file");
-    let file = wrf::from_container(Box::new(file), Path::new("two.nc")).expect("a WRF file");
+    let file = wrf::from_container(file, Path::new("two.nc")).expect("a WRF file");
     assert_eq!(
         file.step(2).err().expect("an error").to_string(),
         "step 2: two.nc has steps 0 to 1"

@@ -137,11 +137,11 @@ impl From<CloudStatistics> for CloudRow {
 }
 
 fn about(file: &WeatherFile, name: &str) -> About {
-    let container = file.container();
+    let container = &file.container;
     let projection = file.text("MAP_PROJ_CHAR").filter(|text| !text.is_empty());
     About {
         file: name.to_owned(),
-        container: container.kind(),
+        container: container.kind,
         title: file.text("TITLE").map(plain),
         grid: GridRow {
             nx: file.shape.nx,
@@ -159,7 +159,7 @@ fn about(file: &WeatherFile, name: &str) -> About {
         n_steps: file.n_steps,
         clouds: if file.clouds == Clouds::Given { "given" } else { "diagnosed" },
         notes: file.notes.clone(),
-        variables: container.variables().iter().map(variable_row).collect(),
+        variables: container.variables.iter().map(variable_row).collect(),
     }
 }
 

@@ -41,7 +41,7 @@ pub fn row(scene: &Scene) -> AirRow {
     let (air, parcel, law) = (&scene.air, &scene.air.parcel, scene.air.law);
     let level = air.condensation();
     AirRow {
-        saturation: law.saturation.to_string(),
+        saturation: law.saturation.name().to_owned(),
         ice: law.ice,
         temperature_c: parcel.t_k - T0_K,
         pressure_hpa: 0.01 * parcel.pressure_pa,

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 use serde::Serialize;
 
-use crate::model::basis::{Basis, N_NODES, Sampling, node, node_t};
+use crate::model::basis::{Basis, N_NODES, node, node_t};
 use crate::model::material::{Material, MaterialKey};
 use crate::model::scene::{LightingMode, Scene};
 
@@ -79,12 +79,11 @@ fn of_scene(scene: &Scene) -> Basis {
 /// Returns everything about the scene's basis.
 pub fn report(scene: &Scene) -> BasisReport {
     let basis = of_scene(scene);
-    let name = |s: Sampling| Sampling::NAMES.iter().find(|n| n.1 == s).map_or("", |n| n.0);
     let values = basis.singular_values().iter().enumerate();
     BasisReport {
         asked: basis.n_asked(),
         kept: basis.n_bases(),
-        sampling: name(scene.lighting.sampling),
+        sampling: scene.lighting.sampling.name(),
         exponents: basis.exponents(),
         singular_values: values
             .map(|(i, s)| ValueRow {
@@ -195,6 +194,7 @@ impl NodeTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::basis::Sampling;
     use crate::model::material::Brdf;
 
     fn material(keys: &[(f64, f64, f64)]) -> Material {
@@ -213,9 +213,7 @@ mod tests {
         let (ns, error) =
             worst_of(&basis, &material(&[(0.0, 0.1, 1.0), (1.0, 0.1, 256.0)])).expect("a lobe");
         let of_ends = basis.error(1.0).max(basis.error(256.0));
-        assert!(
-            error >= of_ends && error == basis.error(ns) && error <= basis.greatest_error() * 1.001
-        );
+        assert!(error >= of_ends && error == basis.error(ns) && error <= basis.worst().1 * 1.001);
         // The lobe is gone before the exponent moves.
         let fades = material(&[(0.0, 0.1, 9.0), (1.0, 0.0, 9.0), (2.0, 0.0, 256.0)]);
         assert_eq!(worst_of(&basis, &fades), Some((9.0, basis.error(9.0))));

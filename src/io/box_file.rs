@@ -57,9 +57,7 @@ pub fn format(boxes: &[CloudBox]) -> String {
     let sum: u64 = boxes.iter().map(|b| u64::from(b.n_particles)).sum();
     let mut text = format!("{sum}\n{}\n", boxes.len());
     for b in boxes {
-        let numbers =
-            [b.extent.to_array().as_slice(), &b.center.to_array(), &[b.radius_max]].concat();
-        let numbers: Vec<String> = numbers.into_iter().map(shortest).collect();
+        let numbers: Vec<String> = numbers(b).into_iter().map(shortest).collect();
         text += &format!("{}, {}\n", b.n_particles, numbers.join(", "));
     }
     text
@@ -84,11 +82,15 @@ pub fn write(path: &Path, boxes: &[CloudBox]) -> Result<()> {
 
 /// Returns a message about the first field of a box that [`parse`] would refuse.
 pub fn wrong(b: &CloudBox) -> Option<String> {
-    let numbers = [&b.extent.to_array()[..], &b.center.to_array(), &[b.radius_max]].concat();
-    numbers.into_iter().zip(1..).find_map(|(v, i)| {
+    numbers(b).into_iter().zip(1..).find_map(|(v, i)| {
         let expected = wrong_number(i, v)?;
         Some(format!("{}: expected {expected}, found {}", FIELDS[i], shortest(v)))
     })
+}
+
+/// Returns the fields of a box after the number of particles.
+fn numbers(b: &CloudBox) -> Vec<f64> {
+    [&b.extent.to_array()[..], &b.center.to_array(), &[b.radius_max]].concat()
 }
 
 /// Returns the expected range when `v` is outside the one of field `i`.
@@ -204,8 +206,8 @@ impl<'a> Line<'a> {
         }
         Ok(CloudBox {
             n_particles,
-            extent: DVec3::new(v[1], v[2], v[3]),
-            center: DVec3::new(v[4], v[5], v[6]),
+            extent: DVec3::from_slice(&v[1..]),
+            center: DVec3::from_slice(&v[4..]),
             radius_max: v[7],
         })
     }

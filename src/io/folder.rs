@@ -11,7 +11,7 @@
 use std::fs;
 use std::path::Path;
 
-use super::atomic::{Temporary, in_progress};
+use super::atomic::{Temporary, folder_of, in_progress};
 use crate::error::{Error, Result};
 
 /// Replaces the `files` of a folder with those that `write` puts into the folder it is given.
@@ -129,8 +129,7 @@ fn moved_in(folder: &Path, write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> 
     let Some(name) = folder.file_name() else {
         return Err(Error::io(folder, "expected a folder's name"));
     };
-    let parent =
-        folder.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."));
+    let parent = folder_of(folder);
     let staged = Temporary::folder(parent, &name.to_string_lossy()).map_err(failed)?;
     write(&staged.path)?;
     let mut paths = in_progress();

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::bounds::{LEAST, rounded, wrong_coordinate, wrong_size};
 use super::document::suggest::{did_you_mean, list, shown};
-use super::text_file::{DATA_LIMIT, line_column, read_text};
+use super::text_file::line_column;
 use crate::error::{Error, Place, Result};
 use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS};
 
@@ -24,27 +24,11 @@ const COLOR: std::ops::Range<usize> = 7..10;
 /// Beginning of a particle list, for messages.
 pub const FIRST: &str = "a header x,y,z,sigma,kappa[,r,g,b]";
 
-/// Reads a particle list.
-///
-/// # Errors
-/// When the file cannot be read or holds a fault.
-pub fn read(path: &Path) -> Result<Vec<Particle>> {
-    parse(&read_text(path, DATA_LIMIT, FIRST)?, path)
-}
-
-/// Reads particles from text; `path` is its name in messages.
+/// Reads particles from text, and the line of each; `path` is the text's name in messages.
 ///
 /// # Errors
 /// When the text holds a fault, with line and column.
-pub fn parse(text: &str, path: &Path) -> Result<Vec<Particle>> {
-    Ok(parse_with_lines(text, path)?.0)
-}
-
-/// Reads particles from text, and the line of each.
-///
-/// # Errors
-/// As [`parse`].
-pub fn parse_with_lines(text: &str, path: &Path) -> Result<(Vec<Particle>, Vec<usize>)> {
+pub fn parse(text: &str, path: &Path) -> Result<(Vec<Particle>, Vec<usize>)> {
     let file = File { text, path };
     let mut reader =
         ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
@@ -229,7 +213,7 @@ mod tests {
     use super::*;
 
     fn good(text: &str) -> Vec<Particle> {
-        parse(text, Path::new("p.csv")).unwrap()
+        parse(text, Path::new("p.csv")).unwrap().0
     }
 
     #[test]
@@ -250,7 +234,7 @@ mod tests {
         assert_eq!(plain, [Particle { color: DVec3::ONE, ..expected }]);
         assert_eq!(good("x,y,z,sigma,kappa"), []);
         let text = "\nx,y,z,sigma,kappa\r\n\r\n1,2,3,4,5\n \n1,2,3,4,5\n1,2,3,4,5";
-        assert_eq!(parse_with_lines(text, Path::new("p.csv")).unwrap().1, [4, 6, 7]);
+        assert_eq!(parse(text, Path::new("p.csv")).unwrap().1, [4, 6, 7]);
     }
 
     #[test]

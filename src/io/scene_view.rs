@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 
-use super::atomic::write_atomic;
-use super::document::overrides::is_word;
+use super::atomic::{folder_of, write_atomic};
+use super::document::overrides::{is_word, parts};
 use super::document::tree::Document;
 use super::scene_keys::{DEFAULT_LIGHTS, DEFAULT_MATERIAL, add_defaults};
 use super::text_file::{SCENE_LIMIT, read_text};
@@ -41,14 +41,12 @@ pub fn text_of(from: &Path, to: &Path, overrides: &[String], seed: Option<u32>) 
     let fault = |what: String| Error::io(from, format!("cannot be saved otherwise: {what}"));
     let mut edited: DocumentMut =
         text.parse().map_err(|e: toml_edit::TomlError| fault(e.message().to_owned()))?;
-    let seeds = seed.map_or(vec![], |seed| seeds(&edited, seed));
+    let seeds = seed.map_or(vec![], |seed| seeds(&mut edited, seed));
     for text in overrides.iter().chain(&seeds) {
-        let (path, value) =
-            text.split_once('=').ok_or_else(|| fault(format!("{text} sets nothing")))?;
-        let segments: Vec<&str> = path.split('.').map(str::trim).collect();
-        set(&mut edited, &segments, &value_of(value.trim()).map_err(fault)?).map_err(fault)?;
+        let (segments, value) = parts(text).ok_or_else(|| fault(format!("{text} sets nothing")))?;
+        set(&mut edited, &segments, &value_of(value).map_err(fault)?).map_err(fault)?;
     }
-    let (old, new) = (folder_of(from)?, folder_of(to)?);
+    let (old, new) = (canonical_folder(from)?, canonical_folder(to)?);
     if old != new {
         move_files(&mut edited, &old, &new)?;
     }
@@ -58,14 +56,10 @@ pub fn text_of(from: &Path, to: &Path, overrides: &[String], seed: Option<u32>) 
     Ok(if is_crlf { saved.replace("\r\n", "\n").replace('\n', "\r\n") } else { saved })
 }
 
-fn seeds(document: &DocumentMut, seed: u32) -> Vec<String> {
-    let n = match document.get("cloud") {
-        Some(Item::ArrayOfTables(clouds)) => clouds.len(),
-        Some(Item::Value(Value::Array(clouds))) => clouds.len(),
-        _ => 0,
-    };
+fn seeds(document: &mut DocumentMut, seed: u32) -> Vec<String> {
+    let n = items(document, "cloud").len() as u32;
     // Seeds wrap around, as they do when a scene is read.
-    (0..n as u32).map(|i| format!("cloud.{i}.seed={}", seed.wrapping_add(i))).collect()
+    (0..n).map(|i| format!("cloud.{i}.seed={}", seed.wrapping_add(i))).collect()
 }
 
 fn value_of(text: &str) -> std::result::Result<Value, String> {
@@ -142,9 +136,15 @@ impl<'a> Part<'a> {
 }
 
 fn phases(document: &mut DocumentMut) -> Vec<&mut (dyn TableLike + '_)> {
-    let phases = document.get_mut("phase").and_then(Part::of);
-    let Some(Part::Array(phases)) = phases.map(Part::open) else { return Vec::new() };
-    phases.into_iter().filter_map(Part::into_table).collect()
+    items(document, "phase").into_iter().filter_map(Part::into_table).collect()
+}
+
+/// Returns the items of an array of the document; none where it has no such array.
+fn items<'a>(document: &'a mut DocumentMut, key: &str) -> Vec<Part<'a>> {
+    match document.get_mut(key).and_then(Part::of).map(Part::open) {
+        Some(Part::Array(items)) => items,
+        _ => Vec::new(),
+    }
 }
 
 /// Puts a value at `segments` below a part.
@@ -238,11 +238,8 @@ fn over_phase(
 }
 
 /// Returns the canonical name of the folder that names in a scene at `path` are relative to.
-fn folder_of(path: &Path) -> Result<PathBuf> {
-    let folder = match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
+fn canonical_folder(path: &Path) -> Result<PathBuf> {
+    let folder = folder_of(path);
     folder
         .canonicalize()
         .map_err(|e| Error::io(path, format!("its folder {}: {e}", folder.display())))
@@ -293,7 +290,7 @@ fn each_file(
 fn relative(file: &Path, from: &Path) -> Result<String> {
     let fault = |what: String| Error::io(file, what);
     let name = file.file_name().ok_or_else(|| fault("expected a file name".to_owned()))?;
-    let folder = folder_of(file)?;
+    let folder = canonical_folder(file)?;
     let parts =
         |path: &Path| path.components().map(|c| c.as_os_str().to_owned()).collect::<Vec<_>>();
     let (folder_parts, from_parts) = (parts(&folder), parts(from));

@@ -1,7 +1,7 @@
 //! The air that a scene's clouds form in, and the height where a parcel lifted from the ground
 //! becomes saturated (docs/explanation/model.md §4).
 
-use super::moisture::{Level, Parcel, Saturation, T0_K, Vapour};
+use super::moisture::{Level, Parcel, Vapour};
 
 /// The air of a scene, given by a parcel at the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,14 +17,6 @@ pub struct Air {
 }
 
 impl Air {
-    /// A fair day, with cloud bases about 1000 m up.
-    pub const FAIR: Air = Air {
-        parcel: Parcel { t_k: T0_K + 20.0, pressure_pa: 101_325.0, humidity: 0.6 },
-        law: Vapour { saturation: Saturation::Bolton, ice: false },
-        metres_per_unit: 250.0,
-        ground: 0.0,
-    };
-
     /// Returns the lifted condensation level of air from the ground.
     pub fn condensation(&self) -> Level {
         self.parcel.condensation(self.law)
@@ -49,12 +41,18 @@ impl Air {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::moisture::{Saturation, T0_K};
 
     #[test]
     fn bases_are_in_the_scenes_units() {
         // At 20 °C and 60 % the dew point is 12.0 °C; by the rule of 125 m a kelvin (Espy) the base
         // is 1000 m up.
-        let air = Air { ground: -2.0, ..Air::FAIR };
+        let air = Air {
+            parcel: Parcel { t_k: T0_K + 20.0, pressure_pa: 101_325.0, humidity: 0.6 },
+            law: Vapour { saturation: Saturation::Bolton, ice: false },
+            metres_per_unit: 250.0,
+            ground: -2.0,
+        };
         assert!((air.parcel.dew_point_k(air.law) - T0_K - 12.0).abs() < 0.05);
         assert!((air.condensation().height_m - 1000.0).abs() < 20.0, "{:?}", air.condensation());
         assert!((air.base() - (air.condensation().height_m / 250.0 - 2.0)).abs() < 1e-12);

@@ -7,21 +7,17 @@
 use nalgebra::{DMatrix, SVD};
 
 use super::material::Brdf;
+use super::named::named;
 
-/// Spacing of the lobes that the basis is made from over the range of exponents.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sampling {
-    /// Even spacing in ln n_s, each lobe of unit norm. If the range begins below 1, even in ln(1 +
-    /// n_s).
-    Log,
-    /// Even spacing in n_s, each lobe unscaled, as C has it.
-    Uniform,
-}
-
-impl Sampling {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Sampling); 2] =
-        [("log", Sampling::Log), ("uniform", Sampling::Uniform)];
+named! {
+    /// Spacing of the lobes that the basis is made from over the range of exponents.
+    pub enum Sampling {
+        /// Even spacing in ln n_s, each lobe of unit norm. If the range begins below 1, even in ln(1 +
+        /// n_s).
+        Log = "log",
+        /// Even spacing in n_s, each lobe unscaled, as C has it.
+        Uniform = "uniform",
+    }
 }
 
 /// Greatest number of bases: the diffuse one and 31 of lobes.
@@ -156,12 +152,7 @@ impl Basis {
         norm(&rest, &self.weights) / norm(&lobe, &self.weights)
     }
 
-    /// Returns the greatest [`Basis::error`] over the range.
-    pub fn greatest_error(&self) -> f64 {
-        self.worst().1
-    }
-
-    /// Returns the exponent of the range with the greatest error, and that error.
+    /// Returns the exponent of the range with the greatest [`Basis::error`], and that error.
     pub fn worst(&self) -> (f64, f64) {
         let tried = even(self.exponents, N_PROBES, true).into_iter().map(|ns| (ns, self.error(ns)));
         tried.fold(
@@ -191,17 +182,13 @@ impl Basis {
 /// Returns the lobes that the basis is made from: a single one if the range is a point.
 fn samples(exponents: [f64; 2], sampling: Sampling, weights: &[f64]) -> Vec<Vec<f64>> {
     let n = if exponents[0] == exponents[1] { 1 } else { N_SAMPLES };
-    let mut lobes = match sampling {
-        Sampling::Uniform => {
-            return even_by(exponents, n, |ns| ns, |x| x).into_iter().map(lobe_table).collect();
-        }
-        Sampling::Log => {
-            even(exponents, n, exponents[0] < 1.0).into_iter().map(lobe_table).collect::<Vec<_>>()
-        }
+    let sampled = match sampling {
+        Sampling::Uniform => even_by(exponents, n, |ns| ns, |x| x),
+        Sampling::Log => even(exponents, n, exponents[0] < 1.0),
     };
-    for lobe in &mut lobes {
-        let scale = norm(lobe, weights).recip();
-        lobe.iter_mut().for_each(|value| *value *= scale);
+    let mut lobes: Vec<Vec<f64>> = sampled.into_iter().map(lobe_table).collect();
+    if sampling == Sampling::Log {
+        lobes.iter_mut().for_each(|lobe| normalise(lobe, weights));
     }
     lobes
 }
@@ -269,9 +256,13 @@ fn orthonormalise(vector: &mut [f64], others: &[Vec<f64>], weights: &[f64]) {
             let share = product(vector, other, weights);
             add(vector, -share, other);
         }
-        let scale = norm(vector, weights).recip();
-        vector.iter_mut().for_each(|value| *value *= scale);
+        normalise(vector, weights);
     }
+}
+
+fn normalise(vector: &mut [f64], weights: &[f64]) {
+    let scale = norm(vector, weights).recip();
+    vector.iter_mut().for_each(|value| *value *= scale);
 }
 
 /// Flips signs so that the first of the values of greatest magnitude is positive.

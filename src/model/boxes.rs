@@ -1,8 +1,11 @@
 //! A cloud's macrostructure as boxes: P, Table 1 and P (1)–(11). The two readings of the equations,
 //! the radius law's constants and the bound on rejection, which the GPU and the reference share.
 
-use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI};
+
+use glam::DVec3;
+
+use super::named::named;
 
 /// Attempts before a particle is folded back into its box. P's Fig. 1 sets no bound, but a box as
 /// thin as a needle accepts almost nothing. At an acceptance of 50 %, 64 attempts fail once in 2⁶⁴
@@ -22,19 +25,14 @@ pub struct CloudBox {
     pub radius_max: f64,
 }
 
-/// A reading of P (1)–(11).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
-    /// The equations as printed: positions from [0, L), y from Z, radii that exceed R_max.
-    Printed,
-    /// Corrected: positions from [−L, L), y from Y, radii scaled so that P (9) holds.
-    Centred,
-}
-
-impl Form {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Form); 2] =
-        [("centred", Form::Centred), ("printed", Form::Printed)];
+named! {
+    /// A reading of P (1)–(11).
+    pub enum Form {
+        /// Corrected: positions from [−L, L), y from Y, radii scaled so that P (9) holds.
+        Centred = "centred",
+        /// The equations as printed: positions from [0, L), y from Z, radii that exceed R_max.
+        Printed = "printed",
+    }
 }
 
 /// How a cloud's particles are made from its boxes.

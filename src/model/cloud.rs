@@ -8,6 +8,7 @@ use super::disc::Disc;
 pub use super::group::{Group, max_blob_mass, runs};
 use super::growth::Growth;
 use super::gust::Gust;
+use super::named::named;
 pub use super::particle::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
 use super::texture::Texture;
 
@@ -35,20 +36,15 @@ pub struct Cloud {
     pub seed: u32,
 }
 
-/// Direction that a cloud's facets face where the density around them has none
-/// (docs/explanation/passes.md "facets").
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Facing {
-    /// Away from the cloud's centre; for a single cloud.
-    Outward,
-    /// Upward; for layers of clouds, or many clouds.
-    Up,
-}
-
-impl Facing {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Facing); 2] =
-        [("outward", Facing::Outward), ("up", Facing::Up)];
+named! {
+    /// Direction that a cloud's facets face where the density around them has none
+    /// (docs/explanation/passes.md "facets").
+    pub enum Facing {
+        /// Away from the cloud's centre; for a single cloud.
+        Outward = "outward",
+        /// Upward; for layers of clouds, or many clouds.
+        Up = "up",
+    }
 }
 
 /// Depth below the cloud of the point that upward facets face away from. Their directions differ by
@@ -138,7 +134,7 @@ impl Cloud {
         let at_rest = Group {
             i_cloud,
             i_first,
-            n_particles: 0,
+            n_particles: self.n_particles() as u32,
             center: DVec3::ZERO,
             cloud_center: self.center(),
             facing_from: self.facing_from(),
@@ -197,16 +193,13 @@ fn list_group(list: &[Particle], at_rest: Group) -> Group {
     let low = list.iter().map(|p| p.position).reduce(DVec3::min).unwrap_or(DVec3::ZERO);
     let high = list.iter().map(|p| p.position).reduce(DVec3::max).unwrap_or(DVec3::ZERO);
     Group {
-        n_particles: list.len() as u32,
-        center: 0.5 * (low + high),
-        half_extent: 0.5 * (high - low),
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
         sigma_y_max: list.iter().map(|p| p.sigma * p.aspect).fold(0.0, f64::max),
         sigma_mean: list.iter().map(|p| p.sigma).sum::<f64>() / list.len().max(1) as f64,
         aspects: aspects(list),
         kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
         mass_max: list.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).fold(0.0, f64::max),
-        ..at_rest
+        ..at_rest.between(low, high)
     }
 }
 
@@ -225,30 +218,24 @@ fn aspects(list: &[Particle]) -> [f64; 3] {
 fn disc_group(disc: &Disc, wind: DVec3, at_rest: Group) -> Group {
     let (low, high) = disc.bounds(wind);
     Group {
-        n_particles: disc.n_particles,
-        center: 0.5 * (low + high),
-        half_extent: 0.5 * (high - low),
         sigma_max: disc.sigma_max(),
         sigma_y_max: disc.sigma_max(),
         sigma_mean: disc.sigma_mean(),
         kappa_max: disc.kappa(),
         mass_max: disc.mass_max(),
-        ..at_rest
+        ..at_rest.between(low, high)
     }
 }
 
 fn animated_group(m: &AnimatedParticles, at_rest: Group) -> Group {
     Group {
-        n_particles: m.n_particles,
-        center: 0.5 * (m.low + m.high),
-        half_extent: 0.5 * (m.high - m.low),
         sigma_max: m.sigma_max,
         sigma_y_max: m.sigma_y_max,
         sigma_mean: m.sigma_mean,
         aspects: [MIN_ASPECT, m.aspect_mean, 1.0 / MIN_ASPECT],
         kappa_max: m.kappa_max,
         mass_max: m.mass_max,
-        ..at_rest
+        ..at_rest.between(m.low, m.high)
     }
 }
 

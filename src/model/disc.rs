@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 
+use super::named::named;
 use super::particle::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
 use super::philox::{philox4x32_10, uniform};
 
@@ -19,22 +20,19 @@ const STREAM: u32 = 0x6469_7363;
 /// Time steps of a period: 2³².
 const STEPS: f64 = 4_294_967_296.0;
 
-/// Change of a blob's extinction as it entrains air: κ ∝ σ^−k.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Dilution {
-    /// Droplets are spread out: κ σ³, and with it the mass, is constant.
-    Mass,
-    /// κ σ, and with it the optical depth through the centre, is constant.
-    Depth,
-    /// κ is constant: as much water condenses as air is entrained.
-    None,
+named! {
+    /// Change of a blob's extinction as it entrains air: κ ∝ σ^−k.
+    pub enum Dilution {
+        /// Droplets are spread out: κ σ³, and with it the mass, is constant.
+        Mass = "mass",
+        /// κ σ, and with it the optical depth through the centre, is constant.
+        Depth = "depth",
+        /// κ is constant: as much water condenses as air is entrained.
+        None = "none",
+    }
 }
 
 impl Dilution {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Dilution); 3] =
-        [("mass", Dilution::Mass), ("depth", Dilution::Depth), ("none", Dilution::None)];
-
     /// Returns k.
     pub fn exponent(self) -> u32 {
         match self {

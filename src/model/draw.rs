@@ -2,58 +2,44 @@
 
 use super::count::Count;
 use super::cutoff::Cutoff;
+use super::named::named;
 use super::resolution::Resolution;
 use super::sort_bits::SortBits;
 
-/// Pipeline that draws the particles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DrawPath {
-    /// Quads through the graphics pipeline.
-    Sprites,
-    /// Tiles of pixels in compute.
-    Tiles,
-    /// The faster one at the scene's first frame.
-    Auto,
+named! {
+    /// Pipeline that draws the particles.
+    pub enum DrawPath {
+        /// Quads through the graphics pipeline.
+        Sprites = "sprites",
+        /// Tiles of pixels in compute.
+        Tiles = "tiles",
+        /// The faster one at the scene's first frame.
+        Auto = "auto",
+    }
 }
 
-impl DrawPath {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, DrawPath); 3] =
-        [("sprites", DrawPath::Sprites), ("tiles", DrawPath::Tiles), ("auto", DrawPath::Auto)];
+named! {
+    /// Whether distant particles are drawn from an impostor picture.
+    pub enum Impostors {
+        /// Every particle is drawn in every frame.
+        Off = "off",
+        /// Distant particles are drawn once and reused while the error stays small.
+        On = "on",
+        /// The faster one over the scene's first frames.
+        Auto = "auto",
+    }
 }
 
-/// Whether distant particles are drawn from an impostor picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Impostors {
-    /// Every particle is drawn in every frame.
-    Off,
-    /// Distant particles are drawn once and reused while the error stays small.
-    On,
-    /// The faster one over the scene's first frames.
-    Auto,
-}
-
-impl Impostors {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Impostors); 3] =
-        [("off", Impostors::Off), ("on", Impostors::On), ("auto", Impostors::Auto)];
-}
-
-/// Whether particles that no pixel shows are left out before the sort. The picture is the same.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cull {
-    /// All particles are sorted and drawn.
-    Off,
-    /// Particles that no pixel shows are left out.
-    On,
-    /// The faster one at the scene's first frame.
-    Auto,
-}
-
-impl Cull {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Cull); 3] =
-        [("on", Cull::On), ("off", Cull::Off), ("auto", Cull::Auto)];
+named! {
+    /// Whether particles that no pixel shows are left out before the sort. The picture is the same.
+    pub enum Cull {
+        /// Particles that no pixel shows are left out.
+        On = "on",
+        /// All particles are sorted and drawn.
+        Off = "off",
+        /// The faster one at the scene's first frame.
+        Auto = "auto",
+    }
 }
 
 /// Greatest number of chunks that sprites are drawn in.

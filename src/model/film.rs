@@ -2,25 +2,21 @@
 
 use glam::DVec3;
 
-/// Format of the render target.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FilmFormat {
-    /// Linear values 0 to 1 in steps of 1/255. Every blended layer is clamped to that range.
-    Rgba8,
-    /// Half floats.
-    Rgba16f,
-    /// Single floats.
-    Rgba32f,
+use super::named::named;
+
+named! {
+    /// Format of the render target.
+    pub enum FilmFormat {
+        /// Linear values 0 to 1 in steps of 1/255. Every blended layer is clamped to that range.
+        Rgba8 = "rgba8",
+        /// Half floats.
+        Rgba16f = "rgba16f",
+        /// Single floats.
+        Rgba32f = "rgba32f",
+    }
 }
 
 impl FilmFormat {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, FilmFormat); 3] = [
-        ("rgba8", FilmFormat::Rgba8),
-        ("rgba16f", FilmFormat::Rgba16f),
-        ("rgba32f", FilmFormat::Rgba32f),
-    ];
-
     /// Returns the unit round-off of a stored channel: half of the spacing of numbers in [1, 2).
     /// For rgba8 it is half of a step, whatever the number.
     pub fn unit_roundoff(self) -> f64 {
@@ -32,19 +28,14 @@ impl FilmFormat {
     }
 }
 
-/// Tone map of the display.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ToneMap {
-    /// Khronos PBR Neutral: the identity for displayable values, with highlights compressed.
-    Neutral,
-    /// Clamps to 1.
-    Clip,
-}
-
-impl ToneMap {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, ToneMap); 2] =
-        [("neutral", ToneMap::Neutral), ("clip", ToneMap::Clip)];
+named! {
+    /// Tone map of the display.
+    pub enum ToneMap {
+        /// Khronos PBR Neutral: the identity for displayable values, with highlights compressed.
+        Neutral = "neutral",
+        /// Clamps to 1.
+        Clip = "clip",
+    }
 }
 
 /// Picture size, format and display settings.

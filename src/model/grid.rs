@@ -38,15 +38,9 @@ pub struct GridSpec {
 }
 
 impl GridSpec {
-    /// Returns the grid of cubes that covers `low`..`high`. Its longest axis has `n` cells, margin
-    /// included.
-    pub fn fit(low: DVec3, high: DVec3, n: u32) -> GridSpec {
-        GridSpec::fit_cells(low, high, n, 1.0)
-    }
-
-    /// Returns the grid whose cells are `aspect` times as high as wide. No axis has more than `n`
-    /// cells.
-    pub fn fit_cells(low: DVec3, high: DVec3, n: u32, aspect: f64) -> GridSpec {
+    /// Returns the grid that covers `low`..`high`. Its cells are `aspect` times as high as wide, and
+    /// its longest axis has `n` of them, margin included.
+    pub fn fit(low: DVec3, high: DVec3, n: u32, aspect: f64) -> GridSpec {
         // Bounds without extent still need a cell; there is no other length to take than 1 unit.
         let shape = DVec3::new(1.0, aspect, 1.0);
         let extent = (high - low).max(DVec3::ZERO) / shape;
@@ -93,7 +87,7 @@ mod tests {
     #[test]
     fn the_grid_covers_its_bounds_with_the_margin() {
         let (low, high) = (DVec3::new(-3.0, 0.0, 1.0), DVec3::new(5.0, 2.0, 1.5));
-        let grid = GridSpec::fit(low, high, 64);
+        let grid = GridSpec::fit(low, high, 64, 1.0);
         assert_eq!(grid.n_cells, UVec3::new(64, 19, 8));
         let margin = f64::from(MARGIN_CELLS) * grid.cell - 1e-9;
         assert!(
@@ -104,7 +98,7 @@ mod tests {
 
     #[test]
     fn bounds_without_extent_still_have_cells() {
-        let grid = GridSpec::fit(DVec3::ONE, DVec3::ONE, 16);
+        let grid = GridSpec::fit(DVec3::ONE, DVec3::ONE, 16, 1.0);
         assert!(grid.cell > 0.0 && grid.n_total() > 0 && grid.low.is_finite());
     }
 }

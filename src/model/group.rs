@@ -39,6 +39,11 @@ pub struct Group {
 }
 
 impl Group {
+    /// Returns the group with particles from `low` to `high`.
+    pub(super) fn between(self, low: DVec3, high: DVec3) -> Group {
+        Group { center: 0.5 * (low + high), half_extent: 0.5 * (high - low), ..self }
+    }
+
     /// Returns a bound on σ along every axis.
     pub fn sigma_bounds(&self) -> DVec3 {
         DVec3::new(self.sigma_max, self.sigma_y_max, self.sigma_max)

@@ -1,43 +1,31 @@
 //! Settings of a scene's lighting.
 
 use super::basis::Sampling;
+use super::named::named;
 use super::sums::Sums;
 
-/// Reflections that are computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LightingMode {
-    /// None: particles show their own colours.
-    None,
-    /// The first reflection, C (15).
-    First,
-    /// The first and the second reflection, C (15) and (16).
-    TwoReflection,
+named! {
+    /// Reflections that are computed.
+    pub enum LightingMode {
+        /// None: particles show their own colours.
+        None = "none",
+        /// The first reflection, C (15).
+        First = "first",
+        /// The first and the second reflection, C (15) and (16).
+        TwoReflection = "two-reflection",
+    }
 }
 
-impl LightingMode {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, LightingMode); 3] = [
-        ("none", LightingMode::None),
-        ("first", LightingMode::First),
-        ("two-reflection", LightingMode::TwoReflection),
-    ];
-}
-
-/// Method of the second reflection's gather.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Gather {
-    /// The faster one at the scene's number of facets.
-    Auto,
-    /// Every pair of facets.
-    Exact,
-    /// Clusters of facets, opened where they are large compared with their distance.
-    Tree,
-}
-
-impl Gather {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Gather); 3] =
-        [("auto", Gather::Auto), ("exact", Gather::Exact), ("tree", Gather::Tree)];
+named! {
+    /// Method of the second reflection's gather.
+    pub enum Gather {
+        /// The faster one at the scene's number of facets.
+        Auto = "auto",
+        /// Every pair of facets.
+        Exact = "exact",
+        /// Clusters of facets, opened where they are large compared with their distance.
+        Tree = "tree",
+    }
 }
 
 /// Lighting settings of a scene.

@@ -25,6 +25,7 @@ pub mod light;
 mod lighting;
 pub mod material;
 pub mod moisture;
+mod named;
 pub mod pairings;
 mod particle;
 pub mod philox;

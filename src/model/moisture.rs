@@ -1,7 +1,7 @@
 //! Saturation, relative humidity and the lifted condensation level: C (1)–(3),
 //! docs/explanation/model.md §4.
 
-use std::fmt;
+use super::named::named;
 
 /// Saturation vapour pressure at [`T0_K`], Pa.
 pub const E0_PA: f64 = 611.2;
@@ -18,31 +18,15 @@ pub const LATENT_HEAT_FALL: f64 = 2361.0;
 /// Latent heat of sublimation, J/kg; it hardly depends on temperature.
 const SUBLIMATION_HEAT: f64 = 2.834e6;
 
-/// Law of the saturation vapour pressure E(T) over water.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Saturation {
-    /// Clausius–Clapeyron with constant L, as in C.
-    Constant,
-    /// Clausius–Clapeyron with L(T) = 2.501e6 − 2361 (T − 273.15).
-    Linear,
-    /// Bolton's fit (1980, eq. 10).
-    Bolton,
-}
-
-impl Saturation {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Saturation); 3] = [
-        ("constant", Saturation::Constant),
-        ("linear", Saturation::Linear),
-        ("bolton", Saturation::Bolton),
-    ];
-}
-
-impl fmt::Display for Saturation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name =
-            Saturation::NAMES.iter().find(|(_, of)| of == self).map_or("", |(name, _)| *name);
-        f.write_str(name)
+named! {
+    /// Law of the saturation vapour pressure E(T) over water.
+    pub enum Saturation {
+        /// Clausius–Clapeyron with constant L, as in C.
+        Constant = "constant",
+        /// Clausius–Clapeyron with L(T) = 2.501e6 − 2361 (T − 273.15).
+        Linear = "linear",
+        /// Bolton's fit (1980, eq. 10).
+        Bolton = "bolton",
     }
 }
 
@@ -227,12 +211,6 @@ fn saturated_at(log_humidity: impl Fn(f64) -> f64, t_k: f64) -> f64 {
     }
 }
 
-/// Returns the temperature at the condensation level, K, accurate to 0.1 K from −35 to 35 °C.
-/// *Source*: Bolton (1980), eq. 22.
-pub fn bolton_level_k(t_k: f64, humidity: f64) -> f64 {
-    1.0 / (1.0 / (t_k - 55.0) - humidity.ln() / 2840.0) + 55.0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -240,6 +218,12 @@ mod tests {
     const CONSTANT: Vapour = Vapour { saturation: Saturation::Constant, ice: false };
     const LINEAR: Vapour = Vapour { saturation: Saturation::Linear, ice: false };
     const BOLTON: Vapour = Vapour { saturation: Saturation::Bolton, ice: false };
+
+    /// Returns the temperature at the condensation level, K, accurate to 0.1 K from −35 to 35 °C.
+    /// *Source*: Bolton (1980), eq. 22.
+    fn bolton_level_k(t_k: f64, humidity: f64) -> f64 {
+        1.0 / (1.0 / (t_k - 55.0) - humidity.ln() / 2840.0) + 55.0
+    }
 
     #[test]
     fn saturation_by_hand() {

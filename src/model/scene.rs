@@ -14,9 +14,17 @@ use super::grid::GridSpec;
 use super::light::Light;
 pub use super::lighting::{Gather, Lighting, LightingMode, MAX_PAIR_LEVELS, Pairs};
 use super::material::Material;
+use super::named::named;
 use super::resolution::LowResLayout;
 use super::surface::Surface;
 use super::terrain::Terrain;
+
+/// Least and greatest coordinates of a box, world units.
+pub type Bounds = (DVec3, DVec3);
+
+fn union(a: Bounds, b: Bounds) -> Bounds {
+    (a.0.min(b.0), a.1.max(b.1))
+}
 
 /// A scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,39 +81,24 @@ impl Time {
     }
 }
 
-/// Threading of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Threading {
-    /// Game and render steps alternate on one thread.
-    Serial,
-    /// The game thread works ahead of the render thread.
-    Parallel,
-}
-
-impl Threading {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Threading); 2] =
-        [("serial", Threading::Serial), ("parallel", Threading::Parallel)];
-
-    /// Returns the name in scene files.
-    pub fn name(self) -> &'static str {
-        Self::NAMES[self as usize].0
+named! {
+    /// Threading of a run.
+    pub enum Threading {
+        /// Game and render steps alternate on one thread.
+        Serial = "serial",
+        /// The game thread works ahead of the render thread.
+        Parallel = "parallel",
     }
 }
 
-/// Processor that moves the particles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Simulate {
-    /// The GPU; the game thread moves only their groups.
-    Gpu,
-    /// The game thread, which uploads all positions.
-    Cpu,
-}
-
-impl Simulate {
-    /// Names in scene files.
-    pub const NAMES: [(&'static str, Simulate); 2] =
-        [("gpu", Simulate::Gpu), ("cpu", Simulate::Cpu)];
+named! {
+    /// Processor that moves the particles.
+    pub enum Simulate {
+        /// The GPU; the game thread moves only their groups.
+        Gpu = "gpu",
+        /// The game thread, which uploads all positions.
+        Cpu = "cpu",
+    }
 }
 
 /// Threads of a run.
@@ -172,7 +165,7 @@ impl Scene {
 
     /// Returns the density grid over ± `half` about the lighting origin.
     pub fn density_grid(&self, groups: &[Group], half: DVec3) -> GridSpec {
-        GridSpec::fit_cells(-half, half, self.lighting.grid, Scene::cell_aspect(groups, 2.0 * half))
+        GridSpec::fit(-half, half, self.lighting.grid, Scene::cell_aspect(groups, 2.0 * half))
     }
 
     /// Returns the cells' heights over their widths: 1 if all blobs of `groups` are balls.
@@ -268,54 +261,36 @@ impl Scene {
         &self.materials[self.region_i_material(i)]
     }
 
-    /// Returns bounds (low, high) of the clouds as [`Scene::bounds`]; without particles, of
+    /// Returns bounds of the clouds as [`Scene::bounds`]; without particles, of
     /// surfaces and ground.
-    pub fn lighting_bounds(
-        &self,
-        groups: &[Group],
-        time_s: f64,
-        n_sigma: f64,
-    ) -> Option<(DVec3, DVec3)> {
-        let of_solids = || self.solid_bounds().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        self.bounds(groups, time_s, n_sigma).or_else(of_solids)
+    pub fn lighting_bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<Bounds> {
+        self.bounds(groups, time_s, n_sigma).or_else(|| self.solid_bounds().reduce(union))
     }
 
-    fn solid_bounds(&self) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
+    fn solid_bounds(&self) -> impl Iterator<Item = Bounds> + '_ {
         self.surfaces.iter().map(Surface::bounds).chain(self.terrains.iter().map(Terrain::bounds))
     }
 
-    /// Returns bounds (low, high) of every region at `time_s`. A cloud without particles has its
-    /// origin as both.
-    pub fn region_bounds(
-        &self,
-        groups: &[Group],
-        time_s: f64,
-        n_sigma: f64,
-    ) -> Vec<(DVec3, DVec3)> {
-        let mut of_clouds: Vec<_> =
-            self.clouds.iter().map(|c| (c.origin_at(time_s), None)).collect();
-        for group in groups.iter().filter(|g| g.n_particles > 0) {
-            let (low, high) = self.group_bounds(group, time_s, n_sigma);
-            let of_cloud = &mut of_clouds[group.i_cloud].1;
-            let (l, h) = of_cloud.unwrap_or((low, high));
-            *of_cloud = Some((low.min(l), high.max(h)));
-        }
-        let of_clouds =
-            of_clouds.into_iter().map(|(origin, bounds)| bounds.unwrap_or((origin, origin)));
-        self.solid_bounds().chain(of_clouds).collect()
+    /// Returns bounds of every region at `time_s`; `groups` are those of [`Scene::groups`]. A cloud
+    /// without particles has its origin as both.
+    pub fn region_bounds(&self, mut groups: &[Group], time_s: f64, n_sigma: f64) -> Vec<Bounds> {
+        let of_cloud = |cloud: &Cloud| {
+            let (own, others) = groups.split_at(cloud.n_groups() as usize);
+            groups = others;
+            let origin = cloud.origin_at(time_s);
+            self.bounds(own, time_s, n_sigma).unwrap_or((origin, origin))
+        };
+        self.solid_bounds().chain(self.clouds.iter().map(of_cloud)).collect()
     }
 
-    /// Returns bounds (low, high) of all particles at `time_s`, blobs included out to `n_sigma` σ;
-    /// `None` without particles.
-    pub fn bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<(DVec3, DVec3)> {
-        let boxes = groups
-            .iter()
-            .filter(|g| g.n_particles > 0)
-            .map(|g| self.group_bounds(g, time_s, n_sigma));
-        boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    /// Returns bounds of all particles at `time_s`, blobs included out to `n_sigma` σ; `None`
+    /// without particles.
+    pub fn bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<Bounds> {
+        let with_particles = groups.iter().filter(|g| g.n_particles > 0);
+        with_particles.map(|g| self.group_bounds(g, time_s, n_sigma)).reduce(union)
     }
 
-    fn group_bounds(&self, group: &Group, time_s: f64, n_sigma: f64) -> (DVec3, DVec3) {
+    fn group_bounds(&self, group: &Group, time_s: f64, n_sigma: f64) -> Bounds {
         let cloud = &self.clouds[group.i_cloud];
         let group = group.grown(cloud.growth.at(time_s));
         let center = cloud.origin_at(time_s) + group.center;

@@ -7,7 +7,6 @@
 
 pub mod adaptive;
 pub mod clip;
-pub mod mean;
 pub mod paths;
 mod resolve;
 mod scene;

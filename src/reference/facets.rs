@@ -55,15 +55,15 @@ pub fn directions() -> [(DVec3, f64); 14] {
     })
 }
 
-/// Returns G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of ρ smoothed by a Gaussian of
-/// 2σ, and S = Σ w ρ(p + 2√5 σ A d). A = diag(1, a, 1) gives the sphere the blob's shape, so that
-/// the gradient is one in the space where the blob is a ball (§14).
-pub fn gradient(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
-    gradient_of(|x| sample(spec, cells, x), p, sigma, aspect)
-}
-
-/// Returns G and S of any density ρ.
-fn gradient_of(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
+/// Returns G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of the density ρ smoothed by a
+/// Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ A d). A = diag(1, a, 1) gives the sphere the blob's
+/// shape, so that the gradient is one in the space where the blob is a ball (§14).
+pub(super) fn gradient(
+    density: impl Fn(DVec3) -> f64,
+    p: DVec3,
+    sigma: f64,
+    aspect: f64,
+) -> (DVec3, f64) {
     let axes = DVec3::new(1.0, aspect, 1.0);
     directions().iter().fold((DVec3::ZERO, 0.0), |(g, s), &(d, w)| {
         let density = w * density(p + GRADIENT_RADIUS_SIGMA * sigma * axes * d);
@@ -71,19 +71,8 @@ fn gradient_of(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64, aspect: f64
     })
 }
 
-/// Returns the unit normal and the conditioning q of a blob of shape (σ, aspect) at `p` in a cloud
-/// about `center`.
-pub fn normal(
-    spec: &GridSpec,
-    cells: &[f64],
-    p: DVec3,
-    [sigma, aspect]: [f64; 2],
-    center: DVec3,
-) -> (DVec3, f64) {
-    blended_normal(gradient(spec, cells, p, sigma, aspect), aspect, p, center)
-}
-
-/// Returns the unit normal from the gradient G and the sum S, and q.
+/// Returns the unit normal of a blob at `p` in a cloud about `center`, from the gradient G and the
+/// sum S, and the conditioning q.
 fn blended_normal((g, s): (DVec3, f64), aspect: f64, p: DVec3, center: DVec3) -> (DVec3, f64) {
     let away = (p - center).try_normalize().unwrap_or(DVec3::Y);
     let q = if s > 0.0 { g.length() / s } else { 0.0 };
@@ -171,7 +160,7 @@ pub(super) fn on_shell(
     center: DVec3,
     density: impl Fn(DVec3) -> f64,
 ) -> Facet {
-    let gradient = gradient_of(density, p, shape[0], shape[1]);
+    let gradient = gradient(density, p, shape[0], shape[1]);
     let (normal, conditioning) = blended_normal(gradient, shape[1], p, center);
     Facet { position: shell(p, shape, normal), normal, area, region, conditioning }
 }
@@ -195,6 +184,11 @@ mod tests {
 
     fn ball() -> Vec<f64> {
         deposit(&SPEC, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 }])
+    }
+
+    /// The unit normal and q of a blob of shape (σ, aspect) at `p` in a cloud about `center`.
+    fn normal(cells: &[f64], p: DVec3, [sigma, aspect]: [f64; 2], center: DVec3) -> (DVec3, f64) {
+        blended_normal(gradient(|x| sample(&SPEC, cells, x), p, sigma, aspect), aspect, p, center)
     }
 
     #[test]
@@ -222,7 +216,7 @@ mod tests {
         let at = |i: usize, axis: u32| -4.9 + 0.2 * (i / 50usize.pow(axis) % 50) as f64;
         let cells: Vec<f64> = (0..125_000).map(|i| 3.0 + 0.2 * at(i, 0) - 0.1 * at(i, 2)).collect();
         let p = DVec3::new(0.33, -0.71, 0.52);
-        let (g, s) = gradient(&SPEC, &cells, p, 0.6, 1.0);
+        let (g, s) = gradient(|x| sample(&SPEC, &cells, x), p, 0.6, 1.0);
         let r = 2.0 * 5f64.sqrt() * 0.6;
         assert!((g - r / 3.0 * DVec3::new(0.2, 0.0, -0.1)).length() < 1e-13);
         assert!((s - (3.0 + 0.066 - 0.052)).abs() < 1e-13);
@@ -233,7 +227,7 @@ mod tests {
         let cells = ball();
         for p in [DVec3::new(1.0, 0.5, 0.3), DVec3::new(-0.7, 0.2, 1.5), DVec3::new(0.0, -2.0, 0.0)]
         {
-            let (n, q) = normal(&SPEC, &cells, p, [0.4, 1.0], DVec3::new(3.0, 3.0, -3.0));
+            let (n, q) = normal(&cells, p, [0.4, 1.0], DVec3::new(3.0, 3.0, -3.0));
             // q ≈ (2σ/3)|p|/1.2² > 0.1, so the gradient alone decides. Its direction errs by the
             // deposit's cut at 3σ (a cube: 0.27 %) and by cells of 0.2: below one degree.
             assert!(
@@ -272,7 +266,7 @@ mod tests {
     fn normals_blend_without_a_jump() {
         let cells = ball();
         let at = |k: i32| {
-            normal(&SPEC, &cells, DVec3::X * 1e-3 * f64::from(k), [0.3, 1.0], DVec3::NEG_Y * 20.0)
+            normal(&cells, DVec3::X * 1e-3 * f64::from(k), [0.3, 1.0], DVec3::NEG_Y * 20.0)
         };
         // q grows by some (2√5·0.3/3)/1.2² = 0.31 a unit, t by at most 1.5/0.08 times that, and the
         // normal turns from +y to ±x by at most twice dt: 1.2e-2 a step of 1e-3.

@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::DVec3;
 
 use crate::model::boxes::{BoxLaw, CloudBox, Form, MAX_ATTEMPTS, radius_factor, radius_shape};
-use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
+use crate::model::cloud::{SIGMA_PER_RADIUS, box_kappa};
 use crate::model::philox::{philox4x32_10, uniform};
 
 /// A particle relative to its group.
@@ -32,6 +32,22 @@ pub struct Generated {
     pub folded: bool,
     /// Least [`decision_margin`] over the attempts; infinite without attempts.
     pub margin: f64,
+}
+
+impl Generated {
+    /// A particle that no box generates, `position` relative to its group's centre.
+    pub(super) fn given(position: DVec3, sigma: f64, aspect: f64, kappa: f64) -> Generated {
+        Generated {
+            position,
+            radius: sigma / SIGMA_PER_RADIUS,
+            sigma,
+            aspect,
+            kappa,
+            n_attempts: 0,
+            folded: false,
+            margin: f64::INFINITY,
+        }
+    }
 }
 
 /// Acceptance counts over some particles, model.md §1.
@@ -128,24 +144,19 @@ pub fn generate_particle(
     i_particle: u32,
 ) -> Generated {
     let half = 0.5 * b.extent;
-    let mut margin = f64::INFINITY;
-    let mut last = (DVec3::ZERO, 0.0);
-    let mut accepted_at = None;
-    for attempt in 0..MAX_ATTEMPTS {
-        let [u1, u2, u3, u4] = uniforms(seed, i_box, i_particle, attempt);
-        let v = offset(b.extent, law.form, [u1, u2, u3]);
-        margin = margin.min(decision_margin(v, half));
-        last = (v, u4);
-        if is_inside(v, half) {
-            accepted_at = Some(attempt);
-            break;
-        }
+    let (mut position, mut u4) = (DVec3::ZERO, 0.0);
+    let (mut n_attempts, mut folded, mut margin) = (0, true, f64::INFINITY);
+    while folded && n_attempts < MAX_ATTEMPTS {
+        let [u1, u2, u3, u] = uniforms(seed, i_box, i_particle, n_attempts);
+        (position, u4) = (offset(b.extent, law.form, [u1, u2, u3]), u);
+        margin = margin.min(decision_margin(position, half));
+        folded = !is_inside(position, half);
+        n_attempts += 1;
     }
-    let (v, u4) = last;
-    let position = match accepted_at {
-        Some(_) => v,
-        None => DVec3::new(fold(v.x, half.x), fold(v.y, half.y), fold(v.z, half.z)),
-    };
+    if folded {
+        let along = |i: usize| fold(position[i], half[i]);
+        position = DVec3::new(along(0), along(1), along(2));
+    }
     let radius = radius(law.form, b.radius_max, u4);
     Generated {
         position,
@@ -153,8 +164,8 @@ pub fn generate_particle(
         sigma: radius * law.radius_scale * SIGMA_PER_RADIUS,
         aspect: 1.0,
         kappa: box_kappa(b, law),
-        n_attempts: accepted_at.map_or(MAX_ATTEMPTS, |a| a + 1),
-        folded: accepted_at.is_none(),
+        n_attempts,
+        folded,
         margin,
     }
 }
@@ -162,18 +173,4 @@ pub fn generate_particle(
 /// Generates all particles of a box.
 pub fn generate_box(b: &CloudBox, i_box: u32, seed: u32, law: &BoxLaw) -> Vec<Generated> {
     (0..b.n_particles).map(|i| generate_particle(b, i_box, seed, law, i)).collect()
-}
-
-/// Returns a particle of a list relative to its group's origin.
-pub(super) fn given(p: &Particle, group: Option<&Group>) -> Generated {
-    Generated {
-        position: p.position - group.map_or(DVec3::ZERO, |g| g.center),
-        radius: p.sigma / SIGMA_PER_RADIUS,
-        sigma: p.sigma,
-        aspect: p.aspect,
-        kappa: p.kappa,
-        n_attempts: 0,
-        folded: false,
-        margin: f64::INFINITY,
-    }
 }

@@ -13,13 +13,18 @@ use libm::{erf, erfc};
 use super::Blob;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 
+/// Returns the blobs that have extinction.
+fn dense(blobs: &[Blob]) -> impl Iterator<Item = &Blob> {
+    blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0)
+}
+
 /// Returns the density of every cell. A blob outside the grid, or with σ = 0 or κ = 0, deposits
 /// nothing.
 pub fn deposit(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
     let n = spec.n_cells.as_usizevec3();
     let mut cells = vec![0.0; n.x * n.y * n.z];
     let (edges, volume) = (spec.edges(), spec.cell_volume());
-    for blob in blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0) {
+    for blob in dense(blobs) {
         let sigma = blob.sigma * blob.axes();
         let axis = |i: usize| axis_weights(blob.position[i], sigma[i], spec.low[i], edges[i], n[i]);
         let ((x0, wx), (y0, wy), (z0, wz)) = (axis(0), axis(1), axis(2));
@@ -47,7 +52,7 @@ pub fn n_deposited(spec: &GridSpec, blobs: &[Blob]) -> f64 {
         };
         axis(0) as f64 * axis(1) as f64 * axis(2) as f64
     };
-    blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
+    dense(blobs).map(of_blob).sum()
 }
 
 /// Returns the first to last cell of one axis within the cut; `None` if there is none.
@@ -113,7 +118,7 @@ pub fn density(blobs: &[Blob], x: DVec3) -> f64 {
         let r2 = blob.whiten(x - blob.position).length_squared() / (blob.sigma * blob.sigma);
         if r2 > UNSEEN { 0.0 } else { blob.kappa * (-0.5 * r2).exp() }
     };
-    blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
+    dense(blobs).map(of_blob).sum()
 }
 
 /// (Distance/σ)² beyond which a blob is skipped: e^{−50} of its peak, which even summed over 10⁶
@@ -138,7 +143,7 @@ pub fn optical_depth_exact(blobs: &[Blob], p: DVec3, d: DVec3, length: f64) -> f
             (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
         line.tau() * normal_share(-foot / sigma, (length - foot) / sigma)
     };
-    blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
+    dense(blobs).map(of_blob).sum()
 }
 
 #[cfg(test)]
@@ -342,14 +347,14 @@ mod tests {
 
     #[test]
     fn far_from_the_grid_there_is_no_density() {
-        let spec = GridSpec::fit(DVec3::splat(-3.0), DVec3::splat(3.0), 32);
+        let spec = GridSpec::fit(DVec3::splat(-3.0), DVec3::splat(3.0), 32, 1.0);
         let cells =
             deposit(&spec, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.0, kappa: 1.0 }]);
         let density = cells.iter().sum::<f64>() * spec.cell.powi(3);
         assert!((density / SQRT_TAU.powi(3) - 1.0).abs() < 1e-12);
         assert_eq!(sample(&spec, &cells, DVec3::splat(9.0)), 0.0);
         // Along the grid's diagonal density falls from the centre, so that no facet turns inward.
-        let q = facets::gradient(&spec, &cells, DVec3::ONE, 0.5, 1.0).0;
+        let q = facets::gradient(|x| sample(&spec, &cells, x), DVec3::ONE, 0.5, 1.0).0;
         assert!(q.x < 0.0 && (q.x - q.y).abs() < 1e-12);
     }
 }

@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::generate::{self, Generated};
-use crate::model::cloud::{Cloud, CloudSource, SIGMA_PER_RADIUS};
+use crate::model::cloud::{Cloud, CloudSource, Particle, SIGMA_PER_RADIUS};
 use crate::model::disc::{Dilution, Disc};
 use crate::model::philox::{philox4x32_10, uniform};
 
@@ -114,34 +114,23 @@ fn smoothstep(v: f64) -> f64 {
 /// animations depend on the time. An animation that cannot be read has no particles; callers read
 /// it before.
 pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
-    let groups = cloud.groups(0, 0);
-    let disc = match &cloud.source {
-        CloudSource::Disc(disc) => disc,
-        CloudSource::Animated(m) => {
-            let particles = m.animation.at(time_s).unwrap_or_default();
-            return particles.iter().map(|p| generate::given(p, groups.first())).collect();
-        }
+    let center = cloud.groups(0, 0).first().map_or(DVec3::ZERO, |g| g.center);
+    let given = |p: &Particle| Generated::given(p.position - center, p.sigma, p.aspect, p.kappa);
+    match &cloud.source {
         CloudSource::Boxes { boxes, law } => {
             let of = |(b, i): (_, u32)| generate::generate_box(b, i, cloud.seed, law);
-            return boxes.iter().zip(0..).flat_map(of).collect();
+            boxes.iter().zip(0..).flat_map(of).collect()
         }
-        CloudSource::Particles(list) => {
-            return list.iter().map(|p| generate::given(p, groups.first())).collect();
+        CloudSource::Particles(list) => list.iter().map(given).collect(),
+        CloudSource::Animated(m) => {
+            m.animation.at(time_s).unwrap_or_default().iter().map(given).collect()
         }
-    };
-    let center = groups.first().map_or(DVec3::ZERO, |g| g.center);
-    let of = |i| {
-        let p = alive(disc, cloud.seed, cloud.wind, i, time_s);
-        Generated {
-            aspect: 1.0,
-            position: p.position - center,
-            radius: p.sigmas[1] / SIGMA_PER_RADIUS,
-            sigma: p.sigmas[1],
-            kappa: p.kappa,
-            n_attempts: 0,
-            folded: false,
-            margin: f64::INFINITY,
+        CloudSource::Disc(disc) => {
+            let of = |i| {
+                let p = alive(disc, cloud.seed, cloud.wind, i, time_s);
+                Generated::given(p.position - center, p.sigmas[1], 1.0, p.kappa)
+            };
+            (0..disc.n_particles).map(of).collect()
         }
-    };
-    (0..disc.n_particles).map(of).collect()
+    }
 }

@@ -37,7 +37,6 @@ pub mod threshold;
 pub mod tiles;
 pub mod transmit;
 pub mod upsample;
-pub mod upsample_bound;
 pub mod view;
 pub mod volume;
 

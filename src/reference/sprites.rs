@@ -51,23 +51,12 @@ pub fn render_over(
     sprites: &Sprites<'_>,
     rounding: &Rounding,
 ) -> Bounded {
-    let mut pixels: Vec<Layered> = opaque.iter().map(Layered::from).collect();
-    let width = view.width as usize;
-    let n_rows = view.height.div_ceil(N_THREADS).max(1);
-    std::thread::scope(|scope| {
-        for (band, i) in pixels.chunks_mut((width * n_rows as usize).max(1)).zip(0u32..) {
-            scope.spawn(move || {
-                for &j in sprites.order {
-                    draw(view, sprites, j as usize, (&mut *band, i * n_rows), rounding);
-                }
-            });
-        }
-    });
+    let (width, height) = (view.width, view.height);
+    let at: Vec<[u32; 2]> = (0..width * height).map(|i| [i % width, i / width]).collect();
+    let whole = Raster { first: [0, 0], n_columns: width, cell: 1, at: &at };
+    let pixels = layered(view, &whole, opaque, sprites, rounding, &|_| ());
     pixels.iter().map(|p| (p.value, p.bound)).unzip()
 }
-
-/// Number of bands of rows that are drawn in parallel. The result does not depend on it.
-const N_THREADS: u32 = 2;
 
 /// Pixels of a part of a picture, one in each cell of a grid.
 #[derive(Debug, Clone, Copy)]
@@ -91,8 +80,19 @@ pub fn render_at(
     sprites: &Sprites<'_>,
     on_row: &(dyn Fn(usize) + Sync),
 ) -> Vec<[f64; 4]> {
-    let none = Rounding::NONE;
-    let footprint = |&j: &u32| Some((j as usize, sprites.footprint(view, j as usize, &none)?));
+    let pixels = layered(view, raster, opaque, sprites, &Rounding::NONE, on_row);
+    pixels.into_iter().map(|p| p.value).collect()
+}
+
+fn layered(
+    view: &View,
+    raster: &Raster<'_>,
+    opaque: &[OpaquePixel],
+    sprites: &Sprites<'_>,
+    rounding: &Rounding,
+    on_row: &(dyn Fn(usize) + Sync),
+) -> Vec<Layered> {
+    let footprint = |&j: &u32| Some((j as usize, sprites.footprint(view, j as usize, rounding)?));
     let footprints: Vec<(usize, Footprint)> = sprites.order.iter().filter_map(footprint).collect();
     let Raster { first: [left, top], cell, at, .. } = *raster;
     let n_columns = raster.n_columns as usize;
@@ -109,32 +109,14 @@ pub fn render_at(
                 if (f.columns.0..f.columns.1).contains(&column)
                     && (f.rows.0..f.rows.1).contains(&row)
                 {
-                    sprites.lay(view, *j, f, [column, row], pixel, &none);
+                    sprites.lay(view, *j, f, [column, row], pixel, rounding);
                 }
             }
         }
         on_row(n_rows);
         pixels
     });
-    rows.into_iter().flatten().map(|p| p.value).collect()
-}
-
-/// Draws blob `j` over the rows that `band` holds, from `first_row` on.
-fn draw(
-    view: &View,
-    sprites: &Sprites<'_>,
-    j: usize,
-    (band, first_row): (&mut [Layered], u32),
-    r: &Rounding,
-) {
-    let Some(footprint) = sprites.footprint(view, j, r) else { return };
-    let n_rows = (band.len() / view.width as usize) as u32;
-    for row in footprint.rows.0.max(first_row)..footprint.rows.1.min(first_row + n_rows) {
-        for column in footprint.columns.0..footprint.columns.1 {
-            let pixel = &mut band[((row - first_row) * view.width + column) as usize];
-            sprites.lay(view, j, &footprint, [column, row], pixel, r);
-        }
-    }
+    rows.concat()
 }
 
 /// A blob as a view sees it.

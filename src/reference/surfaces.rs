@@ -63,14 +63,8 @@ pub fn radiance(surface: &Surface, facets: &[DVec3], hit: &Hit) -> DVec3 {
     row(j0).lerp(row(j1), b)
 }
 
-/// Returns the picture of `surfaces`. `facets` is the radiance of all their facets, surface after
-/// surface.
-pub fn render(view: &View, surfaces: &[Surface], facets: &[DVec3]) -> Vec<OpaquePixel> {
-    let rows = (0..view.height).flat_map(|j| (0..view.width).map(move |i| [i, j]));
-    render_at(view, surfaces, facets, rows)
-}
-
-/// Returns the picture at some pixels, [column, row].
+/// Returns the picture of `surfaces` at some pixels, [column, row]. `facets` is the radiance of all
+/// their facets, surface after surface.
 pub fn render_at(
     view: &View,
     surfaces: &[Surface],
@@ -118,6 +112,11 @@ mod tests {
     /// At depth `z`, facing the eye: u right, v up, 2 wide and high.
     fn wall(z: f64, subdivide: [u32; 2]) -> Surface {
         Surface { center: DVec3::NEG_Z * z, u: DVec3::X, v: DVec3::Y, i_material: 0, subdivide }
+    }
+
+    fn render(surfaces: &[Surface], facets: &[DVec3]) -> Vec<OpaquePixel> {
+        let rows = (0..VIEW.height).flat_map(|j| (0..VIEW.width).map(move |i| [i, j]));
+        render_at(&VIEW, surfaces, facets, rows)
     }
 
     #[test]
@@ -187,7 +186,7 @@ mod tests {
         // middle one only.
         let colors = [DVec3::X, DVec3::Y, DVec3::Z];
         let see = |walls: &[Surface]| -> Vec<[f64; 4]> {
-            render(&VIEW, walls, &colors[..walls.len()]).iter().map(|p| p.color).collect()
+            render(walls, &colors[..walls.len()]).iter().map(|p| p.color).collect()
         };
         let (red, green, blue) = ([1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0]);
         let (near, far) = (wall(1.2, [1, 1]), wall(2.0, [1, 1]));
@@ -196,7 +195,7 @@ mod tests {
         assert_eq!(see(&[near, far, near]), [blue; 9]);
         let middle = see(&[far]);
         assert!(middle[4] == red && middle.iter().filter(|p| **p == [0.0; 4]).count() == 8);
-        let depths: Vec<f64> = render(&VIEW, &[far], &colors).iter().map(|p| p.depth).collect();
+        let depths: Vec<f64> = render(&[far], &colors).iter().map(|p| p.depth).collect();
         assert!(depths[4] == 2.0 && depths[0] == f64::INFINITY);
         // The back is black, and it hides.
         let back = Surface { u: DVec3::NEG_X, ..near };

@@ -101,18 +101,6 @@ impl Triangle {
         self.hit(view, ray).map(|hit| self.shown(&hit))
     }
 
-    /// Returns the place shown in a pixel that the rasteriser gives to the triangle although the
-    /// ray may pass it: where the ray meets the plane, clamped to the triangle's extent.
-    pub fn given(&self, view: &View, ray: DVec3) -> Option<Hit> {
-        let hit = self.meet(view.pose.position, ray)?;
-        let depths =
-            self.points().map(|p| (p - view.pose.position).dot(view.pose.forward).max(view.near));
-        let least = depths.into_iter().fold(f64::INFINITY, f64::min);
-        let depth = hit.depth.clamp(least, depths.into_iter().fold(least, f64::max));
-        let s = hit.s.clamp(0.0, 1.0);
-        Some(Hit { depth, s, t: hit.t.clamp(0.0, 1.0 - s), ..hit })
-    }
-
     /// Returns the pixel that shows the triangle at `hit`.
     pub fn shown(&self, hit: &Hit) -> OpaquePixel {
         let color = self.radiance(hit).extend(1.0).to_array();

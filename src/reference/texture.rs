@@ -133,29 +133,8 @@ impl Pool {
         Pool(fields)
     }
 
-    /// Returns the pool as shaders read it: for every field, level and texel the four corners, n_l
-    /// in the first two words, n_{l+1} in the others, each in 16 bits.
-    pub fn words(&self) -> Vec<[u32; 4]> {
-        let quanta = |n: f64| (n / QUANTUM).clamp(-MOST_QUANTA, MOST_QUANTA).round() as i16 as u16;
-        let both = |a: f64, b: f64| u32::from(quanta(a)) | u32::from(quanta(b)) << 16;
-        let texel = |level: &Level, i: usize, j: usize| {
-            let of = |n: &[f64]| {
-                let at = |i: usize, j: usize| n[i % level.side + level.side * (j % level.side)];
-                [both(at(i, j), at(i + 1, j)), both(at(i, j + 1), at(i + 1, j + 1))]
-            };
-            let ([a, b], [c, d]) = (of(&level.own), of(&level.above));
-            [a, b, c, d]
-        };
-        let of_level = |level: &Level| -> Vec<[u32; 4]> {
-            (0..level.side)
-                .flat_map(|j| (0..level.side).map(move |i| (i, j)))
-                .map(|(i, j)| texel(level, i, j))
-                .collect()
-        };
-        self.0.iter().flatten().flat_map(of_level).collect()
-    }
-
-    /// Returns the pool with every n rounded as in [`Pool::words`].
+    /// Returns the pool with every n rounded to the 16 bits that shaders read, quanta of
+    /// [`QUANTUM`].
     pub fn rounded(&self) -> Pool {
         let round = |n: &f64| QUANTUM * (n / QUANTUM).clamp(-MOST_QUANTA, MOST_QUANTA).round();
         let all = |n: &[f64]| -> Vec<f64> { n.iter().map(round).collect() };

@@ -23,11 +23,6 @@ impl Omitted {
         -libm::expm1(-self.tau)
     }
 
-    /// Returns the same bound from the number of layers alone, for blobs without texture.
-    pub fn share_of_layers(&self, threshold: f64) -> f64 {
-        -libm::expm1(-f64::from(self.n_layers) * threshold)
-    }
-
     /// Returns the greater number of layers and the greater optical depth of two pixels.
     pub fn most(self, other: Omitted) -> Omitted {
         Omitted { n_layers: self.n_layers.max(other.n_layers), tau: self.tau.max(other.tau) }
@@ -120,7 +115,7 @@ mod tests {
                 && (middle.tau - 0.09).abs() < 1e-15
         );
         assert!((left.share() - (1.0 - (-left.tau).exp())).abs() < 1e-15);
-        assert!(left.share() < left.share_of_layers(0.1) && left.most(nothing) == left);
+        assert!(left.share() < -libm::expm1(-2.0 * 0.1) && left.most(nothing) == left);
         assert_eq!(of(&[blob(0.2)], 1.9), [nothing; 3], "hidden");
         // Pixels are one slope wide, σ = 1 at depth 2 half of one.
         let of = |smallest: f64| {

@@ -92,31 +92,31 @@ impl Obstacles<'_> {
         (-(1.0 - self.forward) * tau).exp()
     }
 
-    fn is_clear(&self, receiver: &Receiver, p: DVec3, light: &Light) -> bool {
-        is_clear(self.rectangles, receiver.i_region, p, light)
-    }
-
     /// Returns V of every facet toward every light: 0 if a surface hides the light, else
     /// e^{−(1−g)τ}; 0 for lights without energy. *Shape*: [facet][light].
     pub fn transmittance(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
-        let one = |r: &Receiver, light: &Light| {
-            let is_lit = light.energy() != DVec3::ZERO && self.is_clear(r, r.position, light);
-            if is_lit { self.through_the_cloud(r.position, light) } else { 0.0 }
-        };
-        receivers.iter().flat_map(|r| lights.iter().map(move |l| one(r, l))).collect()
+        let is_clear = |r: &Receiver, l: &_| is_clear(self.rectangles, r.i_region, r.position, l);
+        self.where_lit(receivers, lights, is_clear)
     }
 
     /// Returns the transmittance of the clouds alone; 0 for lights without energy. *Shape*:
     /// [receiver][light].
     pub fn through(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
+        self.where_lit(receivers, lights, |_, _| true)
+    }
+
+    fn where_lit(
+        &self,
+        receivers: &[Receiver],
+        lights: &[Light],
+        is_lit: impl Fn(&Receiver, &Light) -> bool,
+    ) -> Vec<f64> {
         let one = |r: &Receiver, light: &Light| {
-            if light.energy() == DVec3::ZERO {
-                0.0
-            } else {
-                self.through_the_cloud(r.position, light)
-            }
+            let is_lit = light.energy() != DVec3::ZERO && is_lit(r, light);
+            if is_lit { self.through_the_cloud(r.position, light) } else { 0.0 }
         };
-        receivers.iter().flat_map(|r| lights.iter().map(move |l| one(r, l))).collect()
+        let of = |r: &Receiver| lights.iter().map(|light| one(r, light)).collect::<Vec<_>>();
+        receivers.iter().flat_map(of).collect()
     }
 }
 

@@ -12,7 +12,6 @@ use glam::DVec3;
 
 use super::Blob;
 use super::composite::OpaquePixel;
-use super::parallel::parallel_map;
 use super::view::View;
 use piece::{RayBlob, RayIntegral, RayIntegrator};
 
@@ -62,20 +61,15 @@ impl<'a> Volume<'a> {
         Volume { view: *view, blobs, radiance, places, brightest, omitted }
     }
 
-    /// Integrates row `j` before `behind`, one a pixel.
-    pub fn row(&self, j: u32, behind: &[OpaquePixel]) -> Vec<Pixel> {
-        self.of_row(j, (0..self.view.width).zip(behind.iter().copied()))
-    }
-
     /// Integrates some pixels of row `j`, given by column and background.
-    pub fn of_row(&self, j: u32, columns: impl Iterator<Item = (u32, OpaquePixel)>) -> Vec<Pixel> {
+    pub fn row(&self, j: u32, columns: impl Iterator<Item = (u32, OpaquePixel)>) -> Vec<Pixel> {
         let inside = |(from, to): (u32, u32), i: u32| (from..to).contains(&i);
-        let of_row: Vec<usize> =
+        let in_row: Vec<usize> =
             (0..self.blobs.len()).filter(|&k| inside(self.places[k][1], j)).collect();
         let mut integrator = RayIntegrator::default();
         let pixel = |(i, behind): (u32, OpaquePixel)| {
             let ray = self.view.ray(i, j);
-            let near = of_row.iter().filter(|&&k| inside(self.places[k][0], i));
+            let near = in_row.iter().filter(|&&k| inside(self.places[k][0], i));
             let passed = near.filter_map(|&k| self.pass(k, ray, behind.depth)).collect();
             self.pixel(&mut integrator, passed, &behind)
         };
@@ -127,17 +121,4 @@ impl<'a> Volume<'a> {
 /// left; 0 if it never has more. The tail beyond x is below e^{−x²/2}/2 of the whole.
 fn reach(depth: f64, omitted: f64) -> f64 {
     if depth > omitted { (2.0 * (depth / omitted).ln()).sqrt() } else { 0.0 }
-}
-
-/// Integrates the whole picture before `behind`, one a pixel.
-pub fn render(
-    view: &View,
-    behind: &[OpaquePixel],
-    blobs: &[Blob],
-    radiance: &[DVec3],
-) -> Vec<Pixel> {
-    let volume = Volume::new(view, blobs, radiance);
-    let width = view.width as usize;
-    parallel_map(view.height as usize, |j| volume.row(j as u32, &behind[j * width..][..width]))
-        .concat()
 }

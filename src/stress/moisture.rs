@@ -93,7 +93,7 @@ fn by_integral(_: &mut StressContext, c: &mut Comparison) -> Result<()> {
             let integral = (0..=N).map(|i| weight(i) * slope(i)).sum::<f64>() * h / 3.0;
             let truth = E0_PA * integral.exp();
             let value = Vapour { saturation, ice: false }.saturation(t);
-            c.add(value, truth, 1e-11 * truth, format_args!("E at {t} K, {saturation}"));
+            c.add(value, truth, 1e-11 * truth, format_args!("E at {t} K, {}", saturation.name()));
         }
     }
     Ok(())

@@ -15,6 +15,7 @@ use nimbus::passes::sprites::Sprites;
 use nimbus::passes::surfaces::Surfaces;
 use nimbus::passes::tiles::{Division, Variant};
 use nimbus::reference::Blob;
+use nimbus::reference::texture::{Level, Pool, QUANTUM};
 
 use super::Picture;
 use crate::bounded::U;
@@ -180,7 +181,7 @@ impl Picture {
         let named: Vec<u32> = self.i_facet.iter().flatten().map(|i| i + n_before).collect();
         let (of_drawn, of_groups) = self.drawn.clone().unwrap_or_default();
         let (of_textured, textures, words) = match &self.textured {
-            Some((i_group, textures, pool)) => (i_group.clone(), textures.clone(), pool.words()),
+            Some((i_group, textures, pool)) => (i_group.clone(), textures.clone(), words(pool)),
             None => Default::default(),
         };
         assert!(
@@ -268,4 +269,26 @@ impl Picture {
             ellipsoids: self.has_ellipsoids(),
         }
     }
+}
+
+/// Returns the pool as shaders read it: for every field, level and texel the four corners, n_l in
+/// the first two words, n_{l+1} in the others, each in 16 bits.
+fn words(pool: &Pool) -> Vec<[u32; 4]> {
+    let quanta = |n: f64| (n / QUANTUM) as i16 as u16;
+    let both = |a: f64, b: f64| u32::from(quanta(a)) | u32::from(quanta(b)) << 16;
+    let texel = |level: &Level, i: usize, j: usize| {
+        let of = |n: &[f64]| {
+            let at = |i: usize, j: usize| n[i % level.side + level.side * (j % level.side)];
+            [both(at(i, j), at(i + 1, j)), both(at(i, j + 1), at(i + 1, j + 1))]
+        };
+        let ([a, b], [c, d]) = (of(&level.own), of(&level.above));
+        [a, b, c, d]
+    };
+    let of_level = |level: &Level| -> Vec<[u32; 4]> {
+        (0..level.side)
+            .flat_map(|j| (0..level.side).map(move |i| (i, j)))
+            .map(|(i, j)| texel(level, i, j))
+            .collect()
+    };
+    pool.rounded().0.iter().flatten().flat_map(of_level).collect()
 }

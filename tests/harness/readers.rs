@@ -106,8 +106,8 @@ pub fn boxes(bytes: &[u8]) -> std::result::Result<(), String> {
 /// Checks the parser of particle lists: every particle has its own line.
 pub fn particle_list(bytes: &[u8]) -> std::result::Result<(), String> {
     let Ok(text) = std::str::from_utf8(bytes) else { return Err("no text".to_owned()) };
-    let (particles, lines) = particle_file::parse_with_lines(text, Path::new("p.csv"))
-        .map_err(|e| clean(&e, &[text]))?;
+    let (particles, lines) =
+        particle_file::parse(text, Path::new("p.csv")).map_err(|e| clean(&e, &[text]))?;
     assert_eq!(particles.len(), lines.len());
     // CSV ends a row at a single carriage return, where no line ends.
     let is_after = |w: &[usize]| if text.contains('\r') { w[0] <= w[1] } else { w[0] < w[1] };
@@ -157,8 +157,7 @@ pub fn results(bytes: &[u8]) -> std::result::Result<(), String> {
 pub fn weather(bytes: &[u8]) -> std::result::Result<(), String> {
     const MOST_STEPS: usize = 4;
     let container = netcdf::from_bytes(bytes.to_vec())?;
-    let file =
-        wrf::from_container(Box::new(container), Path::new("w.nc")).map_err(|e| clean(&e, &[]))?;
+    let file = wrf::from_container(container, Path::new("w.nc")).map_err(|e| clean(&e, &[]))?;
     for i_step in 0..file.n_steps.min(MOST_STEPS) {
         let step = file.step(i_step).map_err(|e| clean(&e, &[]))?;
         let layout = Layout::new(&step.grid, &[&step.extinction], 100, 1);

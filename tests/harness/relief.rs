@@ -127,7 +127,7 @@ impl Relief {
             let [x, y] = ray(i, j);
             let may_show = |k: &&usize| is_within(&shapes[**k], center);
             let shown = near_by.iter().filter(may_show).flat_map(|k| {
-                let given = halves[*k].given(view, view.ray(i, j));
+                let given = given(&halves[*k], view, view.ray(i, j));
                 given.map_or(vec![], |hit| {
                     seen[*k].candidates(&hit, [x, y, Bounded::exact(1.0)], &halves[*k], &drawn[*k])
                 })
@@ -142,6 +142,18 @@ impl Relief {
         };
         near_by.iter().enumerate().map(pixel).collect()
     }
+}
+
+/// Returns the place shown in a pixel that the rasteriser gives to the triangle although the ray
+/// may pass it: where the ray meets the plane, clamped to the triangle's extent.
+fn given(half: &Triangle, view: &View, ray: DVec3) -> Option<Hit> {
+    let hit = half.meet(view.pose.position, ray)?;
+    let depths =
+        half.points().map(|p| (p - view.pose.position).dot(view.pose.forward).max(view.near));
+    let least = depths.into_iter().fold(f64::INFINITY, f64::min);
+    let depth = hit.depth.clamp(least, depths.into_iter().fold(least, f64::max));
+    let s = hit.s.clamp(0.0, 1.0);
+    Some(Hit { depth, s, t: hit.t.clamp(0.0, 1.0 - s), ..hit })
 }
 
 /// Returns the greatest visible depth around a pixel's centre, within the error of vertices;

@@ -9,7 +9,7 @@ use nimbus::model::camera::Pose;
 use nimbus::model::material::Brdf;
 use nimbus::model::surface::Surface;
 use nimbus::reference::composite::{OpaquePixel, Rounding};
-use nimbus::reference::surfaces::{Hit, meet, radiance, render};
+use nimbus::reference::surfaces::{Hit, meet, radiance, render_at};
 use nimbus::reference::view::View;
 
 use crate::bounded::{Bounded, Random, U, dot, exact3};
@@ -88,7 +88,7 @@ impl Scenery {
         let seen: Vec<Seen> = self.regions.iter().map(|r| Seen::new(r, &view.pose)).collect();
         let facets = |r: &RegionRecord| &all[r.i_first_facet as usize..][..r.n_facets as usize];
         let rows = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
-        let truths = render(view, &surfaces, &all);
+        let truths = render_at(view, &surfaces, &all, rows.clone().map(|(i, j)| [i, j]));
         let pixel = |((i, j), truth): ((u32, u32), &OpaquePixel)| {
             let (d, [x, y]) = (view.ray(i, j), ray(i, j));
             let met = surfaces.iter().zip(&self.regions).zip(&seen).filter_map(

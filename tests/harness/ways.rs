@@ -61,7 +61,7 @@ pub fn case_of_cells(aspect: f64) -> Case {
         .collect();
     let reach = DVec3::splat(2.1);
     let (low, high) = (DVec3::new(-3.0, -1.0, -2.0) - reach, DVec3::new(3.0, 1.0, 2.0) + reach);
-    let fit = GridSpec::fit_cells(low, high, 48, aspect);
+    let fit = GridSpec::fit(low, high, 48, aspect);
     let aspect = f64::from(fit.aspect as f32);
     let spec = GridSpec {
         cell: f64::from(fit.cell as f32),

@@ -127,7 +127,7 @@ fn grid_contains_its_bounds_with_the_margin() {
     let half = || prop_oneof![Just(0.0), magnitude(-15, 15), 0.0..10.0];
     check(2000, ([half(), half(), half()], 1..=2 * MAX_CELLS), |(half, n)| {
         let half = DVec3::from_array(half);
-        let grid = GridSpec::fit(-half, half, n);
+        let grid = GridSpec::fit(-half, half, n, 1.0);
         let n = n.clamp(2 * MARGIN_CELLS + 1, MAX_CELLS);
         prop_assert!(
             grid.n_cells.max_element() <= n && grid.n_cells.min_element() > 2 * MARGIN_CELLS

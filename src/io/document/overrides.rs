@@ -7,7 +7,7 @@ use toml::de::DeValue;
 use super::depth::{MAX_DOTS, too_deep};
 use super::suggest::shown;
 use super::tree::{Document, Entry, Node, Origin, TOO_DEEP, TOO_LARGE, Table, Value, convert};
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 impl Document {
     /// Lays `--set` arguments over the tree in their order; later ones win.
@@ -18,24 +18,28 @@ impl Document {
         for text in overrides {
             let origin = Origin::Override(self.source.overrides.len());
             self.source.overrides.push(text.clone());
-            self.apply_one(text, origin)
-                .map_err(|what| Error::scene(self.source.place(origin), what))?;
+            self.apply_one(text, origin).map_err(|what| self.source.fault(origin, what))?;
         }
         Ok(())
     }
 
     fn apply_one(&mut self, text: &str, origin: Origin) -> std::result::Result<(), String> {
-        let (path, value) =
-            text.split_once('=').ok_or("expected key.path=VALUE, for example lighting.grid=32")?;
-        let segments: Vec<&str> = path.split('.').map(str::trim).collect();
+        let (segments, value) =
+            parts(text).ok_or("expected key.path=VALUE, for example lighting.grid=32")?;
         if segments.len() > MAX_DOTS + 1 || too_deep(value).is_some() {
             return Err(TOO_DEEP.to_owned());
         }
         if segments.iter().any(|s| s.is_empty()) {
             return Err("expected key.path=VALUE, found an empty key".to_owned());
         }
-        put(&mut self.root, &segments, 0, parse_value(value.trim(), origin)?)
+        put(&mut self.root, &segments, 0, parse_value(value, origin)?)
     }
+}
+
+/// Returns the path of an argument `key.path=VALUE`, key by key, and its value.
+pub fn parts(text: &str) -> Option<(Vec<&str>, &str)> {
+    let (path, value) = text.split_once('=')?;
+    Some((path.split('.').map(str::trim).collect(), value.trim()))
 }
 
 fn parse_value(text: &str, origin: Origin) -> std::result::Result<Node, String> {

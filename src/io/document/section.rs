@@ -27,13 +27,12 @@ impl<'a> Section<'a> {
     }
 
     fn new(source: &'a Source, path: String, node: Option<&'a Node>) -> Result<Section<'a>> {
-        let table = match node.map(|node| &node.value) {
+        let table = match node.map(|node| (&node.value, node.origin)) {
             None => None,
-            Some(Value::Table(table)) => Some(table),
-            Some(other) => {
-                let at = source.place(node.map_or(Origin::Default, |n| n.origin));
+            Some((Value::Table(table), _)) => Some(table),
+            Some((other, origin)) => {
                 let what = format!("`{path}`: expected a table, found {}", other.describe());
-                return Err(Error::scene(at, what));
+                return Err(source.fault(origin, what));
             }
         };
         let origin = node.map(|node| node.origin);
@@ -56,7 +55,7 @@ impl<'a> Section<'a> {
                 suggestion(key, &known),
                 list(&known)
             );
-            return Err(Error::scene(self.source.place(entry.key_origin), what));
+            return Err(self.source.fault(entry.key_origin, what));
         }
         self.known = known;
         Ok(())

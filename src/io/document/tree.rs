@@ -95,14 +95,14 @@ impl Document {
     /// When the text is no TOML, with the place.
     pub fn parse(text: String, path: &Path) -> Result<Document> {
         let source = Source { path: path.to_owned(), text, overrides: Vec::new() };
-        let fault = |origin, what: &str| Error::scene(source.place(origin), what);
         if let Some(offset) = too_deep(&source.text) {
-            return Err(fault(Origin::File(offset), TOO_DEEP));
+            return Err(source.fault(Origin::File(offset), TOO_DEEP));
         }
-        let table = DeTable::parse(&source.text)
-            .map_err(|e| fault(Origin::File(e.span().map_or(0, |span| span.start)), e.message()))?;
+        let table = DeTable::parse(&source.text).map_err(|e| {
+            source.fault(Origin::File(e.span().map_or(0, |span| span.start)), e.message())
+        })?;
         let table = convert_table(table.get_ref(), &Origin::File);
-        let value = Value::Table(table.map_err(|origin| fault(origin, TOO_LARGE))?);
+        let value = Value::Table(table.map_err(|origin| source.fault(origin, TOO_LARGE))?);
         Ok(Document { source, root: Node { origin: Origin::File(0), value } })
     }
 
@@ -130,6 +130,11 @@ impl Document {
 }
 
 impl Source {
+    /// Returns a complaint about what stands at `origin`.
+    pub fn fault(&self, origin: Origin, what: impl Into<String>) -> Error {
+        Error::scene(self.place(origin), what)
+    }
+
     /// Returns where an origin is, for a message.
     pub fn place(&self, origin: Origin) -> Place {
         match origin {

@@ -36,15 +36,15 @@ keys! {
 keys! { VAPOUR: fn vapour(s) -> Vapour { Vapour;
     /// Law of the saturation vapour pressure: C's with constant latent heat, with linear latent
     /// heat, or Bolton's fit (1980, eq. 10).
-    saturation: choice("bolton", &Saturation::NAMES), "";
+    saturation: choice("bolton", &Saturation::NAMES);
     /// Whether saturation is over ice below 0 °C.
-    ice: flag(false), "";
+    ice: flag(false);
 }}
 
 keys! { PARCEL: fn parcel(s, t_k: f64, law: Vapour) -> Parcel { Parcel;
     t_k => t_k;
     /// Relative humidity at the ground.
-    humidity: number(0.6, HUMIDITY), "" => |humidity| match s.has("dew_point_c") {
+    humidity: number(0.6, HUMIDITY) => |humidity| match s.has("dew_point_c") {
         true => from_dew_point(s, law, t_k),
         false => humidity.take(s, "humidity"),
     };

@@ -80,7 +80,14 @@ const BOXES_KIND: CloudKind = CloudKind {
 const KINDS: &[(&str, CloudKind)] = &[
     ("boxes", BOXES_KIND),
     ("particles", CloudKind { lists: &[FILE, BASE, GROWTH], read: read_particles, ..BOXES_KIND }),
-    ("disc", CloudKind { lists: &DISC_KEYS, read: read_disc_source, ..BOXES_KIND }),
+    (
+        "disc",
+        CloudKind {
+            lists: &DISC_KEYS,
+            read: |s, reading| read_disc(s, reading.around.air).map(CloudSource::Disc),
+            ..BOXES_KIND
+        },
+    ),
     (
         "weather",
         CloudKind {
@@ -96,23 +103,23 @@ pub const KEYS: [Keys; 7] = [FROM, POSITION, CLOUD, GUST, TEXTURE, MATERIAL_NAME
 
 keys! {
     /// Source of the cloud's particles, which its other keys follow from.
-    FROM: fn kind(s) -> CloudKind = "from": choice("", KINDS).required(), "";
+    FROM: fn kind(s) -> CloudKind = "from": choice("", KINDS).required();
 }
 
 keys! {
     /// File that the cloud is made from, relative to the scene's folder: a box file (P Table 1), a
     /// particle list (CSV), or WRF output (NetCDF).
-    FILE: fn file(s) -> String = "file": required_text(), "";
+    FILE: fn file(s) -> String = "file": required_text();
 }
 
 keys! { BOX_LAW: fn box_law(s) -> BoxLaw { BoxLaw;
     /// How P (1)–(11) are read: with positions centred in the box and radii that obey P (9), or as
     /// printed.
-    form: choice("centred", &Form::NAMES), "";
+    form: choice("centred", &Form::NAMES);
     /// Optical depth through the centre of a particle of the box's mean radius.
-    optical_depth: number(1.0, AMOUNT), "";
+    optical_depth: number(1.0, AMOUNT);
     /// Factor on the radii of the box file.
-    radius_scale: number(1.0, AMOUNT), "";
+    radius_scale: number(1.0, AMOUNT);
 }}
 
 keys! { CLOUD: fn cloud(s, source: CloudSource, kind: CloudKind, reading: &Reading) -> Cloud {
@@ -129,7 +136,7 @@ keys! { CLOUD: fn cloud(s, source: CloudSource, kind: CloudKind, reading: &Readi
     i_material => material_named(s, reading.around.materials)?;
     /// Direction of facets where the density around them has none: away from the cloud's centre, or
     /// up (the default of weather files).
-    facing: choice("outward", &Facing::NAMES), ""
+    facing: choice("outward", &Facing::NAMES)
         => |facing| facing.or(kind.default_facing).take(s, "facing");
     seed => read_seed(s, reading)?;
     source => source;
@@ -137,7 +144,7 @@ keys! { CLOUD: fn cloud(s, source: CloudSource, kind: CloudKind, reading: &Readi
 
 keys! {
     /// Seed of the cloud's random numbers. Without it, cloud i (from 0) has the seed i + 1.
-    SEED: fn own_seed(s, default: u32) -> u32 = "seed": integer(1, 0, u32::MAX), ""
+    SEED: fn own_seed(s, default: u32) -> u32 = "seed": integer(1, 0, u32::MAX)
         => |seed| seed.or(default).take(s, "seed");
 }
 
@@ -237,13 +244,9 @@ fn read_boxes(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
 
 fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
     let (text, path) = read_named(s, reading, particle_file::FIRST)?;
-    let (particles, lines) = particle_file::parse_with_lines(&text, &path)?;
+    let (particles, lines) = particle_file::parse(&text, &path)?;
     reading.found.lines = lines;
     Ok(CloudSource::Particles(particles))
-}
-
-fn read_disc_source(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
-    read_disc(s, reading.around.air).map(CloudSource::Disc)
 }
 
 fn read_weather(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {

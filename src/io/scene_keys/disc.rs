@@ -18,25 +18,25 @@ pub const DISC_KEYS: [Keys; 3] = [DISC, CONDENSATION, BASE];
 
 keys! { DISC: pub fn read_disc(s, air: &Air) -> Disc { Disc;
     /// Particles at a time.
-    n_particles ["particles"]: integer(1000, 0, u32::MAX), "";
+    n_particles ["particles"]: integer(1000, 0, u32::MAX);
     /// Radius of the disc.
     radius: number(1.0, AMOUNT), "unit";
     /// Period after which a new particle takes the place of each one.
     period_s ["lifetime_s"]: number(20.0, DIVISOR), "s";
     /// Share of the period by which lifetimes may be shorter.
-    life_spread ["lifetime_spread"]: number(0.3, SPREAD), "";
+    life_spread ["lifetime_spread"]: number(0.3, SPREAD);
     /// Mean σ at birth.
     sigma: number(0.3, DIVISOR), "unit";
     /// Share by which σ at birth varies on either side.
-    sigma_spread: number(0.3, SPREAD), "";
+    sigma_spread: number(0.3, SPREAD);
     /// Optical depth through the centre of a particle of mean σ at birth.
-    optical_depth: number(1.0, AMOUNT), "";
+    optical_depth: number(1.0, AMOUNT);
     /// Mean excess temperature at birth.
     warmth ["warmth_k"]: number(1.0, AMOUNT), "K";
     /// Share by which the excess temperature varies on either side.
-    warmth_spread: number(0.3, SHARE), "";
+    warmth_spread: number(0.3, SHARE);
     /// Share by which the rim of the disc is less warm than its centre.
-    core ["warmth_core"]: number(0.5, SHARE), "";
+    core ["warmth_core"]: number(0.5, SHARE);
     /// Speed of rise for each kelvin.
     buoyancy: number(0.5, AMOUNT), "unit/(s K)";
     /// Time in which excess temperature and speeds fall to 1/e.
@@ -44,13 +44,13 @@ keys! { DISC: pub fn read_disc(s, air: &Air) -> Disc { Disc;
     /// Greatest horizontal speed at birth.
     outflow: number(0.1, AMOUNT), "unit/s";
     /// Share α of the rise by which the radius of a particle grows.
-    entrainment: number(0.2, AMOUNT), "";
+    entrainment: number(0.2, AMOUNT);
     /// Quantity that a growing particle keeps: its mass, its optical depth, or its extinction.
-    dilution: choice("mass", &Dilution::NAMES), "";
+    dilution: choice("mass", &Dilution::NAMES);
     /// Share of its life in which a particle fades in.
-    fade_in: number(0.2, FADE), "";
+    fade_in: number(0.2, FADE);
     /// Share of its life in which a particle fades out.
-    fade_out: number(0.4, FADE), "";
+    fade_out: number(0.4, FADE);
     condensation => condensation(s, air)?;
 }}
 

@@ -33,49 +33,49 @@ fn resolution() -> Spec<Resolution> {
 keys! { DRAW: fn draw(s) -> Draw { Draw;
     /// How particles are drawn: as quads in the graphics pipeline, as tiles of pixels in compute,
     /// or whichever is faster at the first frame.
-    path: choice("tiles", &DrawPath::NAMES), "";
+    path: choice("tiles", &DrawPath::NAMES);
     /// Whether distant particles are shown again from a picture of them.
-    impostors: choice("off", &Impostors::NAMES), "";
+    impostors: choice("off", &Impostors::NAMES);
     /// Greatest predicted error of an impostor.
     impostor_error: number(0.5, Bounds::Within(0.01, 100.0)), "px";
     /// Distance from its centre at which a sprite ends.
     cutoff: number(3.0, Bounds::Within(0.5, 8.0)), "σ";
     /// Chunks that sprites are drawn in, near to far; after each, pixels that are opaque are left
     /// out. With 0 all sprites are drawn far to near.
-    chunks: chunks(), "";
+    chunks: chunks();
     /// Optical depth below which a sprite ends.
-    threshold: cutoff(Bounds::From(0.0, 1.0)), "";
+    threshold: cutoff(Bounds::From(0.0, 1.0));
     /// Whether particles that show in no pixel are left out before the sort. No pixel changes.
-    cull: choice("on", &Cull::NAMES), "";
+    cull: choice("on", &Cull::NAMES);
     /// With `cull`, σ on the screen below which a particle is left out.
     smallest: cutoff(Bounds::Within(0.0, 1000.0)), "px";
     /// Bits of the depth keys that particles are sorted by.
-    sort_bits: sort_bits(), "";
+    sort_bits: sort_bits();
     /// Pixels of the picture that particles are drawn into, along a side, for each of the film's.
-    resolution: resolution(), "";
+    resolution: resolution();
     /// Greatest root mean square error that all settings "auto" may cause together.
-    error: number(1.0 / 1020.0, Bounds::From(0.0, 1.0)), "";
+    error: number(1.0 / 1020.0, Bounds::From(0.0, 1.0));
     /// Whether the number of particles drawn falls with a cloud's distance, C (4)–(6).
-    count: choice("all", &[("all", false), ("distance", true)]), "" => |is_by_distance| {
+    count: choice("all", &[("all", false), ("distance", true)]) => |is_by_distance| {
         let is_by_distance = is_by_distance.take(s, "count")?;
         Ok(Some(count(s)?).filter(|_| is_by_distance))
     };
     /// Particles of all clouds made from boxes together; 0: as many as their files say.
-    n_particles ["particles"]: integer(0, 0, u32::MAX), "";
+    n_particles ["particles"]: integer(0, 0, u32::MAX);
     /// Seed of the pool of textures.
-    texture_seed: integer(1, 0, u32::MAX), "";
+    texture_seed: integer(1, 0, u32::MAX);
 }}
 
 keys! { COUNT: fn count(s) -> Count { Count;
     /// Constant a of C (5): the count falls by 1/e over a distance of a d₀.
-    a ["count_a"]: number(280.0, DIVISOR), "";
+    a ["count_a"]: number(280.0, DIVISOR);
     /// Distance d₀ of C (5).
     d0 ["count_d0"]: number(1.0, DIVISOR), "unit";
     /// Whether the count at d₀ is that of the file, as C says, or e^(−1/a) of it, as C's formula
     /// gives.
-    normalised ["count_normalised"]: flag(false), "";
+    normalised ["count_normalised"]: flag(false);
     /// Whether κ grows as the count falls.
-    conserve ["count_conserve"]: flag(true), "";
+    conserve ["count_conserve"]: flag(true);
 }}
 
 /// Keys of `[draw]`.

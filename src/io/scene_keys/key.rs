@@ -29,7 +29,7 @@ pub type Keys = &'static [&'static [Key]];
 ///
 /// Of a table: `LIST: fn read(s, more: Type…) -> Out { Struct; fields }`, where `s` is the
 /// [`Section`] that is read and a field is one of
-/// - `field: type, "unit";` for the key of the field's name,
+/// - `field: type, "unit";`, or without the unit, for the key of the field's name,
 /// - `field ["key"]: type, "unit";` for a key of another name,
 /// - either with `=> |key_type| value`, where `value` is a `Result` that the closure makes,
 /// - `field => value;` for a field that is no key.
@@ -41,10 +41,10 @@ macro_rules! keys {
     ($list:ident: $vis:vis fn $read:ident($s:ident $(, $arg:ident: $arg_type:ty)*) -> $out:ty {
         $($make:ident)::+;
         $($(#[doc = $docs:literal])* $field:ident $([$key:literal])?
-            $(: $type:expr, $unit:literal)? $(=> $with:expr)?;)*
+            $(: $type:expr $(, $unit:literal)?)? $(=> $with:expr)?;)*
     }) => {
         $vis const $list: $crate::io::scene_keys::key::Keys =
-            &[$(keys!(@key [$($docs)*] [$field $($key)?] $($type, $unit)?)),*];
+            &[$(keys!(@key [$($docs)*] [$field $($key)?] $($type $(, $unit)?)?)),*];
 
         $vis fn $read(
             $s: &mut $crate::io::document::section::Section $(, $arg: $arg_type)*
@@ -56,10 +56,10 @@ macro_rules! keys {
     };
     ($(#[doc = $docs:literal])* $list:ident:
         $vis:vis fn $read:ident($s:ident $(, $arg:ident: $arg_type:ty)*) -> $out:ty =
-        $key:literal: $type:expr, $unit:literal $(=> $with:expr)?;
+        $key:literal: $type:expr $(, $unit:literal)? $(=> $with:expr)?;
     ) => {
         $vis const $list: $crate::io::scene_keys::key::Keys =
-            &[keys!(@key [$($docs)*] [key $key] $type, $unit)];
+            &[keys!(@key [$($docs)*] [key $key] $type $(, $unit)?)];
 
         $vis fn $read(
             $s: &mut $crate::io::document::section::Section $(, $arg: $arg_type)*
@@ -67,10 +67,10 @@ macro_rules! keys {
             Ok(keys!(@value $s [key $key] $type $(=> $with)?))
         }
     };
-    (@key [$($docs:literal)*] [$($name:tt)*] $type:expr, $unit:literal) => {
+    (@key [$($docs:literal)*] [$($name:tt)*] $type:expr $(, $unit:literal)?) => {
         &[$crate::io::scene_keys::key::Key {
             name: keys!(@name $($name)*),
-            unit: $unit,
+            unit: concat!($($unit)?),
             docs: concat!($($docs),*),
             about: || $type.about(),
         }]

@@ -16,46 +16,46 @@ const MIN_CELLS: u32 = 8;
 keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
     /// Reflections that are computed: none (particles have their colours as given), the first,
     /// C (15), or the first and the second, C (15) and (16).
-    mode: choice("two-reflection", &LightingMode::NAMES), "";
+    mode: choice("two-reflection", &LightingMode::NAMES);
     /// Cells along the longest axis of the density grid.
-    grid: integer(64, MIN_CELLS, MAX_CELLS), "";
+    grid: integer(64, MIN_CELLS, MAX_CELLS);
     /// Step of the march through the density grid toward a light.
     step: number(1.0, Bounds::Within(0.05, 16.0)), "cell";
     /// Share g of the optical depth that does not weaken light on its way through a cloud.
-    forward: number(0.85, SHARE), "";
+    forward: number(0.85, SHARE);
     /// Functions of the BRDF basis N_b: the diffuse one and N_b − 1 lobes.
-    bases: integer(8, 1, MAX_BASES), "";
+    bases: integer(8, 1, MAX_BASES);
     /// Spacing of the exponents that the basis is made from.
-    sampling: choice("log", &Sampling::NAMES), "";
+    sampling: choice("log", &Sampling::NAMES);
     /// Range of exponents n_s that the basis is made for. Without it, the range is widened to the
     /// exponents of the materials.
-    exponents: pair([1.0, 256.0], Bounds::Within(0.0, GREATEST_EXPONENT)), ""
+    exponents: pair([1.0, 256.0], Bounds::Within(0.0, GREATEST_EXPONENT))
         => |range| exponents(s, range, of_materials);
     /// How the second reflection is gathered: from every facet, from a tree of clusters, or by
     /// whichever is faster at the number of facets.
-    gather: choice("auto", &Gather::NAMES), "";
+    gather: choice("auto", &Gather::NAMES);
     /// Share of its distance above which the radius of a cluster opens it.
-    theta: number(0.4, Bounds::Within(0.0, 2.0)), "";
+    theta: number(0.4, Bounds::Within(0.0, 2.0));
     /// Facets of each cloud; 0: one for each particle.
-    facets_per_cloud: integer(0, 0, u32::MAX).map(|n| Some(n).filter(|n| *n > 0)), "";
+    facets_per_cloud: integer(0, 0, u32::MAX).map(|n| Some(n).filter(|n| *n > 0));
     pairs => pairs(s)?;
     sums => sums(s)?;
 }}
 
 keys! { PAIRS: fn pairs(s) -> Pairs { Pairs;
     /// Share of its distance above which the width of an emitter quarters it.
-    size ["pair_size"]: number(0.5, Bounds::Within(0.01, 100.0)), "";
+    size ["pair_size"]: number(0.5, Bounds::Within(0.01, 100.0));
     /// Most times that an emitter is quartered.
-    levels ["pair_levels"]: integer(6, 0, MAX_PAIR_LEVELS), "";
+    levels ["pair_levels"]: integer(6, 0, MAX_PAIR_LEVELS);
     /// Most steps of the march through the density grid between two facets.
-    steps ["pair_steps"]: integer(16, 1, MAX_MARCH_STEPS), "";
+    steps ["pair_steps"]: integer(16, 1, MAX_MARCH_STEPS);
 }}
 
 keys! { SUMS: fn sums(s) -> Sums { Sums;
     /// How the sums of the second reflection are added up.
-    summation: choice("plain", &Summation::NAMES), "";
+    summation: choice("plain", &Summation::NAMES);
     /// Precision of these sums.
-    precision: choice("f32", &Precision::NAMES), "";
+    precision: choice("f32", &Precision::NAMES);
 }}
 
 /// Keys of `[lighting]`.

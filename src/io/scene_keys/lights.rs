@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::key::{Keys, keys, names, read_tables};
-use super::spec::{Spec, choice, number, required_text, vector};
+use super::spec::{Spec, choice, number, required_text, required_vector};
 use crate::error::Result;
 use crate::io::bounds::{AMOUNT, Bounds, COORDINATE, GREATEST, GREATEST_SHARE, LEAST_LIGHT_RADIUS};
 use crate::io::document::section::Section;
@@ -45,21 +45,21 @@ const HALF_ANGLE: Bounds = Bounds::Within(0.0, 180.0);
 
 keys! {
     /// Kind of the light, which its other keys follow from.
-    KIND: pub fn kind(s) -> LightKind = "kind": choice("", KINDS).required(), "";
+    KIND: pub fn kind(s) -> LightKind = "kind": choice("", KINDS).required();
 }
 
 keys! { DIRECTIONAL: fn directional(s) -> Light { Light::Directional;
     /// Direction in which the light travels.
-    direction: vector([0.0; 3], Bounds::Any).required(), "" => |d| unit_vector(s, &d);
+    direction: required_vector(Bounds::Any) => |d| unit_vector(s, &d);
     /// Linear RGB irradiance on a plane across the direction.
-    irradiance: vector([0.0; 3], AMOUNT).required(), "";
+    irradiance: required_vector(AMOUNT);
 }}
 
 keys! { POINT: fn point(s) -> Light { Light::Point;
     /// Place of the light.
-    position: vector([0.0; 3], COORDINATE).required(), "unit";
+    position: required_vector(COORDINATE), "unit";
     /// Linear RGB power for each solid angle.
-    intensity: vector([0.0; 3], AMOUNT).required(), "";
+    intensity: required_vector(AMOUNT);
     /// Distance below which the irradiance stops growing.
     radius: radius(), "unit";
 }}
@@ -80,20 +80,20 @@ keys! { SPOT: fn spot(s, cone: Cone) -> Light { Light::Spot;
     cos_outer => cone.outer.to_radians().cos();
     cos_inner => cone.inner.to_radians().cos();
     /// Place of the light.
-    position: vector([0.0; 3], COORDINATE).required(), "unit";
+    position: required_vector(COORDINATE), "unit";
     /// Direction of the axis of its cone.
-    direction: vector([0.0; 3], Bounds::Any).required(), "" => |d| unit_vector(s, &d);
+    direction: required_vector(Bounds::Any) => |d| unit_vector(s, &d);
     /// Linear RGB power for each solid angle.
-    intensity: vector([0.0; 3], AMOUNT).required(), "";
+    intensity: required_vector(AMOUNT);
     /// Distance below which the irradiance stops growing.
     radius: radius(), "unit";
 }}
 
 keys! { SKY: fn sky(s) -> Light { Light::Sky;
     /// Linear RGB irradiance from above.
-    irradiance: vector([0.0; 3], AMOUNT).required(), "";
+    irradiance: required_vector(AMOUNT);
     /// Share of the irradiance that reaches every facet, whatever is in the way.
-    constant: number(0.15, Bounds::Within(0.0, GREATEST_SHARE)), "";
+    constant: number(0.15, Bounds::Within(0.0, GREATEST_SHARE));
 }}
 
 /// A directional light from where the sun stands.
@@ -112,7 +112,7 @@ keys! { SUN: fn sun(s) -> Sun { Sun;
     /// Longitude, positive to the east.
     longitude ["longitude_deg"]: number(0.0, Bounds::Within(-180.0, 360.0)), "degree";
     /// Linear RGB irradiance on a plane across the light.
-    irradiance: vector([0.0; 3], AMOUNT).required(), "";
+    irradiance: required_vector(AMOUNT);
 }}
 
 /// Lists the kinds of lights and the keys of each.

@@ -21,19 +21,19 @@ const PLAIN: Brdf = Brdf { kd: DVec3::splat(0.9), ks: DVec3::ZERO, ns: 8.0 };
 
 keys! { MATERIAL: fn material(s) -> Material { Material;
     /// Name by which clouds and surfaces refer to the material.
-    name: required_text(), "";
+    name: required_text();
     /// Settings of a material that changes over time, in place of `kd`, `ks` and `ns`. A setting
     /// left out is that of the entry before.
-    keys ["path"]: described("array of { time_s, kd, ks, ns }"), "" => |_| read_keys(s);
+    keys ["path"]: described("array of { time_s, kd, ks, ns }") => |_| read_keys(s);
 }}
 
 keys! { BRDF: fn brdf(s, before: Brdf) -> Brdf { Brdf;
     /// Diffuse reflectance K_d, linear RGB.
-    kd: vector([0.9; 3], SHARE), "" => |kd| kd.or(before.kd.to_array()).take(s, "kd");
+    kd: vector([0.9; 3], SHARE) => |kd| kd.or(before.kd.to_array()).take(s, "kd");
     /// Specular reflectance K_s, linear RGB. K_d + 4 K_s above 1 reflects more light than arrives.
-    ks: vector([0.0; 3], AMOUNT), "" => |ks| ks.or(before.ks.to_array()).take(s, "ks");
+    ks: vector([0.0; 3], AMOUNT) => |ks| ks.or(before.ks.to_array()).take(s, "ks");
     /// Exponent n_s of the lobe.
-    ns: number(8.0, Bounds::Within(0.0, GREATEST_EXPONENT)), ""
+    ns: number(8.0, Bounds::Within(0.0, GREATEST_EXPONENT))
         => |ns| ns.or(before.ns).take(s, "ns");
 }}
 
@@ -46,7 +46,7 @@ keys! { MATERIAL_KEY: fn material_key(s, before: Brdf) -> MaterialKey { Material
 keys! {
     /// Name of the material. Without it, the only material, or else the one named "cloud".
     MATERIAL_NAME: pub fn material_named(s, materials: &[Material]) -> usize =
-        "material": text("cloud"), "" => |name| {
+        "material": text("cloud") => |name| {
             let name = match materials {
                 [only] => name.or(only.name.as_str()),
                 _ => name,
@@ -59,7 +59,7 @@ keys! {
 keys! {
     /// Name of the material of the ground (HGT) under the cloud, or "none" for no ground.
     GROUND: pub fn ground_named(s, materials: &[Material]) -> Option<usize> =
-        "ground": text("none"), "" => |name| match name.take(s, "ground")?.as_str() {
+        "ground": text("none") => |name| match name.take(s, "ground")?.as_str() {
             "none" => Ok(None),
             name => number_of(s, "ground", name, materials).map(Some),
         };

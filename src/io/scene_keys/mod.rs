@@ -48,7 +48,7 @@ pub struct Table {
 
 keys! {
     /// Title of the scene, for reports.
-    TITLE: fn title(s) -> String = "title": text(""), "";
+    TITLE: fn title(s) -> String = "title": text("");
 }
 
 /// Names of a scene's tables.

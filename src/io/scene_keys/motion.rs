@@ -22,12 +22,12 @@ keys! { GUST: pub fn read_gust(s) -> Gust { Gust;
     /// Period of the largest eddy.
     period_s ["gust_period_s"]: number(8.0, DIVISOR), "s";
     /// Waves that stand for the spectrum of eddies.
-    n_waves ["gust_waves"]: integer(16, 1, MAX_WAVES), "";
+    n_waves ["gust_waves"]: integer(16, 1, MAX_WAVES);
 }}
 
 keys! { GROWTH: pub fn read_growth(s) -> Growth { Growth;
     /// Lengths at the end of growth over those at time 0.
-    to ["grow_to"]: number(1.0, Bounds::Within(MIN_SCALE, MAX_SCALE)), "";
+    to ["grow_to"]: number(1.0, Bounds::Within(MIN_SCALE, MAX_SCALE));
     /// Time in which a share of 1 − 1/e of the way is grown.
     time_s ["grow_time_s"]: number(60.0, DIVISOR), "s";
 }}
@@ -35,7 +35,7 @@ keys! { GROWTH: pub fn read_growth(s) -> Growth { Growth;
 keys! { TEXTURE: pub fn read_texture(s) -> Texture { Texture;
     /// Field of the texture pool that particles are drawn with: none, one field for the whole
     /// cloud, or one by the number of the box.
-    choice ["texture"]: choice("none", &Choice::NAMES), "";
+    choice ["texture"]: choice("none", &Choice::NAMES);
     /// Strength s of the texture: optical depth is multiplied by exp(s n − s²⟨n²⟩/2).
-    strength ["texture_strength"]: number(1.0, Bounds::Within(0.0, MAX_STRENGTH)), "";
+    strength ["texture_strength"]: number(1.0, Bounds::Within(0.0, MAX_STRENGTH));
 }}

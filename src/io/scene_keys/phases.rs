@@ -6,7 +6,7 @@ use serde_json::Value as Json;
 
 use super::key::{keys, names};
 use super::spec::{described, integer, required_text};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io::document::overrides::put;
 use crate::io::document::section::Section;
 use crate::io::document::suggest::{list, shown};
@@ -30,12 +30,12 @@ pub struct PhaseSpec {
 
 keys! { PHASE: pub(super) fn phase(s) -> PhaseSpec { PhaseSpec;
     /// Name of the phase in results; each name once.
-    name: required_text(), "";
+    name: required_text();
     /// Number of frames of the phase.
-    n_frames ["frames"]: integer(1, 1, u32::MAX).required(), "";
+    n_frames ["frames"]: integer(1, 1, u32::MAX).required();
     /// Keys of the scene that the phase sets, such as `set.lighting.mode = "none"`; not `title` and
     /// `time`.
-    sets ["set"]: described("table of keys"), "" => |_| sets(s);
+    sets ["set"]: described("table of keys") => |_| sets(s);
     resolved => Json::Null;
 }}
 
@@ -51,7 +51,7 @@ impl PhaseSpec {
             let segments: Vec<&str> = path.iter().map(String::as_str).collect();
             put(&mut document.root, &segments, 0, node.clone()).map_err(|what| {
                 let what = format!("phase \"{}\": {what}", shown(&self.name));
-                Error::scene(document.source.place(node.origin), what)
+                document.source.fault(node.origin, what)
             })?;
         }
         Ok(())
@@ -78,7 +78,7 @@ pub fn read_phases(document: &Document) -> Result<Vec<PhaseSpec>> {
         if let Some((path, node)) = phase.sets.iter().find(|(path, _)| refused(path)) {
             let (key, others) = (shown(&path.join(".")), list(&NOT_IN_A_PHASE));
             let what = format!("`set.{key}`: a phase cannot set {others}");
-            return Err(Error::scene(document.source.place(node.origin), what));
+            return Err(document.source.fault(node.origin, what));
         }
         phase.resolved = s.finish();
         phases.push(phase);
@@ -120,7 +120,7 @@ pub fn set_frames(document: &mut Document, n_frames: u32) -> Result<()> {
             Err(what) => (Origin::Default, what),
         },
     };
-    Err(Error::scene(document.source.place(origin), what))
+    Err(document.source.fault(origin, what))
 }
 
 /// Lists every value of a table of tables, with its path. An array is one value.

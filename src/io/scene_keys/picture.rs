@@ -1,7 +1,7 @@
 //! Tables `[film]`, `[camera]`, `[time]` and `[threads]`.
 
 use super::key::{Keys, keys, read_path, read_table};
-use super::spec::{choice, described, integer, number, vector};
+use super::spec::{choice, described, integer, number, required_vector, vector};
 use crate::error::Result;
 use crate::io::bounds::{AMOUNT, Bounds, COORDINATE, DIVISOR, GREATEST, rounded, shortest};
 use crate::io::document::section::Section;
@@ -20,13 +20,13 @@ keys! { FILM: fn film(s) -> Film { Film;
     /// Height of the picture.
     height: integer(600, 1, MAX_SIDE), "px";
     /// Format of the render target that layers are blended in.
-    format: choice("rgba16f", &FilmFormat::NAMES), "";
+    format: choice("rgba16f", &FilmFormat::NAMES);
     /// Linear RGB radiance behind the scene.
-    background: vector([0.32, 0.52, 0.80], AMOUNT), "";
+    background: vector([0.32, 0.52, 0.80], AMOUNT);
     /// Factor on radiance before the tone map.
-    exposure: number(1.0, AMOUNT), "";
+    exposure: number(1.0, AMOUNT);
     /// Tone map of PNG files and of the window: Khronos PBR Neutral, or cut at 1.
-    tone_map: choice("neutral", &ToneMap::NAMES), "";
+    tone_map: choice("neutral", &ToneMap::NAMES);
 }}
 
 keys! { VIEW: fn view(s) -> CameraKey { CameraKey;
@@ -41,16 +41,16 @@ keys! { WAYPOINT: fn waypoint(s) -> CameraKey { CameraKey;
     /// Time at which the camera is there. Times must grow.
     time_s: number(0.0, COORDINATE).required(), "s";
     /// Place of the camera then.
-    position: vector([0.0; 3], COORDINATE).required(), "unit";
+    position: required_vector(COORDINATE), "unit";
     /// Point in the middle of the picture then.
-    target: vector([0.0; 3], COORDINATE).required(), "unit";
+    target: required_vector(COORDINATE), "unit";
 }}
 
 keys! { CAMERA: fn camera(s) -> Camera { Camera;
     /// Path of a camera that moves (Catmull–Rom), in place of `position` and `target`.
-    keys ["path"]: described("array of { time_s, position, target }"), "" => |_| views(s);
+    keys ["path"]: described("array of { time_s, position, target }") => |_| views(s);
     /// Direction that is up in the picture.
-    up: vector([0.0, 1.0, 0.0], COORDINATE), "";
+    up: vector([0.0, 1.0, 0.0], COORDINATE);
     /// Vertical field of view.
     fov_y_rad ["fov_y_deg"]: number(45.0, FIELD_OF_VIEW).map(f64::to_radians), "degree";
     /// Distance below which nothing is drawn.
@@ -63,14 +63,14 @@ keys! { TIME: fn time(s) -> Time { Time;
     /// Time from one frame to the next.
     step_s: number(0.0333, AMOUNT), "s";
     /// Number of frames; with phases, the sum of theirs.
-    n_frames ["frames"]: integer(300, 1, u32::MAX), "";
+    n_frames ["frames"]: integer(300, 1, u32::MAX);
 }}
 
 keys! { THREADS: fn threads(s) -> Threads { Threads;
     /// Whether game and render step share a thread or run on two.
-    mode: choice("parallel", &Threading::NAMES), "";
+    mode: choice("parallel", &Threading::NAMES);
     /// Where particles are moved: on the GPU, or by the game thread.
-    simulate: choice("gpu", &Simulate::NAMES), "";
+    simulate: choice("gpu", &Simulate::NAMES);
 }}
 
 /// Tables of this file and their keys.

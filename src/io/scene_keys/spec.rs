@@ -184,6 +184,11 @@ pub fn vector(default: [f64; 3], bounds: Bounds) -> Spec<DVec3> {
     several(default, bounds).map(DVec3::from_array)
 }
 
+/// A vector that must be given.
+pub fn required_vector(bounds: Bounds) -> Spec<DVec3> {
+    vector([0.0; 3], bounds).required()
+}
+
 /// True or false.
 pub fn flag(default: bool) -> Spec<bool> {
     const EXPECTED: &str = "true or false";

@@ -2,7 +2,7 @@
 
 use super::key::{Keys, keys, names, read_tables};
 use super::materials::{MATERIAL_NAME, material_named};
-use super::spec::{integers, vector};
+use super::spec::{integers, required_vector};
 use crate::error::Result;
 use crate::io::bounds::{COORDINATE, GREATEST, LEAST, rounded, shortest};
 use crate::io::document::section::Section;
@@ -16,14 +16,14 @@ const SQUARE: f64 = 1e-6;
 
 keys! { SURFACE: fn surface(s, materials: &[Material]) -> Surface { Surface;
     /// Centre of the rectangle.
-    center: vector([0.0; 3], COORDINATE).required(), "unit";
+    center: required_vector(COORDINATE), "unit";
     /// Half axis; u × v is the side that is lit.
-    u: vector([0.0; 3], COORDINATE).required(), "unit";
+    u: required_vector(COORDINATE), "unit";
     /// Half axis, perpendicular to u.
-    v: vector([0.0; 3], COORDINATE).required(), "unit";
+    v: required_vector(COORDINATE), "unit";
     i_material => material_named(s, materials)?;
     /// Facets along u and along v.
-    subdivide: integers([8, 8], 1, MAX_SUBDIVIDE), "";
+    subdivide: integers([8, 8], 1, MAX_SUBDIVIDE);
 }}
 
 /// Keys of `[[surface]]`.

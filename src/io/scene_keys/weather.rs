@@ -21,14 +21,14 @@ const GREATEST_SPEED: f64 = 86_400.0;
 
 keys! { WEATHER: pub fn settings(s, last: u32) -> Settings { Settings;
     /// Step of the file, from 0, that time 0 shows.
-    i_step ["step"]: integer(0, 0, u32::MAX), ""
+    i_step ["step"]: integer(0, 0, u32::MAX)
         => |_| integer(0, 0, last).map(|i| i as usize).take(s, "step");
     /// Blobs that stand for the file's clouds.
-    n_particles ["particles"]: integer(20_000, 1, MOST_PARTICLES), "";
+    n_particles ["particles"]: integer(20_000, 1, MOST_PARTICLES);
     /// Factor on heights.
-    exaggeration: number(1.0, Bounds::Within(0.01, 100.0)), "";
+    exaggeration: number(1.0, Bounds::Within(0.01, 100.0));
     /// Seconds of the file in a second of the scene; 0: the step stands still.
-    speed: number(0.0, Bounds::Within(-GREATEST_SPEED, GREATEST_SPEED)), "";
+    speed: number(0.0, Bounds::Within(-GREATEST_SPEED, GREATEST_SPEED));
 }}
 
 /// Reads the keys that say how `file` is shown.

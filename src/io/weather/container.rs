@@ -1,5 +1,4 @@
-//! A weather file without regard to its format: named dimensions, variables over them, attributes.
-//! Variables are read in parts.
+//! Declarations of a weather file: named dimensions, variables over them, attributes.
 
 /// Result of reading a weather file. The error says what is wrong, without the name of the file.
 pub type Checked<T> = Result<T, String>;
@@ -55,9 +54,14 @@ impl Variable {
         number(&self.attributes, name)
     }
 
+    /// Returns the lengths of its dimensions, slowest first.
+    pub fn lengths(&self) -> Vec<u64> {
+        self.dimensions.iter().map(|d| d.length).collect()
+    }
+
     /// Returns the shape in words, such as "14 x 48 x 48".
     pub fn shape_text(&self) -> String {
-        let lengths: Vec<String> = self.dimensions.iter().map(|d| d.length.to_string()).collect();
+        let lengths: Vec<String> = self.lengths().iter().map(u64::to_string).collect();
         if lengths.is_empty() { "one number".to_owned() } else { lengths.join(" x ") }
     }
 }
@@ -76,37 +80,4 @@ pub fn number(attributes: &[Attribute], name: &str) -> Option<f64> {
         Value::Numbers(numbers) => numbers.first().copied(),
         Value::Text(_) => None,
     })
-}
-
-/// An open file. Opening reads the declarations of its variables, not their numbers.
-pub trait Container: Send + Sync {
-    /// Returns the format in words, such as "NetCDF-4 (HDF5)".
-    fn kind(&self) -> &'static str;
-
-    /// Returns the dimensions of the file.
-    fn dimensions(&self) -> &[Dimension];
-
-    /// Returns the variables of the file.
-    fn variables(&self) -> &[Variable];
-
-    /// Returns the attributes of the whole file.
-    fn attributes(&self) -> &[Attribute];
-
-    /// Reads the part of a variable that begins at `start` and has `count` places along each of its
-    /// dimensions, slowest first. Numbers are returned as stored; fill values are numbers too.
-    ///
-    /// # Errors
-    /// When the file is damaged or the part lies outside the variable.
-    fn read(&self, variable: &str, start: &[u64], count: &[u64]) -> Checked<Vec<f64>>;
-
-    /// Reads the rows of a variable of characters, whose last dimension runs along a row.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read).
-    fn read_rows(&self, variable: &str) -> Checked<Vec<String>>;
-
-    /// Finds a variable.
-    fn variable(&self, name: &str) -> Option<&Variable> {
-        self.variables().iter().find(|v| v.name == name)
-    }
 }

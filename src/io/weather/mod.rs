@@ -1,5 +1,5 @@
-//! Output of weather models to plain data: a [`container`] of variables, which [`netcdf`] reads in
-//! every kind of the format; [`wrf`], which knows what WRF's variables mean; and its clouds as
+//! Output of weather models to plain data: variables ([`container`]), which [`netcdf`] reads
+//! from every kind of the format; [`wrf`], which knows what WRF's variables mean; and its clouds as
 //! particles, of one step (`blobs`) or moving from step to step (`moving`). The numbers are worked
 //! on in `model::weather`.
 

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::model::animated::{AnimatedParticles, Animation};
 use crate::model::cloud::{MIN_ASPECT, Particle, mass};
 use crate::model::weather::particles::Layout;
-use crate::model::weather::steps::{Between, between};
+use crate::model::weather::steps::between;
 
 /// Factor by which heights of steps that were not read may exceed those of the steps that were.
 const MORE_HEIGHT: f64 = 1.05;
@@ -124,12 +124,12 @@ impl Animation for Steps {
     fn at(&self, time_s: f64) -> Result<Arc<Vec<Particle>>> {
         let file_s = self.times_s.get(self.settings.i_step).copied().unwrap_or(0.0)
             + self.settings.speed * time_s;
-        let at = between(&self.times_s, file_s).unwrap_or(Between { i: 0, j: 0, weight: 0.0 });
+        let (i, weight) = between(&self.times_s, file_s).unwrap_or((0, 0.0));
         // A span holds its first step; before the first step of the file that step stands still.
         let is_before = file_s < self.times_s.first().copied().unwrap_or(file_s);
-        let ends = if is_before { (at.i, at.i) } else { self.spans.ends_from(at.i) };
+        let ends = if is_before { (i, i) } else { self.spans.ends_from(i) };
         let span = self.spans.get(ends)?;
-        let of = |i: usize| match span.blob(i, at.weight) {
+        let of = |slot: usize| match span.blob(slot, weight) {
             Some(blob) => self.kept_to(particle(&blob, self.settings.exaggeration)),
             None => self.nothing(),
         };

@@ -11,7 +11,7 @@ use netcdf_reader::{
     NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcVariable,
 };
 
-use super::container::{Attribute, Checked, Container, Dimension, Value, Variable};
+use super::container::{Attribute, Checked, Dimension, Value, Variable};
 use crate::error::{Error, Place, Result};
 
 /// Most numbers that one part of a variable may have: those of a step of the largest grid.
@@ -25,13 +25,15 @@ const MOST_HEADER_BYTES: usize = 16 << 20;
 /// Size of the cache of unpacked chunks, for variables whose chunks hold several steps.
 const CHUNK_CACHE_BYTES: usize = 64 << 20;
 
-/// An open NetCDF file.
+/// An open NetCDF file. Opening reads the declarations of its variables, not their numbers.
 pub struct NetCdf {
     file: NcFile,
-    kind: &'static str,
-    dimensions: Vec<Dimension>,
-    variables: Vec<Variable>,
-    attributes: Vec<Attribute>,
+    /// Format in words, such as "NetCDF-4 (HDF5)".
+    pub kind: &'static str,
+    /// Variables of the file.
+    pub variables: Vec<Variable>,
+    /// Attributes of the whole file.
+    pub attributes: Vec<Attribute>,
 }
 
 /// Opens a file and reads its header.
@@ -82,10 +84,9 @@ fn from_storage(storage: DynStorage) -> Checked<NetCdf> {
         NcFormat::Nc4 => "NetCDF-4 (HDF5)",
         NcFormat::Nc4Classic => "NetCDF-4 (HDF5), classic model",
     };
-    let dimensions = file.dimensions().map_err(damaged)?.iter().map(dimension).collect();
     let variables = file.variables().map_err(damaged)?.iter().map(variable).collect();
     let attributes = file.global_attributes().map_err(damaged)?.iter().map(attribute).collect();
-    Ok(NetCdf { file, kind, dimensions, variables, attributes })
+    Ok(NetCdf { file, kind, variables, attributes })
 }
 
 const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
@@ -163,24 +164,18 @@ fn attribute(a: &NcAttribute) -> Attribute {
     Attribute { name: a.name.clone(), value }
 }
 
-impl Container for NetCdf {
-    fn kind(&self) -> &'static str {
-        self.kind
+impl NetCdf {
+    /// Finds a variable.
+    pub fn variable(&self, name: &str) -> Option<&Variable> {
+        self.variables.iter().find(|v| v.name == name)
     }
 
-    fn dimensions(&self) -> &[Dimension] {
-        &self.dimensions
-    }
-
-    fn variables(&self) -> &[Variable] {
-        &self.variables
-    }
-
-    fn attributes(&self) -> &[Attribute] {
-        &self.attributes
-    }
-
-    fn read(&self, name: &str, start: &[u64], count: &[u64]) -> Checked<Vec<f64>> {
+    /// Reads the part of a variable that begins at `start` and has `count` places along each of its
+    /// dimensions, slowest first. Numbers are returned as stored; fill values are numbers too.
+    ///
+    /// # Errors
+    /// When the file is damaged or the part lies outside the variable.
+    pub fn read(&self, name: &str, start: &[u64], count: &[u64]) -> Checked<Vec<f64>> {
         let lengths = self.lengths(name)?;
         let is_within = lengths.len() == start.len()
             && lengths.len() == count.len()
@@ -212,16 +207,17 @@ impl Container for NetCdf {
         Ok(numbers)
     }
 
-    fn read_rows(&self, name: &str) -> Checked<Vec<String>> {
+    /// Reads the rows of a variable of characters, whose last dimension runs along a row.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn read_rows(&self, name: &str) -> Checked<Vec<String>> {
         product(self.lengths(name)?.into_iter(), MOST_CHARACTERS)?;
         self.file.read_variable_as_strings(name).map_err(|e| format!("cannot be read: {e}"))
     }
-}
 
-impl NetCdf {
     fn lengths(&self, name: &str) -> Checked<Vec<u64>> {
-        let variable = self.variable(name).ok_or_else(|| "is not in the file".to_owned())?;
-        Ok(variable.dimensions.iter().map(|d| d.length).collect())
+        self.variable(name).map(Variable::lengths).ok_or_else(|| "is not in the file".to_owned())
     }
 }
 

@@ -6,7 +6,6 @@ use std::thread::JoinHandle;
 
 use super::wrf::WeatherFile;
 use crate::error::{Error, Result};
-use crate::model::weather::grid::Grid;
 use crate::model::weather::interval::{Interval, StepClouds};
 use crate::model::weather::particles::{Layout, WeatherBlob};
 use crate::model::weather::steps::LONGEST_INTERPOLATED_S;
@@ -45,31 +44,18 @@ impl Span {
     /// Returns the blob in slot `i` at `weight` of the way to the second step, or `None` in a slot
     /// that the layout does not use.
     pub fn blob(&self, i: usize, weight: f64) -> Option<WeatherBlob> {
-        let (half, i) = if i < self.n_first {
-            (&self.halves[0], i)
-        } else {
-            (&self.halves[1], i - self.n_first)
+        let (half, i) = match i.checked_sub(self.n_first) {
+            None => (&self.halves[0], i),
+            Some(i) => (&self.halves[1], i),
         };
-        let (interval, fade) = half.as_ref().filter(|(interval, _)| i < interval.len())?;
-        let blob = interval.blob(i, weight);
+        let (interval, fade) = half.as_ref()?;
+        let blob = interval.blob(i, weight)?;
         let share = match fade {
             Fade::Always => 1.0,
             Fade::Out => 1.0 - weight,
             Fade::In => weight,
         };
         Some(WeatherBlob { kappa: share * blob.kappa, ..blob })
-    }
-}
-
-/// Clouds of a step.
-struct Held {
-    grid: Grid,
-    extinction: Vec<f64>,
-}
-
-impl Held {
-    fn moment(&self) -> StepClouds<'_> {
-        StepClouds { grid: &self.grid, extinction: &self.extinction }
     }
 }
 
@@ -98,7 +84,7 @@ struct Source {
     layout: Option<Layout>,
     /// Numbers of slots of both halves.
     n_slots: [usize; 2],
-    held: Mutex<Vec<(usize, Arc<Held>)>>,
+    held: Mutex<Vec<(usize, Arc<StepClouds>)>>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -189,9 +175,7 @@ impl Source {
     fn make(&self, (i, j): Ends) -> Result<Span> {
         let first = self.step(i)?;
         let second = if i == j { None } else { Some(self.step(j)?) };
-        let laid_out = |layout: &Layout| {
-            Interval::laid_out(layout, first.moment(), second.as_ref().map(|s| s.moment()))
-        };
+        let laid_out = |layout: &Layout| Interval::laid_out(layout, &first, second.as_deref());
         let mut halves = [None, None];
         match &self.layout {
             Some(layout) => halves[0] = Some((laid_out(layout), Fade::Always)),
@@ -213,13 +197,13 @@ impl Source {
         Ok(Layout::new(&self.step(k)?.grid, &all, self.n_slots[k % 2], self.seed))
     }
 
-    fn step(&self, i: usize) -> Result<Arc<Held>> {
+    fn step(&self, i: usize) -> Result<Arc<StepClouds>> {
         if let Some((_, held)) = lock(&self.held).iter().find(|(of, _)| *of == i) {
             return Ok(held.clone());
         }
         // The lock is free while the step is read, so that another thread can read another step.
         let step = self.file.step(i)?;
-        let read = Arc::new(Held { grid: step.grid, extinction: step.extinction });
+        let read = Arc::new(StepClouds { grid: step.grid, extinction: step.extinction });
         let mut held = lock(&self.held);
         held.truncate(MOST_STEPS - 1);
         held.insert(0, (i, read.clone()));

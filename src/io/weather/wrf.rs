@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::container::{Checked, Container, number, text};
-use super::netcdf;
+use super::container::{Checked, Variable, number, text};
+use super::netcdf::{self, NetCdf};
 use super::wrf_clock;
 use super::wrf_fields::{Field, place};
 use super::wrf_variables::Fields;
 use crate::error::{Error, Place, Result};
 use crate::model::weather::air::{self, PRESSURES_PA, TEMPERATURES_K};
 use crate::model::weather::diagnosed::{self, Air};
-use crate::model::weather::extinction::{InvalidCounts, add, single_moment_phase};
+use crate::model::weather::extinction::{InvalidCounts, single_moment_phase};
 use crate::model::weather::grid::{Grid, Ground, Shape};
 
 /// Most cells of a step: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more
@@ -23,8 +23,6 @@ pub const MOST_CELLS: u64 = 1 << 24;
 const SPACINGS_M: (f64, f64) = (1.0, 500_000.0);
 /// Range of the heights of levels, m above sea level.
 const HEIGHTS_M: (f64, f64) = (-1000.0, 200_000.0);
-/// Greatest mixing ratio, kg/kg: there is no more water than air.
-const GREATEST_RATIO: f64 = 1.0;
 
 const NEEDED: [&str; 5] = ["P", "PB", "T", "PH", "PHB"];
 
@@ -39,7 +37,8 @@ pub enum Clouds {
 
 /// An open WRF file.
 pub struct WeatherFile {
-    container: Box<dyn Container>,
+    /// The file, with its format, variables and attributes.
+    pub container: NetCdf,
     path: PathBuf,
     /// Numbers of cells along each axis.
     pub shape: Shape,
@@ -64,12 +63,8 @@ pub struct Step {
     pub grid: Grid,
     /// Extinction of the clouds, m⁻¹.
     pub extinction: Vec<f64>,
-    /// Pressure.
-    pub pressure_pa: Vec<f64>,
-    /// Temperature.
-    pub temperature_k: Vec<f64>,
-    /// Mixing ratio of vapour, kg/kg.
-    pub vapour: Vec<f64>,
+    /// Pressure, temperature and vapour.
+    pub air: Air,
     /// Latitude and longitude of the domain's middle, radians, which moves where a nest follows a
     /// storm; `None` for an idealised case.
     pub middle: Option<(f64, f64)>,
@@ -82,23 +77,23 @@ pub struct Step {
 /// # Errors
 /// When the file is no WRF file or has no variables that clouds can be made of.
 pub fn open(path: &Path) -> Result<WeatherFile> {
-    from_container(Box::new(netcdf::open(path)?), path)
+    from_container(netcdf::open(path)?, path)
 }
 
 /// Reads the declarations of an open container; `path` is its name in messages.
 ///
 /// # Errors
 /// As [`open`].
-pub fn from_container(container: Box<dyn Container>, path: &Path) -> Result<WeatherFile> {
+pub fn from_container(container: NetCdf, path: &Path) -> Result<WeatherFile> {
     understand(container, path).map_err(|what| Error::scene(Place::file(path), what))
 }
 
-fn understand(container: Box<dyn Container>, path: &Path) -> Checked<WeatherFile> {
-    let file = container.as_ref();
+fn understand(container: NetCdf, path: &Path) -> Checked<WeatherFile> {
+    let file = &container;
     let missing: Vec<&str> =
         NEEDED.into_iter().filter(|name| file.variable(name).is_none()).collect();
     if missing.len() == NEEDED.len() {
-        let names: Vec<&str> = file.variables().iter().take(8).map(|v| v.name.as_str()).collect();
+        let names: Vec<&str> = file.variables.iter().take(8).map(|v| v.name.as_str()).collect();
         return Err(format!(
             "not a WRF file: none of {} is in it; it has {}",
             NEEDED.join(", "),
@@ -112,9 +107,10 @@ fn understand(container: Box<dyn Container>, path: &Path) -> Checked<WeatherFile
     if !missing.is_empty() {
         return Err(format!("{} missing: expected {} of WRF", list(&missing), NEEDED.join(", ")));
     }
-    let (shape, n_steps) = shape_of(file)?;
+    let (shape, n_steps) =
+        shape_of(&file.variable("P").map(Variable::lengths).unwrap_or_default())?;
     let spacing_m = (spacing(file, "DX")?, spacing(file, "DY")?);
-    let is_idealised = number(file.attributes(), "MAP_PROJ") == Some(0.0);
+    let is_idealised = number(&file.attributes, "MAP_PROJ") == Some(0.0);
     let mut notes = Vec::new();
     let fields = Fields::find(file, shape, n_steps, &mut notes)?;
     let clouds = if fields.condensates.is_empty() { Clouds::Diagnosed } else { Clouds::Given };
@@ -149,13 +145,10 @@ fn list(names: &[&str]) -> String {
     }
 }
 
-/// Returns the shape and the number of steps of P, which has a value for each cell.
-fn shape_of(file: &dyn Container) -> Checked<(Shape, usize)> {
-    let lengths: Vec<u64> = file
-        .variable("P")
-        .map(|v| v.dimensions.iter().map(|d| d.length).collect())
-        .unwrap_or_default();
-    let [n_steps, nz, ny, nx] = lengths[..] else {
+/// Returns the shape and the number of steps of P, which has a value for each cell, from the lengths
+/// of its dimensions.
+fn shape_of(lengths: &[u64]) -> Checked<(Shape, usize)> {
+    let [n_steps, nz, ny, nx] = *lengths else {
         return Err(format!(
             "variable P: {} dimensions, expected Time, bottom_top, south_north and west_east",
             lengths.len()
@@ -181,9 +174,9 @@ fn shape_of(file: &dyn Container) -> Checked<(Shape, usize)> {
     Ok((Shape { nx: nx as usize, ny: ny as usize, nz: nz as usize }, n_steps as usize))
 }
 
-fn spacing(file: &dyn Container, name: &str) -> Checked<f64> {
+fn spacing(file: &NetCdf, name: &str) -> Checked<f64> {
     let expected = format!("expected metres from {} to {}", SPACINGS_M.0, SPACINGS_M.1);
-    match number(file.attributes(), name) {
+    match number(&file.attributes, name) {
         Some(spacing) if (SPACINGS_M.0..=SPACINGS_M.1).contains(&spacing) => Ok(spacing),
         Some(spacing) => Err(format!("attribute {name} is {spacing}: {expected}")),
         None => Err(format!("attribute {name} is missing: {expected}")),
@@ -191,14 +184,9 @@ fn spacing(file: &dyn Container, name: &str) -> Checked<f64> {
 }
 
 impl WeatherFile {
-    /// Returns the container, with the format, the variables and the attributes.
-    pub fn container(&self) -> &dyn Container {
-        self.container.as_ref()
-    }
-
     /// Returns the text of a global attribute.
     pub fn text(&self, name: &str) -> Option<&str> {
-        text(self.container.attributes(), name)
+        text(&self.container.attributes, name)
     }
 
     /// Returns the SHA-256 of the whole file.
@@ -227,7 +215,7 @@ impl WeatherFile {
     /// As [`WeatherFile::step`].
     pub fn terrain(&self, i_step: usize) -> Result<Option<(Ground, Vec<f64>)>> {
         let read = |field: &Field| {
-            let heights_m = field.read_whole(self.container.as_ref(), self.shape, i_step)?;
+            let heights_m = field.read_whole(&self.container, self.shape, i_step)?;
             within(&heights_m, HEIGHTS_M, "HGT", "m", self.shape, i_step)?;
             Ok((self.ground(i_step)?, heights_m))
         };
@@ -248,7 +236,7 @@ impl WeatherFile {
     }
 
     fn read_step(&self, i_step: usize) -> Checked<Step> {
-        let (file, shape, fields) = (self.container.as_ref(), self.shape, &self.fields);
+        let (file, shape, fields) = (&self.container, self.shape, &self.fields);
         let whole = |field: &Field| field.read_whole(file, shape, i_step);
         let grid = self.grid(i_step)?;
         let mut pressure_pa = whole(&fields.p)?;
@@ -256,55 +244,45 @@ impl WeatherFile {
         within(&pressure_pa, PRESSURES_PA, "P + PB", "Pa", shape, i_step)?;
         let mut temperature_k = whole(&fields.t)?;
         temperature_k.iter_mut().zip(&pressure_pa).for_each(|(t, p)| *t = air::temperature(*t, *p));
-        within(
-            &temperature_k,
-            TEMPERATURES_K,
-            "the temperature of T, P and PB",
-            "K",
-            shape,
-            i_step,
-        )?;
+        let what = "the temperature of T, P and PB";
+        within(&temperature_k, TEMPERATURES_K, what, "K", shape, i_step)?;
         let mut oddities = InvalidCounts::default();
+        let mut ratios = |field: &Field| -> Checked<Vec<f64>> {
+            let mut ratios = field.read(file, shape, i_step)?;
+            oddities.clear(&mut ratios);
+            Ok(ratios)
+        };
         let vapour = match &fields.vapour {
-            Some(field) => ratios(field.read(file, shape, i_step)?, &mut oddities),
+            Some(field) => ratios(field)?,
             None => vec![0.0; shape.n_cells()],
         };
-        let dry_density = |i: usize| air::dry_density(pressure_pa[i], temperature_k[i], vapour[i]);
+        let air = Air { pressure_pa, temperature_k, vapour };
         let extinction = match self.clouds {
             Clouds::Given => {
                 let mut extinction = vec![0.0; shape.n_cells()];
                 for (field, phase) in &fields.condensates {
-                    let read = field.read(file, shape, i_step)?;
                     let is_both = fields.is_single_moment && field.name == "QCLOUD";
-                    let phase_of = |i: usize| {
-                        if is_both { single_moment_phase(temperature_k[i]) } else { *phase }
-                    };
-                    let odd = add(&mut extinction, &read, dry_density, phase_of, |ratio| {
-                        ratio > GREATEST_RATIO
-                    });
-                    oddities.n_negative += odd.n_negative;
-                    oddities.n_missing += odd.n_missing;
+                    for (i, ratio) in ratios(field)?.into_iter().enumerate() {
+                        let phase = if is_both {
+                            single_moment_phase(air.temperature_k[i])
+                        } else {
+                            *phase
+                        };
+                        extinction[i] += phase.extinction(ratio, air.dry_density(i));
+                    }
                 }
                 extinction
             }
-            Clouds::Diagnosed => {
-                let air = Air {
-                    pressure_pa: &pressure_pa,
-                    temperature_k: &temperature_k,
-                    vapour: &vapour,
-                };
-                diagnosed::extinction(&grid, air)
-            }
+            Clouds::Diagnosed => diagnosed::extinction(&grid, &air),
         };
-        let middle = self.middle(i_step)?;
-        Ok(Step { grid, extinction, pressure_pa, temperature_k, vapour, middle, oddities })
+        Ok(Step { grid, extinction, air, middle: self.middle(i_step)?, oddities })
     }
 
     fn middle(&self, i_step: usize) -> Checked<Option<(f64, f64)>> {
         let i_middle = self.shape.ny / 2 * self.shape.nx + self.shape.nx / 2;
         let at = |field: &Option<Field>, greatest: f64| match field {
             Some(field) => {
-                let degrees = field.read(self.container.as_ref(), self.shape, i_step)?[i_middle];
+                let degrees = field.read(&self.container, self.shape, i_step)?[i_middle];
                 Ok((degrees.abs() <= greatest).then_some(degrees.to_radians()))
             }
             None => Ok::<_, String>(None),
@@ -318,7 +296,7 @@ impl WeatherFile {
     fn ground(&self, i_step: usize) -> Checked<Ground> {
         let (shape, fields) = (self.shape, &self.fields);
         let factors = |field: &Option<Field>| match field {
-            Some(field) => field.read_whole(self.container.as_ref(), shape, i_step),
+            Some(field) => field.read_whole(&self.container, shape, i_step),
             None => Ok(vec![1.0; shape.n_columns()]),
         };
         let [mx, my] = [factors(&fields.factors[0])?, factors(&fields.factors[1])?];
@@ -329,7 +307,7 @@ impl WeatherFile {
 
     /// Returns the places of a step's cells.
     fn grid(&self, i_step: usize) -> Checked<Grid> {
-        let (file, shape, fields) = (self.container.as_ref(), self.shape, &self.fields);
+        let (file, shape, fields) = (&self.container, self.shape, &self.fields);
         let ground = self.ground(i_step)?;
         let mut heights_m = fields.ph.read_whole(file, shape, i_step)?;
         let base = fields.phb.read_whole(file, shape, i_step)?;
@@ -338,20 +316,6 @@ impl WeatherFile {
         Grid::new(ground, heights_m)
             .map_err(|what| format!("variables PH, PHB, step {i_step}: {what}"))
     }
-}
-
-/// Replaces each value that is no mixing ratio by 0 and counts it.
-fn ratios(mut read: Vec<f64>, oddities: &mut InvalidCounts) -> Vec<f64> {
-    for ratio in &mut read {
-        if ratio.is_nan() || *ratio > GREATEST_RATIO {
-            oddities.n_missing += 1;
-            *ratio = 0.0;
-        } else if *ratio < 0.0 {
-            oddities.n_negative += 1;
-            *ratio = 0.0;
-        }
-    }
-    read
 }
 
 fn within(
@@ -369,5 +333,21 @@ fn within(
             numbers[i],
             place(shape, numbers.len(), i)
         )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_memory_holds_is_refused() {
+        assert_eq!(
+            shape_of(&[1, 60_000, 60_000, 60_000]).unwrap_err(),
+            "variable P: 60000 x 60000 x 60000 cells, at most 16777216 can be held"
+        );
+        assert!(shape_of(&[1, 1 << 40, 1 << 40, 1]).is_err());
+        assert!(shape_of(&[wrf_clock::MOST_STEPS + 1, 1, 1, 1]).is_err());
+        assert_eq!(shape_of(&[3, 2, 5, 7]), Ok((Shape { nx: 7, ny: 5, nz: 2 }, 3)));
     }
 }

@@ -1,6 +1,7 @@
 //! Times of the steps of a WRF file.
 
-use super::container::{Checked, Container, Variable};
+use super::container::{Checked, Variable};
+use super::netcdf::NetCdf;
 use crate::model::weather::steps::{first_out_of_order, format, parse};
 
 /// Most steps of a file: two years of 10 minutes.
@@ -11,7 +12,7 @@ pub const MOST_STEPS: u64 = 105_408;
 ///
 /// # Errors
 /// When a time cannot be read or does not come after the one before it.
-pub fn times(file: &dyn Container, n_steps: usize) -> Checked<Option<Vec<f64>>> {
+pub fn times(file: &NetCdf, n_steps: usize) -> Checked<Option<Vec<f64>>> {
     let (name, times_s) = if file.variable("Times").is_some() {
         ("Times", from_text(file, n_steps)?)
     } else if let Some(variable) = file.variable("XTIME") {
@@ -34,7 +35,7 @@ pub fn times(file: &dyn Container, n_steps: usize) -> Checked<Option<Vec<f64>>> 
     }
 }
 
-fn from_text(file: &dyn Container, n_steps: usize) -> Checked<Vec<f64>> {
+fn from_text(file: &NetCdf, n_steps: usize) -> Checked<Vec<f64>> {
     let rows = file.read_rows("Times").map_err(|what| format!("variable Times: {what}"))?;
     if rows.len() != n_steps {
         return Err(format!("variable Times: {} times of {n_steps} steps", rows.len()));
@@ -50,7 +51,7 @@ fn from_text(file: &dyn Container, n_steps: usize) -> Checked<Vec<f64>> {
     rows.iter().enumerate().map(time).collect()
 }
 
-fn from_minutes(file: &dyn Container, variable: &Variable, n_steps: usize) -> Checked<Vec<f64>> {
+fn from_minutes(file: &NetCdf, variable: &Variable, n_steps: usize) -> Checked<Vec<f64>> {
     let since = variable
         .text("units")
         .and_then(|units| units.strip_prefix("minutes since "))
@@ -60,7 +61,7 @@ fn from_minutes(file: &dyn Container, variable: &Variable, n_steps: usize) -> Ch
             "variable XTIME: expected units \"minutes since YYYY-MM-DD HH:MM:SS\"".to_owned()
         );
     };
-    if variable.dimensions.len() != 1 || variable.dimensions[0].length != n_steps as u64 {
+    if variable.lengths() != [n_steps as u64] {
         return Err(format!("variable XTIME: {} values of {n_steps} steps", variable.shape_text()));
     }
     let minutes = file

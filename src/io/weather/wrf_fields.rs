@@ -1,6 +1,7 @@
 //! One WRF variable at one step, with its shape and unit checked.
 
-use super::container::{Checked, Container, Variable};
+use super::container::{Checked, Variable};
+use super::netcdf::NetCdf;
 use crate::model::weather::grid::Shape;
 
 /// Numbers beyond this are fill values: NetCDF's own is 9.969e36, WRF's and others' are 1e20 and
@@ -51,7 +52,7 @@ impl Field {
     /// # Errors
     /// When the shape or the unit is another one than expected.
     pub fn find(
-        file: &dyn Container,
+        file: &NetCdf,
         name: &'static str,
         extent: Extent,
         units: &[(&str, f64)],
@@ -60,7 +61,7 @@ impl Field {
     ) -> Checked<Option<Field>> {
         let Some(variable) = file.variable(name) else { return Ok(None) };
         let expected = extent.lengths(shape);
-        let lengths: Vec<u64> = variable.dimensions.iter().map(|d| d.length).collect();
+        let lengths = variable.lengths();
         let has_time = lengths.len() == expected.len() + 1;
         let is_fit = match lengths.split_first() {
             Some((first, rest)) if has_time => *first == n_steps as u64 && rest == expected,
@@ -86,7 +87,7 @@ impl Field {
     ///
     /// # Errors
     /// When they cannot be read.
-    pub fn read(&self, file: &dyn Container, shape: Shape, i_step: usize) -> Checked<Vec<f64>> {
+    pub fn read(&self, file: &NetCdf, shape: Shape, i_step: usize) -> Checked<Vec<f64>> {
         let mut count = self.extent.lengths(shape);
         let mut start = vec![0; count.len()];
         if self.has_time {
@@ -106,12 +107,7 @@ impl Field {
     ///
     /// # Errors
     /// As [`read`](Self::read), and when values are missing.
-    pub fn read_whole(
-        &self,
-        file: &dyn Container,
-        shape: Shape,
-        i_step: usize,
-    ) -> Checked<Vec<f64>> {
+    pub fn read_whole(&self, file: &NetCdf, shape: Shape, i_step: usize) -> Checked<Vec<f64>> {
         let numbers = self.read(file, shape, i_step)?;
         let Some(first) = numbers.iter().position(|n| n.is_nan()) else { return Ok(numbers) };
         let n_missing = numbers.iter().filter(|n| n.is_nan()).count();

@@ -1,6 +1,7 @@
 //! WRF's variables that clouds are made of: their names, units and meaning.
 
-use super::container::{Checked, Container, number};
+use super::container::{Checked, number};
+use super::netcdf::NetCdf;
 use super::wrf_fields::{Extent, Field};
 use crate::model::weather::extinction::{ICE, LIQUID, Phase, SNOW};
 use crate::model::weather::grid::Shape;
@@ -58,7 +59,7 @@ impl Fields {
     /// Finds the variables and checks their shapes and units. Notes on conversions and on missing
     /// variables go to `notes`.
     pub fn find(
-        file: &dyn Container,
+        file: &NetCdf,
         shape: Shape,
         n_steps: usize,
         notes: &mut Vec<String>,
@@ -79,7 +80,7 @@ impl Fields {
             }
         }
         let has = |name: &str| condensates.iter().any(|(field, _)| field.name == name);
-        let scheme = number(file.attributes(), "MP_PHYSICS");
+        let scheme = number(&file.attributes, "MP_PHYSICS");
         let is_single_moment =
             scheme == Some(SINGLE_MOMENT_SCHEME) && has("QCLOUD") && !has("QICE");
         if is_single_moment {

@@ -39,19 +39,25 @@ fn condensed_per_metre(p_pa: f64, t_k: f64) -> f64 {
 }
 
 /// Air on a grid's cells at one moment.
-#[derive(Debug, Clone, Copy)]
-pub struct Air<'a> {
+pub struct Air {
     /// Pressure.
-    pub pressure_pa: &'a [f64],
+    pub pressure_pa: Vec<f64>,
     /// Temperature.
-    pub temperature_k: &'a [f64],
+    pub temperature_k: Vec<f64>,
     /// Mixing ratio of water vapour, kg/kg.
-    pub vapour: &'a [f64],
+    pub vapour: Vec<f64>,
+}
+
+impl Air {
+    /// Returns the density of the dry air of a cell, kg/m³.
+    pub fn dry_density(&self, i: usize) -> f64 {
+        dry_density(self.pressure_pa[i], self.temperature_k[i], self.vapour[i])
+    }
 }
 
 /// Returns the extinction of every cell, m⁻¹: [`fraction`] times water that grows adiabatically
 /// from the lowest humid cell of the layer. Water below 273.15 K is ice.
-pub fn extinction(grid: &Grid, air: Air) -> Vec<f64> {
+pub fn extinction(grid: &Grid, air: &Air) -> Vec<f64> {
     let shape = grid.shape();
     let mut extinction = vec![0.0; shape.n_cells()];
     for i_column in 0..shape.n_columns() {
@@ -68,8 +74,7 @@ pub fn extinction(grid: &Grid, air: Air) -> Vec<f64> {
             let grown = ADIABATIC_SHARE * condensed_per_metre(p, t) * grid.thickness_m(i);
             let within = (below + 0.5 * grown).min(MAX_WATER_RATIO);
             below += grown;
-            extinction[i] = covered
-                * single_moment_phase(t).extinction(within, dry_density(p, t, air.vapour[i]));
+            extinction[i] = covered * single_moment_phase(t).extinction(within, air.dry_density(i));
         }
     }
     extinction
@@ -114,9 +119,9 @@ mod tests {
         let (p, t) = (9e4, 283.15);
         let saturated = saturation_ratio(p, t);
         // Dry, humid, humid, dry, humid.
-        let vapour = [0.5, 1.0, 1.0, 0.5, 1.0].map(|f| f * saturated);
-        let air = Air { pressure_pa: &[p; 5], temperature_k: &[t; 5], vapour: &vapour };
-        let beta = extinction(&grid, air);
+        let vapour = [0.5, 1.0, 1.0, 0.5, 1.0].map(|f| f * saturated).to_vec();
+        let air = Air { pressure_pa: vec![p; 5], temperature_k: vec![t; 5], vapour };
+        let beta = extinction(&grid, &air);
         // 0.5 · 1.889e-6 · 100 m = 9.444e-5 kg/kg at the middle of the first 200 m. The extinction
         // is 0.15 m⁻¹ a g/kg in 1 kg/m³, and the dry density is 9e4/(287 · 283.15 (1 +
         // 8.524e-3/0.622)) = 1.0925.
@@ -125,6 +130,6 @@ mod tests {
         assert_eq!((beta[0], beta[3], beta[4]), (0.0, 0.0, beta[1]));
         // A kilometre deep, the cloud has its greatest water content.
         let deep = Grid { heights_m: vec![0.0, 1e3, 2e3, 3e3, 4e3, 5e3], ..grid };
-        assert!((extinction(&deep, air)[2] - 0.15 * 1.0925 * 0.5).abs() < 1e-5);
+        assert!((extinction(&deep, &air)[2] - 0.15 * 1.0925 * 0.5).abs() < 1e-5);
     }
 }

@@ -33,6 +33,9 @@ pub fn single_moment_phase(t_k: f64) -> Phase {
     if t_k < T0_K { ICE } else { LIQUID }
 }
 
+/// Greatest mixing ratio, kg/kg: there is no more water than air.
+const GREATEST_RATIO: f64 = 1.0;
+
 /// Counts of values that are not mixing ratios.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct InvalidCounts {
@@ -43,32 +46,17 @@ pub struct InvalidCounts {
 }
 
 impl InvalidCounts {
-    /// Returns whether all values were valid.
-    pub fn is_none(self) -> bool {
-        self == InvalidCounts::default()
-    }
-}
-
-/// Adds the extinction of one kind of condensate to every cell. `ratios` are kg/kg; `is_missing`
-/// tells the values that stand for no data.
-pub fn add(
-    extinction: &mut [f64],
-    ratios: &[f64],
-    dry_density: impl Fn(usize) -> f64,
-    phase_of: impl Fn(usize) -> Phase,
-    is_missing: impl Fn(f64) -> bool,
-) -> InvalidCounts {
-    let mut odd = InvalidCounts::default();
-    for (i, (beta, &ratio)) in extinction.iter_mut().zip(ratios).enumerate() {
-        if !ratio.is_finite() || is_missing(ratio) {
-            odd.n_missing += 1;
-        } else if ratio < 0.0 {
-            odd.n_negative += 1;
-        } else {
-            *beta += phase_of(i).extinction(ratio, dry_density(i));
+    /// Replaces each value that is no mixing ratio, kg/kg, by 0 and counts it.
+    pub fn clear(&mut self, ratios: &mut [f64]) {
+        for ratio in ratios {
+            match *ratio {
+                q if q.is_nan() || q > GREATEST_RATIO => self.n_missing += 1,
+                q if q < 0.0 => self.n_negative += 1,
+                _ => continue,
+            }
+            *ratio = 0.0;
         }
     }
-    odd
 }
 
 #[cfg(test)]
@@ -87,12 +75,12 @@ mod tests {
 
     #[test]
     fn invalid_ratios_are_counted_and_add_nothing() {
-        let mut beta = vec![1.0; 6];
-        let ratios = [1e-3, -1e-9, f64::NAN, f64::INFINITY, 9.969e36, 0.0];
-        let odd = add(&mut beta, &ratios, |_| 1.0, |_| LIQUID, |q| q > 1e30);
+        let mut ratios = [1e-3, -1e-9, f64::NAN, f64::INFINITY, 9.969e36, 0.0];
+        let mut odd = InvalidCounts::default();
+        odd.clear(&mut ratios);
         assert_eq!(odd, InvalidCounts { n_negative: 1, n_missing: 3 });
-        assert!((beta[0] - 1.15).abs() < 1e-15);
-        assert_eq!(beta[1..], [1.0; 5]);
-        assert!(!odd.is_none() && InvalidCounts::default().is_none());
+        assert_eq!(ratios, [1e-3, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        odd.clear(&mut ratios);
+        assert_eq!(odd, InvalidCounts { n_negative: 1, n_missing: 3 });
     }
 }

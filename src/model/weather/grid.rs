@@ -79,18 +79,6 @@ impl Ground {
     pub fn area_m2(&self, i_column: usize) -> f64 {
         self.dx_m[i_column] * self.dy_m[i_column]
     }
-
-    /// Returns the greatest distance of a column's edge from the centre, east and south, m.
-    pub fn extent_m(&self) -> (f64, f64) {
-        let greatest = |places: &[f64], sizes: &[f64]| {
-            places
-                .iter()
-                .zip(sizes)
-                .map(|(place, size)| place.abs() + size / 2.0)
-                .fold(0.0, f64::max)
-        };
-        (greatest(&self.east_m, &self.dx_m), greatest(&self.south_m, &self.dy_m))
-    }
 }
 
 /// Range of the map factors of WRF's projections.
@@ -171,13 +159,6 @@ impl Grid {
     pub fn middle_m(&self, i_cell: usize) -> f64 {
         0.5 * (self.bottom_m(i_cell) + self.top_m(i_cell))
     }
-
-    /// Returns the grid at `weight` of the way to another moment's.
-    pub fn toward(&self, other: &Grid, weight: f64) -> Grid {
-        let mix = |(a, b): (&f64, &f64)| a + weight * (b - a);
-        let heights_m = self.heights_m.iter().zip(&other.heights_m).map(mix).collect();
-        Grid { ground: self.ground.clone(), heights_m }
-    }
 }
 
 #[cfg(test)]
@@ -194,7 +175,6 @@ mod tests {
         assert_eq!(ground.east_m, [-75.0, 0.0, 75.0, -100.0, 0.0, 100.0]);
         // The first row is the southernmost.
         assert_eq!(ground.south_m, [25.0, 25.0, 25.0, -25.0, -25.0, -25.0]);
-        assert_eq!(ground.extent_m(), (150.0, 50.0));
     }
 
     #[test]

@@ -5,12 +5,12 @@ use super::grid::Grid;
 use super::particles::{Layout, WeatherBlob};
 
 /// The clouds of a step.
-#[derive(Debug, Clone, Copy)]
-pub struct StepClouds<'a> {
+#[derive(Debug, Clone)]
+pub struct StepClouds {
     /// Grid of the step.
-    pub grid: &'a Grid,
+    pub grid: Grid,
     /// Extinction of every cell, m⁻¹.
-    pub extinction: &'a [f64],
+    pub extinction: Vec<f64>,
 }
 
 /// Blobs of two neighbouring steps, or of one step.
@@ -24,29 +24,17 @@ pub struct Interval {
 impl Interval {
     /// Places the blobs of `layout` for a step and the next one on a grid of the same shape, or for
     /// a step alone.
-    pub fn laid_out(layout: &Layout, a: StepClouds, b: Option<StepClouds>) -> Self {
-        Interval {
-            from: layout.blobs(a.grid, a.extinction),
-            to: b.map(|b| layout.blobs(b.grid, b.extinction)),
-        }
+    pub fn laid_out(layout: &Layout, a: &StepClouds, b: Option<&StepClouds>) -> Self {
+        let blobs = |step: &StepClouds| layout.blobs(&step.grid, &step.extinction);
+        Interval { from: blobs(a), to: b.map(blobs) }
     }
 
-    /// Returns the number of blobs.
-    pub fn len(&self) -> usize {
-        self.from.len()
-    }
-
-    /// Returns whether there are no blobs.
-    pub fn is_empty(&self) -> bool {
-        self.from.is_empty()
-    }
-
-    /// Returns a blob at `weight` of the way from the first step to the second. Place, widths and
-    /// mass are linear in it, so that the clouds' mass is, too.
-    pub fn blob(&self, i: usize, weight: f64) -> WeatherBlob {
-        let from = self.from[i];
+    /// Returns a blob at `weight` of the way from the first step to the second, or `None` past the
+    /// last blob. Place, widths and mass are linear in it, so that the clouds' mass is, too.
+    pub fn blob(&self, i: usize, weight: f64) -> Option<WeatherBlob> {
+        let from = *self.from.get(i)?;
         let Some(to) = self.to.as_ref().map(|to| to[i]).filter(|_| weight != 0.0) else {
-            return from;
+            return Some(from);
         };
         let mix = |a: f64, b: f64| a + weight * (b - a);
         let mut blob = WeatherBlob {
@@ -56,6 +44,6 @@ impl Interval {
             kappa: 1.0,
         };
         blob.kappa = mix(from.mass(), to.mass()) / blob.mass();
-        blob
+        Some(blob)
     }
 }

@@ -6,7 +6,6 @@
 //! the south, each row from the west.
 
 pub mod air;
-pub mod columns;
 pub mod diagnosed;
 pub mod extinction;
 pub mod grid;

@@ -1,6 +1,5 @@
 //! Statistics of the clouds of a step.
 
-use super::columns;
 use super::grid::Grid;
 
 /// Extinction below which a cell holds no visible cloud, m⁻¹: through 10 km of it 99 % of the light
@@ -29,11 +28,21 @@ pub struct CloudStatistics {
     pub mass_m2: f64,
 }
 
+/// Returns the vertical optical depth of each column, Σ β Δh.
+pub fn column_depths(grid: &Grid, extinction: &[f64]) -> Vec<f64> {
+    let n_columns = grid.shape().n_columns();
+    let mut depths = vec![0.0; n_columns];
+    for (i, beta) in extinction.iter().enumerate() {
+        depths[i % n_columns] += beta * grid.thickness_m(i);
+    }
+    depths
+}
+
 /// Computes the statistics of an extinction field, m⁻¹.
 pub fn of(grid: &Grid, extinction: &[f64]) -> CloudStatistics {
     let shape = grid.shape();
     let n = shape.n_columns();
-    let depths = columns::of_cells(grid, extinction);
+    let depths = column_depths(grid, extinction);
     let mut has_cloud = vec![false; n];
     let mut base_and_top_m: Option<(f64, f64)> = None;
     let mut n_cells = 0;

@@ -9,7 +9,7 @@ const SECONDS_A_DAY: f64 = 86_400.0;
 
 /// Returns the days from 1970-01-01 of a date of the proleptic Gregorian calendar. *Source*:
 /// Hinnant, "chrono-compatible low-level date algorithms".
-pub fn days(year: i64, month: u32, day: u32) -> i64 {
+fn days(year: i64, month: u32, day: u32) -> i64 {
     let year = if month <= 2 { year - 1 } else { year };
     let era = year.div_euclid(400);
     let of_era = year.rem_euclid(400);
@@ -19,7 +19,7 @@ pub fn days(year: i64, month: u32, day: u32) -> i64 {
 }
 
 /// Returns year, month and day of such a day.
-pub fn date(days: i64) -> (i64, u32, u32) {
+fn date(days: i64) -> (i64, u32, u32) {
     let z = days + 719_468;
     let era = z.div_euclid(146_097);
     let of_era = z.rem_euclid(146_097);
@@ -84,36 +84,21 @@ pub fn first_out_of_order(times_s: &[f64]) -> Option<usize> {
     times_s.windows(2).position(|w| !is_later(w)).map(|i| i + 1)
 }
 
-/// Interpolation of a moment: (1 − weight) of step i and weight of step j.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Between {
-    /// Index of the earlier step.
-    pub i: usize,
-    /// Index of the later step; `i` if only one step counts.
-    pub j: usize,
-    /// Weight of the later step.
-    pub weight: f64,
-}
-
-/// Returns the steps that `t_s` lies between, of steps at rising `times_s`. Steps at most
-/// [`LONGEST_INTERPOLATED_S`] apart are interpolated linearly; otherwise the earlier one counts.
-/// The first step stands for all earlier times, the last for all later ones. `None` without steps
-/// or for NaN.
-pub fn between(times_s: &[f64], t_s: f64) -> Option<Between> {
+/// Returns the step before `t_s`, of steps at rising `times_s`, and the weight of the step after it;
+/// the step itself has the rest. Steps at most [`LONGEST_INTERPOLATED_S`] apart are interpolated
+/// linearly; otherwise the earlier one counts. The first step stands for all earlier times, the last
+/// for all later ones. `None` without steps or for NaN.
+pub fn between(times_s: &[f64], t_s: f64) -> Option<(usize, f64)> {
     if times_s.is_empty() || t_s.is_nan() {
         return None;
     }
     let n_before = times_s.partition_point(|&time| time <= t_s);
     let i = n_before.saturating_sub(1);
-    let alone = Some(Between { i, j: i, weight: 0.0 });
-    if n_before == 0 || n_before == times_s.len() {
-        return alone;
+    if n_before == 0 || n_before == times_s.len() || t_s == times_s[i] {
+        return Some((i, 0.0));
     }
     let gap = times_s[i + 1] - times_s[i];
-    if gap > LONGEST_INTERPOLATED_S || t_s == times_s[i] {
-        return alone;
-    }
-    Some(Between { i, j: i + 1, weight: (t_s - times_s[i]) / gap })
+    Some((i, if gap > LONGEST_INTERPOLATED_S { 0.0 } else { (t_s - times_s[i]) / gap }))
 }
 
 #[cfg(test)]
@@ -166,17 +151,17 @@ mod tests {
     #[test]
     fn moments_between_steps() {
         let times = [0.0, 120.0, 720.0, 1320.5];
-        let at = |t: f64| between(&times, t).map(|b| (b.i, b.j, b.weight)).unwrap();
-        assert_eq!(at(-5.0), (0, 0, 0.0));
-        assert_eq!(at(0.0), (0, 0, 0.0));
-        assert_eq!(at(30.0), (0, 1, 0.25));
-        assert_eq!(at(120.0), (1, 1, 0.0));
+        let at = |t: f64| between(&times, t).unwrap();
+        assert_eq!(at(-5.0), (0, 0.0));
+        assert_eq!(at(0.0), (0, 0.0));
+        assert_eq!(at(30.0), (0, 0.25));
+        assert_eq!(at(120.0), (1, 0.0));
         // Ten minutes are interpolated, half a second more is not.
-        assert_eq!(at(420.0), (1, 2, 0.5));
-        assert_eq!(at(1320.0), (2, 2, 0.0));
-        assert_eq!(at(1320.5), (3, 3, 0.0));
-        assert_eq!(at(f64::INFINITY), (3, 3, 0.0));
-        assert_eq!(between(&[7.0], 9.0), Some(Between { i: 0, j: 0, weight: 0.0 }));
+        assert_eq!(at(420.0), (1, 0.5));
+        assert_eq!(at(1320.0), (2, 0.0));
+        assert_eq!(at(1320.5), (3, 0.0));
+        assert_eq!(at(f64::INFINITY), (3, 0.0));
+        assert_eq!(between(&[7.0], 9.0), Some((0, 0.0)));
         assert_eq!(between(&[], 9.0), None);
         assert_eq!(between(&times, f64::NAN), None);
     }

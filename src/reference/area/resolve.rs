@@ -5,7 +5,6 @@
 use glam::DVec3;
 
 use super::adaptive::Cell;
-use super::clip::WHOLE;
 use super::scene::{AreaScene, Exposure, Receiver};
 use crate::model::light::{Light, MIN_PENUMBRA};
 use crate::reference::Blob;
@@ -13,20 +12,17 @@ use crate::reference::occlude::{Rectangle, Source, source_of};
 
 /// Greatest radius of a cell, over its distance from anything that varies as 1/d². There the
 /// integrand has no feature narrower than d, and neighbouring nodes are at most 0.5 radii apart.
-const NEAREST: f64 = 0.7;
+pub(super) const NEAREST: f64 = 0.7;
 /// Resolution of a lobe, in widths 1/√n_s.
-struct LobeDetail {
+pub(super) struct LobeDetail {
     /// Greatest spread of the half vector over a cell.
-    widths: f64,
+    pub widths: f64,
     /// Distance from the peak beyond which the lobe vanishes.
-    reach: f64,
+    pub reach: f64,
 }
 
 /// Neighbouring nodes lie within a width; e^{−8²/2} = 1.3e-14 of the peak is left at the reach.
 const LOBE: LobeDetail = LobeDetail { widths: 1.5, reach: 8.0 };
-/// For a mean of L2: nodes within 1.5 widths meet every peak, and e^{−4²/2} = 3e-4 of it has no
-/// weight in a mean.
-const MIRROR: LobeDetail = LobeDetail { widths: 3.0, reach: 4.0 };
 /// Greatest radius of a cell and reach of a blob, σ. At the reach e^{−4²/2} = 3e-4 of the depth is
 /// left.
 const BLOB_WIDTHS: f64 = 1.5;
@@ -39,16 +35,16 @@ const PENUMBRA_WIDTHS: f64 = 0.7;
 const PENUMBRA_TOLERANCE: f64 = 1e-4;
 /// Angular radius below which a cell is small enough, since a lobe at grazing angles could be
 /// divided without end.
-const MIN_ANGLE: f64 = 1e-9;
+pub(super) const MIN_ANGLE: f64 = 1e-9;
 
 /// The ball about a cell's centroid that contains the cell.
-struct Ball {
-    center: DVec3,
-    radius: f64,
+pub(super) struct Ball {
+    pub center: DVec3,
+    pub radius: f64,
 }
 
 impl Ball {
-    fn of(rect: &Rectangle, cell: &Cell) -> Ball {
+    pub fn of(rect: &Rectangle, cell: &Cell) -> Ball {
         let corners = cell.corners.map(|x| rect.point(x.x, x.y));
         let center = (corners[0] + corners[1] + corners[2]) / 3.0;
         Ball { center, radius: corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max) }
@@ -85,55 +81,9 @@ pub(super) fn is_incident_resolved(
         && are_blobs_resolved(view.scene, &ball, Source::At(at.position), view.relative)
 }
 
-/// Returns whether a cell of a mean of L1 toward `eye` is small enough.
-pub(super) fn is_first_resolved(view: &ViewOfSurface, eye: DVec3, cell: &Cell) -> bool {
-    let ball = Ball::of(&view.scene.rectangles[view.i_surface], cell);
-    let Some((from, spread)) = cone(&ball, eye) else { return false };
-    spread < MIN_ANGLE || is_light_resolved(view, &ball, (-from, spread))
-}
-
-/// Returns whether a cell of a mean of L2 toward `eye` is small enough: for the distance or size of
-/// every other surface, and for the lobe that mirrors the light sources.
-pub(super) fn is_second_resolved(
-    scene: &AreaScene,
-    i_surface: usize,
-    eye: DVec3,
-    cell: &Cell,
-) -> bool {
-    let (rect, brdf) = (&scene.rectangles[i_surface], &scene.brdfs[i_surface]);
-    let ball = Ball::of(rect, cell);
-    let view = ball.center.distance(eye);
-    let glossy = brdf.ks != DVec3::ZERO;
-    if glossy && ball.radius > NEAREST * view {
-        return false;
-    }
-    let (toward, turn) =
-        ((eye - ball.center).normalize_or_zero(), (ball.radius / view).min(1.0).asin());
-    let others = scene.rectangles.iter().enumerate().filter(|(_, other)| !lies_behind(rect, other));
-    others.into_iter().all(|(i, other)| {
-        let way = other.nearest(ball.center) - ball.center;
-        let narrow = other.u.length().min(other.v.length());
-        let reach = way.length().max(narrow);
-        if ball.radius > NEAREST * reach {
-            return false;
-        }
-        // The lobe and the source that it mirrors blur each other, so their features are as wide as
-        // the wider one.
-        let ns = brdf.ns.min((reach / narrow).powi(2));
-        let spread = (ball.radius / reach).asin() + turn;
-        let dark = scene.regions[i].is_empty();
-        let mirrors = |from: DVec3| is_lobe_resolved(ns, rect.normal, from, toward, spread, MIRROR);
-        !glossy || dark || way.try_normalize().is_none_or(mirrors)
-    })
-}
-
-fn lies_behind(rect: &Rectangle, other: &Rectangle) -> bool {
-    WHOLE.iter().all(|x| rect.side(other.point(x.x, x.y)) <= 0.0)
-}
-
 /// Returns whether the first reflection from the ball along `along`, a direction and how far it
 /// turns over the ball, is resolved.
-fn is_light_resolved(view: &ViewOfSurface, ball: &Ball, along: (DVec3, f64)) -> bool {
+pub(super) fn is_light_resolved(view: &ViewOfSurface, ball: &Ball, along: (DVec3, f64)) -> bool {
     let ViewOfSurface { scene, i_surface, lit, relative } = *view;
     let (brdf, normal) = (&scene.brdfs[i_surface], scene.rectangles[i_surface].normal);
     lit.iter().filter(|(_, exposure)| *exposure == Exposure::Open).all(|&(i_light, _)| {
@@ -147,7 +97,7 @@ fn is_light_resolved(view: &ViewOfSurface, ball: &Ball, along: (DVec3, f64)) -> 
 
 /// Returns the direction of a ball's centre from `p` and the half angle of the cone about it;
 /// `None` if the ball is too near.
-fn cone(ball: &Ball, p: DVec3) -> Option<(DVec3, f64)> {
+pub(super) fn cone(ball: &Ball, p: DVec3) -> Option<(DVec3, f64)> {
     let way = ball.center - p;
     let distance = way.length();
     (ball.radius <= NEAREST * distance).then(|| (way / distance, (ball.radius / distance).asin()))
@@ -189,7 +139,7 @@ fn light_cone(light: &Light, ball: &Ball, relative: f64) -> Option<(DVec3, f64)>
 
 /// Returns whether the half vector of directions within `spread` of `a` and `b` together turns
 /// little compared with the lobe's width, or stays where the lobe vanishes.
-fn is_lobe_resolved(
+pub(super) fn is_lobe_resolved(
     ns: f64,
     normal: DVec3,
     a: DVec3,

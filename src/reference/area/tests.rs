@@ -1,11 +1,11 @@
 //! Values worked by hand and published ones, and agreement with paths that share no quadrature.
 
-use super::mean::Window;
 use super::paths::PathSampling;
 use super::*;
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use mean::Window;
 
 use crate::model::light::Light;
 use crate::model::material::Brdf;
@@ -13,6 +13,7 @@ use crate::model::surface::Surface;
 use crate::reference::Blob;
 
 mod estimates;
+mod mean;
 
 const UP: DVec3 = DVec3::Y;
 const FINE: Accuracy = Accuracy::relative(1e-9);

@@ -26,8 +26,6 @@ pub struct FrameReference {
     pub state: FrameState,
     /// Groups of all clouds at time 0.
     pub groups: Vec<Group>,
-    /// Particles relative to their groups, as they have grown.
-    pub generated: Vec<Generated>,
     /// Colour of every particle, linear RGB.
     pub colors: Vec<DVec3>,
     /// Placed particles.
@@ -97,7 +95,6 @@ impl FrameReference {
         Ok(FrameReference {
             state,
             groups,
-            generated,
             colors: colors(scene),
             blobs,
             facets: vec![],
@@ -145,27 +142,37 @@ impl FrameReference {
 
     /// Facets of the clouds and their colours, from the density grid.
     fn cloud_facets(&self, scene: &Scene, cells: &[f64]) -> (Vec<Facet>, Vec<DVec3>) {
-        let (grid, time_s) = (&self.state.grid, self.state.time_s);
-        let centers =
-            reference::place::cloud_centers(&scene.clouds, time_s, self.state.light_origin);
-        let regions = reference::place::regions(&self.groups);
+        let (mut facets, colors): (Vec<Facet>, Vec<DVec3>) =
+            self.with_sources(scene, |sources, centers| {
+                let grid = &self.state.grid;
+                if !scene.groups_facets() {
+                    let facets = reference::facets::facets(grid, cells, sources, centers);
+                    return (facets, self.colors.clone());
+                }
+                let (order, runs) = (self.morton_order(scene, sources.regions), scene.facet_runs());
+                reference::facet_runs::grouped(grid, cells, sources, centers, &order, &runs)
+                    .into_iter()
+                    .unzip()
+            });
+        facets.iter_mut().for_each(|f| f.region += scene.n_solids() as u32);
+        (facets, colors)
+    }
+
+    /// Calls `take` with what facets are made from and the place that each cloud's facets face away
+    /// from.
+    pub(super) fn with_sources<T>(
+        &self,
+        scene: &Scene,
+        take: impl FnOnce(&FacetSources<'_>, &[DVec3]) -> T,
+    ) -> T {
+        let FrameState { time_s, light_origin, .. } = self.state;
         let sources = FacetSources {
             blobs: &self.blobs,
             sigma_means: &reference::place::sigma_means(&self.groups, &scene.clouds, time_s),
-            regions: &regions,
+            regions: &reference::place::regions(&self.groups),
             colors: &self.colors,
         };
-        let (mut facets, colors): (Vec<Facet>, Vec<DVec3>) = if scene.groups_facets() {
-            let (order, runs) = (self.morton_order(scene, &regions), scene.facet_runs());
-            reference::facet_runs::grouped(grid, cells, &sources, &centers, &order, &runs)
-                .into_iter()
-                .unzip()
-        } else {
-            (reference::facets::facets(grid, cells, &sources, &centers), self.colors.clone())
-        };
-        // Surfaces and ground are the first regions.
-        facets.iter_mut().for_each(|f| f.region += scene.n_solids() as u32);
-        (facets, colors)
+        take(&sources, &reference::place::cloud_centers(&scene.clouds, time_s, light_origin))
     }
 
     /// Puts the surfaces' facets before all others, lit by the area reference, and adds the second

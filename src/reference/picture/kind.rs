@@ -82,6 +82,11 @@ impl ReferenceKind {
         Scene { draw, ..scene.clone() }
     }
 
+    /// Returns the number of reflections that the picture of a scene has.
+    pub(super) fn n_reflections(self, scene: &Scene) -> u32 {
+        if let ReferenceKind::Reflections(k) = self { k } else { n_reflections(scene) }
+    }
+
     /// Describes what the estimate of this reference's own error consists of, for a mean of
     /// `n_samples` samples.
     pub fn accuracy_text(self, scene: &Scene, n_samples: u32) -> String {
@@ -89,7 +94,7 @@ impl ReferenceKind {
             ReferenceKind::Thin => "sprites composed in f64: rounding",
             _ => "the volume's quadrature: its error estimate",
         }];
-        let k = if let ReferenceKind::Reflections(k) = self { k } else { n_reflections(scene) };
+        let k = self.n_reflections(scene);
         if k >= 2 {
             parts.push("areas integrated: |degree 8 - degree 5| of every cell");
         }

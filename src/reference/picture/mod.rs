@@ -25,10 +25,11 @@ pub use background::view;
 pub use error_estimate::ErrorEstimate;
 pub use frame::{FrameReference, colors};
 pub use kind::{ReferenceKind, n_reflections};
+pub use model_picture::ModelDrawing;
 pub use pixels::{Pixels, Tile};
 pub use progress::{OnProgress, RenderStage};
 pub use render::{DrawnPicture, Reference, drawn_as_set};
-pub use renderer::{ModelDrawing, render_model};
+pub use renderer::render_model;
 pub use samples::{
     MAX_SAMPLES, MeanPicture, N_VALUES, PairwiseSum, ReferenceRequest, SampleSums, sums, to_f32,
 };

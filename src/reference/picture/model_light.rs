@@ -9,36 +9,27 @@ use super::error_estimate::ErrorEstimate;
 use super::frame::FrameReference;
 use super::local_scene::LocalScene;
 use crate::model::scene::Scene;
-use crate::model::surface::Surface;
 use crate::reference::area::adaptive::Accuracy;
 use crate::reference::area::paths::PathSampling;
 use crate::reference::area::{AreaScene, DiscFacet, Receiver};
-use crate::reference::facets::{self, Facet, FacetSources};
-use crate::reference::place;
+use crate::reference::facets::{self, Facet};
 
 /// Everything that a scene's light meets at one time, relative to the lighting origin.
 pub(super) struct ModelScene {
-    local: LocalScene,
+    /// Surfaces, lights and materials.
+    pub local: LocalScene,
     /// Facets of the ground, then of the particles.
-    discs: Vec<DiscFacet>,
+    pub discs: Vec<DiscFacet>,
     eye: DVec3,
 }
 
 /// Radiance toward the eye, W m⁻² sr⁻¹, with its error estimate.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct RadianceEstimate {
     /// Radiance.
     pub radiance: DVec3,
     /// Error estimate.
     pub error: ErrorEstimate,
-}
-
-impl RadianceEstimate {
-    /// No light.
-    pub const DARK: RadianceEstimate = RadianceEstimate {
-        radiance: DVec3::ZERO,
-        error: ErrorEstimate { quadrature: 0.0, chance: 0.0 },
-    };
 }
 
 /// Relative accuracy of the second reflection: where that is a tenth of all light, 10⁻⁴ of it is
@@ -54,45 +45,23 @@ const N_BATCHES: (u32, u32) = (2, 16);
 impl ModelScene {
     /// Collects surfaces, ground and one facet for every particle of `frame`.
     pub fn new(scene: &Scene, frame: &FrameReference) -> ModelScene {
-        let (origin, time_s) = (frame.state.light_origin, frame.state.time_s);
-        let local = LocalScene::new(scene, origin, time_s);
-        let sources = FacetSources {
-            blobs: &frame.blobs,
-            sigma_means: &place::sigma_means(&frame.groups, &scene.clouds, time_s),
-            regions: &place::regions(&frame.groups),
-            colors: &frame.colors,
-        };
-        let centers = place::cloud_centers(&scene.clouds, time_s, origin);
+        let origin = frame.state.light_origin;
+        let local = LocalScene::new(scene, origin, frame.state.time_s);
         let n_solids = scene.n_solids() as u32;
-        let of_particles = facets::from_density(&sources, &centers);
+        let of_particles = frame.with_sources(scene, facets::from_density).into_iter();
         let of_particles = of_particles
-            .into_iter()
             .zip(&frame.colors)
             .map(|(f, color)| local.disc(&Facet { region: f.region + n_solids, ..f }, *color));
         let of_ground = local.ground.iter().map(|f| local.disc(f, DVec3::ONE));
         let discs = of_ground.chain(of_particles).collect();
         ModelScene { discs, eye: frame.state.pose.position - origin, local }
     }
-
-    /// Returns the surfaces.
-    pub fn surfaces(&self) -> &[Surface] {
-        &self.local.surfaces
-    }
-
-    /// Number of facets of ground and particles.
-    pub fn n_discs(&self) -> usize {
-        self.discs.len()
-    }
-
-    /// Number of facets of the ground, which come first.
-    pub fn n_ground(&self) -> usize {
-        self.local.ground.len()
-    }
 }
 
 /// The light of a scene toward the eye.
 pub(super) struct ModelLight<'a> {
-    area_scene: AreaScene<'a>,
+    /// Surfaces and facets, lit.
+    pub area_scene: AreaScene<'a>,
     eye: DVec3,
     n_reflections: u32,
 }
@@ -106,7 +75,7 @@ impl<'a> ModelLight<'a> {
         n_reflections: u32,
     ) -> ModelLight<'a> {
         let area_scene = AreaScene::new(
-            model.surfaces(),
+            &model.local.surfaces,
             model.local.surface_brdfs(),
             &model.local.lights,
             &frame.blobs,
@@ -121,28 +90,12 @@ impl<'a> ModelLight<'a> {
         self.n_reflections >= 3
     }
 
-    /// Returns the radiance of disc `i` in sample `i_sample`.
-    pub fn of_disc(&self, i: usize, i_sample: u32) -> RadianceEstimate {
-        self.toward_eye(&self.area_scene.on_disc(i), [i as u32, i_sample])
-    }
-
-    /// Returns the radiance at a point of a surface's front. `i` selects the random paths.
-    pub fn of_surface(
-        &self,
-        i_surface: usize,
-        position: DVec3,
-        i: usize,
-        i_sample: u32,
-    ) -> RadianceEstimate {
-        self.toward_eye(&self.area_scene.on_surface(i_surface, position), [i as u32, i_sample])
-    }
-
-    fn toward_eye(&self, at: &Receiver, number: [u32; 2]) -> RadianceEstimate {
+    /// Returns the radiance of a point toward the eye. `number`, of the point and of the sample,
+    /// selects the random paths.
+    pub fn toward_eye(&self, at: &Receiver, number: [u32; 2]) -> RadianceEstimate {
         let toward = (self.eye - at.position).normalize_or(at.normal);
-        let mut lit = RadianceEstimate {
-            radiance: self.area_scene.first(at, toward),
-            ..RadianceEstimate::DARK
-        };
+        let radiance = self.area_scene.first(at, toward);
+        let mut lit = RadianceEstimate { radiance, ..RadianceEstimate::default() };
         if self.n_reflections >= 2 {
             let second = self.area_scene.second(at, toward, &Accuracy::relative(SECOND_ACCURACY));
             lit.radiance += second.radiance;

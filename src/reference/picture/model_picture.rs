@@ -17,6 +17,18 @@ use crate::reference::surfaces;
 use crate::reference::view::View;
 use crate::reference::volume::Volume;
 
+/// A pixel that shows a surface or the ground, and the error of its light.
+type SurfacePixel = (OpaquePixel, ErrorEstimate);
+
+/// How a picture in the model's own light is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ModelDrawing {
+    /// Number of reflections.
+    pub n_reflections: u32,
+    /// Lights surfaces at their facets and interpolates, instead of at every pixel.
+    pub by_facet: bool,
+}
+
 /// A scene and the light in it.
 pub(super) struct ModelPicture<'a> {
     /// The scene.
@@ -27,8 +39,8 @@ pub(super) struct ModelPicture<'a> {
     pub model: &'a ModelScene,
     /// The light.
     pub light: ModelLight<'a>,
-    /// Lights surfaces at their facets and interpolates, instead of at every pixel.
-    pub by_facet: bool,
+    /// How surfaces are lit.
+    pub how: ModelDrawing,
     /// The pixels to draw.
     pub pixels: &'a Pixels,
     /// Called as parts are done.
@@ -39,44 +51,47 @@ impl ModelPicture<'_> {
     /// Lights the facets of ground and particles in one sample. The result is the same in every
     /// sample unless the light is random.
     pub fn discs(&self, i_sample: u32) -> Vec<RadianceEstimate> {
-        let n_parts = self.n_parts();
-        parallel_map(self.model.n_discs(), |i| {
-            let lit = self.light.of_disc(i, i_sample);
-            (self.on_progress)(RenderStage::Lighting, n_parts);
-            lit
+        self.light_each(self.model.discs.len(), |i| {
+            self.light.toward_eye(&self.light.area_scene.on_disc(i), [i as u32, i_sample])
         })
     }
 
-    /// Surface and centre of every facet, if surfaces are lit at their facets.
-    fn surface_facets(&self) -> Vec<(usize, DVec3)> {
-        if !self.by_facet {
-            return Vec::new();
-        }
-        let of = |(i, s): (usize, &Surface)| {
-            (0..s.n_facets() as u32).map(|k| (i, s.facet_center(k))).collect::<Vec<_>>()
-        };
-        self.model.surfaces().iter().enumerate().flat_map(of).collect()
+    /// Returns the radiance at a point of a surface's front. `i` numbers the points on surfaces.
+    fn on_surface(
+        &self,
+        i_surface: usize,
+        position: DVec3,
+        [i, i_sample]: [u32; 2],
+    ) -> RadianceEstimate {
+        let number = [self.model.discs.len() as u32 + i, i_sample];
+        self.light.toward_eye(&self.light.area_scene.on_surface(i_surface, position), number)
     }
 
-    /// Number of points that are lit one by one.
-    fn n_parts(&self) -> usize {
-        let n_on_surfaces =
-            if self.by_facet { self.surface_facets().len() } else { self.pixels.at.len() };
-        self.model.n_discs() + n_on_surfaces
+    /// Lights `n` of the points that are lit one by one.
+    fn light_each<T: Send>(&self, n: usize, light: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        let n_on_surfaces = match self.how.by_facet {
+            true => self.scene.n_surface_facets() as usize,
+            false => self.pixels.at.len(),
+        };
+        let n_all = self.model.discs.len() + n_on_surfaces;
+        parallel_map(n, |i| {
+            let lit = light(i);
+            (self.on_progress)(RenderStage::Lighting, n_all);
+            lit
+        })
     }
 
     /// Draws one sample whose discs are lit as given.
     pub fn draw(&self, discs: &[RadianceEstimate], sample: PixelSample) -> RenderedPixels {
         let view = View { shift: sample.shift, ..view(self.scene, self.frame) };
-        let (ground, particles) = discs.split_at(self.model.n_ground());
-        let opaque = if self.by_facet {
+        let (ground, particles) = discs.split_at(self.model.local.ground.len());
+        let opaque = if self.how.by_facet {
             self.interpolated_surfaces(&view, sample.i)
         } else {
             self.surfaces_at_pixels(&view, sample.i)
         };
         let opaque = self.with_ground(opaque, &view, ground);
-        let radiance: Vec<DVec3> = particles.iter().map(|lit| lit.radiance).collect();
-        let particle_error = ErrorEstimate::root_mean_square(particles.iter().map(|lit| lit.error));
+        let (radiance, particle_error) = separate(particles);
         let places: Vec<OpaquePixel> = opaque.iter().map(|(pixel, _)| *pixel).collect();
         let volume = Volume::new(&view, &self.frame.blobs, &radiance);
         let found = volume_at(&volume, self.pixels, &places, self.on_progress);
@@ -89,66 +104,63 @@ impl ModelPicture<'_> {
     }
 
     /// Lights the surface seen in every pixel; its back is black.
-    fn surfaces_at_pixels(&self, view: &View, i_sample: u32) -> Vec<(OpaquePixel, ErrorEstimate)> {
-        let (n_discs, n_parts) = (self.model.n_discs(), self.n_parts());
-        parallel_map(self.pixels.at.len(), |k| {
-            let ([i, j], number) = (self.pixels.at[k], n_discs + self.pixels.number(k));
+    fn surfaces_at_pixels(&self, view: &View, i_sample: u32) -> Vec<SurfacePixel> {
+        self.light_each(self.pixels.at.len(), |k| {
+            let [i, j] = self.pixels.at[k];
             let ray = view.ray(i, j);
-            let mut found = (OpaquePixel::EMPTY, ErrorEstimate::default());
-            if let Some((i_surface, hit)) = surfaces::seen(view, self.model.surfaces(), ray) {
-                let lit = if hit.is_front {
-                    let position = view.pose.position + hit.depth * ray;
-                    self.light.of_surface(i_surface, position, number, i_sample)
-                } else {
-                    RadianceEstimate::DARK
-                };
-                let color = lit.radiance.extend(1.0).to_array();
-                found = (OpaquePixel { color, depth: hit.depth, ..OpaquePixel::EMPTY }, lit.error);
-            }
-            (self.on_progress)(RenderStage::Lighting, n_parts);
-            found
+            let Some((i_surface, hit)) = surfaces::seen(view, &self.model.local.surfaces, ray)
+            else {
+                return (OpaquePixel::EMPTY, ErrorEstimate::default());
+            };
+            let lit = if hit.is_front {
+                let position = view.pose.position + hit.depth * ray;
+                self.on_surface(i_surface, position, [self.pixels.number(k) as u32, i_sample])
+            } else {
+                RadianceEstimate::default()
+            };
+            let color = lit.radiance.extend(1.0).to_array();
+            (OpaquePixel { color, depth: hit.depth, ..OpaquePixel::EMPTY }, lit.error)
         })
     }
 
     /// Lights the surfaces at their facets and draws them from that.
-    fn interpolated_surfaces(
-        &self,
-        view: &View,
-        i_sample: u32,
-    ) -> Vec<(OpaquePixel, ErrorEstimate)> {
-        let (facets, n_parts) = (self.surface_facets(), self.n_parts());
-        let lit: Vec<RadianceEstimate> = parallel_map(facets.len(), |k| {
-            let (i_surface, position) = facets[k];
-            let number = self.model.n_discs() + k;
-            let lit = self.light.of_surface(i_surface, position, number, i_sample);
-            (self.on_progress)(RenderStage::Lighting, n_parts);
-            lit
-        });
-        let radiance: Vec<DVec3> = lit.iter().map(|lit| lit.radiance).collect();
-        let error = ErrorEstimate::root_mean_square(lit.iter().map(|lit| lit.error));
+    fn interpolated_surfaces(&self, view: &View, i_sample: u32) -> Vec<SurfacePixel> {
+        let surfaces = &self.model.local.surfaces;
+        let of = |(i, s): (usize, &Surface)| {
+            (0..s.n_facets() as u32).map(|k| (i, s.facet_center(k))).collect::<Vec<_>>()
+        };
+        let facets: Vec<(usize, DVec3)> = surfaces.iter().enumerate().flat_map(of).collect();
+        let (radiance, error) = separate(&self.light_each(facets.len(), |k| {
+            self.on_surface(facets[k].0, facets[k].1, [k as u32, i_sample])
+        }));
         let at = self.pixels.at.iter().copied();
-        let seen = surfaces::render_at(view, self.model.surfaces(), &radiance, at);
+        let seen = surfaces::render_at(view, surfaces, &radiance, at);
         seen.into_iter().map(|pixel| (pixel, error)).collect()
     }
 
     /// Draws the ground over `opaque` where it is nearer, from the light of its points.
     fn with_ground(
         &self,
-        opaque: Vec<(OpaquePixel, ErrorEstimate)>,
+        opaque: Vec<SurfacePixel>,
         view: &View,
         ground: &[RadianceEstimate],
-    ) -> Vec<(OpaquePixel, ErrorEstimate)> {
+    ) -> Vec<SurfacePixel> {
         if ground.is_empty() {
             return opaque;
         }
-        let radiance: Vec<DVec3> = ground.iter().map(|lit| lit.radiance).collect();
-        let error = ErrorEstimate::root_mean_square(ground.iter().map(|lit| lit.error));
+        let (radiance, error) = separate(ground);
         let tile = self.pixels.tile;
         let mut picture = vec![OpaquePixel::EMPTY; tile.n_pixels()];
         draw_ground((&mut picture, tile), self.scene, self.frame, view, &radiance);
-        let nearer = |(other, seen): ((OpaquePixel, ErrorEstimate), OpaquePixel)| {
+        let nearer = |(other, seen): (SurfacePixel, OpaquePixel)| {
             if seen.depth < other.0.depth { (seen, error) } else { other }
         };
         opaque.into_iter().zip(self.pixels.pick_tile(&picture)).map(nearer).collect()
     }
+}
+
+/// Returns the radiances, and the root mean square of their errors.
+fn separate(lit: &[RadianceEstimate]) -> (Vec<DVec3>, ErrorEstimate) {
+    let error = ErrorEstimate::root_mean_square(lit.iter().map(|lit| lit.error));
+    (lit.iter().map(|lit| lit.radiance).collect(), error)
 }

@@ -10,10 +10,9 @@ use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
 use super::renderer::{check_scene, with_renderer};
 use super::scene_light::{BlobModel, PixelSample, brightest, render_lit_scene};
-use super::sprites::{drawn_blobs, textures};
+use super::sprites::{drawn_blobs, with_textures};
 use crate::error::Result;
 use crate::model::scene::Scene;
-use crate::reference::sprites::Factor;
 use crate::reference::threshold::{self, Omitted};
 
 /// A reference picture at some pixels, with an estimate of its own error.
@@ -115,13 +114,10 @@ pub fn drawn_as_set(
     }
     let view = view(scene, &frame);
     let (blobs, order) = drawn_blobs(scene, &frame);
-    let textured = textures(scene, &frame, &view);
-    let of = |j: usize, delta| {
-        textured.as_ref().map_or(1.0, |(pool, splats)| splats[j].factor(pool, delta))
-    };
-    let factor: Option<Factor> = if textured.is_some() { Some(&of) } else { None };
     let opaque = opaque_pixels(scene, &frame, &view, &pixels);
-    let omitted = threshold::omitted(&view, &opaque, &blobs, factor);
+    let omitted = with_textures(scene, &frame, &view, |factor| {
+        threshold::omitted(&view, &opaque, &blobs, factor)
+    });
     let omitted = omitted.into_iter().fold(Omitted::default(), Omitted::most);
     Ok(DrawnPicture { n_particles: order.len(), omitted, ..picture })
 }

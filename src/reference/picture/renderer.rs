@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use super::frame::FrameReference;
-use super::kind::{ReferenceKind, n_reflections};
+use super::kind::ReferenceKind;
 use super::model_light::{ModelLight, ModelScene, RadianceEstimate};
-use super::model_picture::ModelPicture;
+use super::model_picture::{ModelDrawing, ModelPicture};
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
 use super::scene_light::{BlobModel, PixelSample, RenderedPixels, render_lit_scene};
@@ -75,8 +75,7 @@ pub(super) fn with_renderer<T>(
 ) -> Result<T> {
     let is_model = matches!(kind, ReferenceKind::Model | ReferenceKind::Reflections(_));
     if is_model && scene.lighting.mode != LightingMode::None {
-        let n = if let ReferenceKind::Reflections(k) = kind { k } else { n_reflections(scene) };
-        let how = ModelDrawing { n_reflections: n, by_facet: false };
+        let how = ModelDrawing { n_reflections: kind.n_reflections(scene), by_facet: false };
         return with_model(how, (scene, time_s), pixels, on_progress, draw);
     }
     let frame = if is_model {
@@ -87,15 +86,6 @@ pub(super) fn with_renderer<T>(
     };
     let model = kind.blob_model();
     draw(&mut |sample| render_lit_scene(scene, &frame, model, pixels, sample, on_progress))
-}
-
-/// How a picture in the model's own light is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ModelDrawing {
-    /// Number of reflections.
-    pub n_reflections: u32,
-    /// Lights surfaces at their facets and interpolates, instead of at every pixel.
-    pub by_facet: bool,
 }
 
 fn with_model<T>(
@@ -109,15 +99,8 @@ fn with_model<T>(
     let model = ModelScene::new(scene, &frame);
     let light = ModelLight::new(scene, &model, &frame, how.n_reflections);
     let is_random = light.is_random();
-    let picture = ModelPicture {
-        scene,
-        frame: &frame,
-        model: &model,
-        light,
-        by_facet: how.by_facet,
-        pixels,
-        on_progress,
-    };
+    let (frame, model) = (&frame, &model);
+    let picture = ModelPicture { scene, frame, model, light, how, pixels, on_progress };
     let mut discs: Option<Vec<RadianceEstimate>> = None;
     draw(&mut |sample| {
         let lit = discs.take().filter(|_| !is_random).unwrap_or_else(|| picture.discs(sample.i));

@@ -7,11 +7,11 @@ use super::error_estimate::{ErrorEstimate, root_mean_square};
 use super::frame::FrameReference;
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
-use super::sprites::{drawn_blobs, textures};
+use super::sprites::{drawn_blobs, with_textures};
 use crate::model::scene::Scene;
 use crate::reference::composite::OpaquePixel;
 use crate::reference::parallel::parallel_map;
-use crate::reference::sprites::{self, Factor, Raster, Sprites};
+use crate::reference::sprites::{self, Raster, Sprites};
 use crate::reference::view::View;
 use crate::reference::volume::{Pixel, Volume};
 
@@ -104,15 +104,13 @@ fn thin(
     on_progress: OnProgress,
 ) -> Vec<[f64; 4]> {
     let (blobs, order) = drawn_blobs(scene, frame);
-    let textured = textures(scene, frame, view);
-    let factor = |j: usize, delta: DVec2| {
-        textured.as_ref().map_or(1.0, |(pool, splats)| splats[j].factor(pool, delta))
-    };
-    let factor: Option<Factor> = if textured.is_some() { Some(&factor) } else { None };
-    let sprites = Sprites { blobs: &blobs, radiance, order: &order, factor };
     let Pixels { tile, cell, ref at, .. } = *pixels;
     let raster = Raster { first: [tile.left, tile.top], n_columns: pixels.n_columns(), cell, at };
-    sprites::render_at(view, &raster, opaque, &sprites, &|n| on_progress(RenderStage::Drawing, n))
+    with_textures(scene, frame, view, |factor| {
+        let sprites = Sprites { blobs: &blobs, radiance, order: &order, factor };
+        let on_row = |n| on_progress(RenderStage::Drawing, n);
+        sprites::render_at(view, &raster, opaque, &sprites, &on_row)
+    })
 }
 
 /// Integrates `volume` along the rays of `pixels` up to the opaque ones.
@@ -128,7 +126,7 @@ pub(super) fn volume_at(
     let rows: Vec<&[usize]> = order.chunk_by(|&a, &b| pixels.at[a][1] == pixels.at[b][1]).collect();
     let of_rows = parallel_map(rows.len(), |r| {
         let j = pixels.at[rows[r][0]][1];
-        let row = volume.of_row(j, rows[r].iter().map(|&k| (pixels.at[k][0], opaque[k])));
+        let row = volume.row(j, rows[r].iter().map(|&k| (pixels.at[k][0], opaque[k])));
         on_progress(RenderStage::Drawing, rows.len());
         row
     });

@@ -6,18 +6,20 @@ use super::frame::FrameReference;
 use crate::model::cloud::Group;
 use crate::model::count::MIN_DRAWN;
 use crate::model::scene::Scene;
+use crate::reference::sprites::Factor;
 use crate::reference::texture::{Pool, SplatTexture, Textured};
 use crate::reference::view::View;
 use crate::reference::{Blob, count, place, sort};
 
-/// Returns the texture pool and every particle's part of it; `None` if no cloud is textured.
-pub(super) fn textures(
+/// Calls `take` with the factor of textures on optical depths; `None` if no cloud is textured.
+pub(super) fn with_textures<T>(
     scene: &Scene,
     frame: &FrameReference,
     view: &View,
-) -> Option<(Pool, Vec<SplatTexture>)> {
+    take: impl FnOnce(Option<Factor<'_>>) -> T,
+) -> T {
     if !scene.is_textured() {
-        return None;
+        return take(None);
     }
     let of_box = |(g, i_box): (&Group, u32)| {
         let cloud = &scene.clouds[g.i_cloud];
@@ -32,9 +34,11 @@ pub(super) fn textures(
         blobs.iter().zip(0u32..).map(splat).collect::<Vec<SplatTexture>>()
     };
     let boxes = frame.groups.chunk_by(|a, b| a.i_cloud == b.i_cloud);
-    let splats = boxes.flat_map(|boxes| boxes.iter().zip(0u32..).flat_map(of_box)).collect();
+    let splats: Vec<SplatTexture> =
+        boxes.flat_map(|boxes| boxes.iter().zip(0u32..).flat_map(of_box)).collect();
     // The device stores the pool in 16 bits.
-    Some((Pool::new(scene.draw.texture_seed).rounded(), splats))
+    let pool = Pool::new(scene.draw.texture_seed).rounded();
+    take(Some(&|j, delta| splats[j].factor(&pool, delta)))
 }
 
 /// Returns the blobs with κ scaled by the count law, and the order that the drawn ones are drawn

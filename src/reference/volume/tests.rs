@@ -7,6 +7,13 @@ use crate::model::camera::Pose;
 use crate::model::cloud::SQRT_TAU;
 use crate::reference::sprites::{self, Sprites};
 
+/// Integrates the whole picture before `behind`, one a pixel.
+fn render(view: &View, behind: &[OpaquePixel], blobs: &[Blob], radiance: &[DVec3]) -> Vec<Pixel> {
+    let volume = Volume::new(view, blobs, radiance);
+    let rows = (0..view.height).zip(behind.chunks(view.width as usize));
+    rows.flat_map(|(j, row)| volume.row(j, (0..view.width).zip(row.iter().copied()))).collect()
+}
+
 /// Eye at the origin, looking along −z. The middle pixel's ray is the axis for one pixel and for
 /// three by three.
 fn view(n: u32) -> View {

@@ -135,11 +135,7 @@ const ALL: [(&str, Part, Describe, Remove); 10] = [
 ];
 
 fn format_of(scene: &Scene) -> String {
-    FilmFormat::NAMES
-        .iter()
-        .find(|(_, format)| *format == scene.film.format)
-        .map_or("", |(name, _)| name)
-        .to_owned()
+    scene.film.format.name().to_owned()
 }
 
 /// Returns the approximation of one facet for a group of particles, if the scene has groups.

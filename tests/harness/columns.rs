@@ -1,24 +1,13 @@
-//! Vertical optical depth of every column: of a file's cells, and of the blobs that represent them.
+//! Vertical optical depth of every column, of the blobs that represent a file's cells.
 
 use std::f64::consts::TAU;
 
 use libm::erf;
-
-use super::grid::Grid;
-use super::particles::WeatherBlob;
+use nimbus::model::weather::grid::Grid;
+use nimbus::model::weather::particles::WeatherBlob;
 
 /// Radius of a blob's footprint, σ_xy: 2 · 10⁻⁹ of its mass lies beyond.
 const REACH: f64 = 6.0;
-
-/// Returns Σ β Δh of each column.
-pub fn of_cells(grid: &Grid, extinction: &[f64]) -> Vec<f64> {
-    let n_columns = grid.shape().n_columns();
-    let mut depths = vec![0.0; n_columns];
-    for (i, beta) in extinction.iter().enumerate() {
-        depths[i % n_columns] += beta * grid.thickness_m(i);
-    }
-    depths
-}
 
 /// Returns the blobs' vertical optical depth, averaged over the area of each column. The share of a
 /// footprint within a column is a product of differences of erf.

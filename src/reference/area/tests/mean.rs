@@ -2,11 +2,16 @@
 
 use glam::{DVec2, DVec3};
 
-use super::adaptive::{self, Accuracy, Cell, Estimate, Integrand, NOTHING, Sample, triangles};
-use super::clip::{self, Line, Polygon, WHOLE};
-use super::resolve::{self, ViewOfSurface};
-use super::scene::AreaScene;
 use crate::model::surface::Surface;
+use crate::reference::area::adaptive::{
+    self, Accuracy, Cell, Estimate, Integrand, NOTHING, Sample, triangles,
+};
+use crate::reference::area::clip::{self, Line, Polygon, WHOLE};
+use crate::reference::area::resolve::{
+    Ball, LobeDetail, MIN_ANGLE, NEAREST, ViewOfSurface, cone, is_light_resolved, is_lobe_resolved,
+};
+use crate::reference::area::scene::AreaScene;
+use crate::reference::occlude::Rectangle;
 
 /// Share of the accuracy that the inner integral gets; its error adds to the outer one's.
 const INNER_SHARE: f64 = 0.1;
@@ -15,6 +20,10 @@ const INNER_SHARE: f64 = 0.1;
 /// behind an edge. There the two rules' errors are of one size and no fixed sign, and one is seldom
 /// more than three times their difference.
 const SAFETY_FACTOR: f64 = 3.0;
+
+/// For a mean of L2: nodes within 1.5 widths meet every peak, and e^{−4²/2} = 3e-4 of it has no
+/// weight in a mean.
+const MIRROR: LobeDetail = LobeDetail { widths: 3.0, reach: 4.0 };
 
 /// A rectangle within a surface's (s, t).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -133,11 +142,9 @@ impl Integrand for Mean<'_, '_> {
                 let lit = &scene.regions[i_surface][cell.i_region].lit;
                 let relative = self.accuracy.relative;
                 let view = ViewOfSurface { scene, i_surface, lit, relative };
-                resolve::is_first_resolved(&view, self.eye, cell)
+                is_first_resolved(&view, self.eye, cell)
             }
-            Quantity::Second => {
-                resolve::is_second_resolved(self.scene, self.i_surface, self.eye, cell)
-            }
+            Quantity::Second => is_second_resolved(self.scene, self.i_surface, self.eye, cell),
         }
     }
 
@@ -151,4 +158,45 @@ impl Integrand for Mean<'_, '_> {
             Quantity::Second => SAFETY_FACTOR,
         }
     }
+}
+
+/// Returns whether a cell of a mean of L1 toward `eye` is small enough.
+fn is_first_resolved(view: &ViewOfSurface, eye: DVec3, cell: &Cell) -> bool {
+    let ball = Ball::of(&view.scene.rectangles[view.i_surface], cell);
+    let Some((from, spread)) = cone(&ball, eye) else { return false };
+    spread < MIN_ANGLE || is_light_resolved(view, &ball, (-from, spread))
+}
+
+/// Returns whether a cell of a mean of L2 toward `eye` is small enough: for the distance or size of
+/// every other surface, and for the lobe that mirrors the light sources.
+fn is_second_resolved(scene: &AreaScene, i_surface: usize, eye: DVec3, cell: &Cell) -> bool {
+    let (rect, brdf) = (&scene.rectangles[i_surface], &scene.brdfs[i_surface]);
+    let ball = Ball::of(rect, cell);
+    let view = ball.center.distance(eye);
+    let glossy = brdf.ks != DVec3::ZERO;
+    if glossy && ball.radius > NEAREST * view {
+        return false;
+    }
+    let (toward, turn) =
+        ((eye - ball.center).normalize_or_zero(), (ball.radius / view).min(1.0).asin());
+    let others = scene.rectangles.iter().enumerate().filter(|(_, other)| !lies_behind(rect, other));
+    others.into_iter().all(|(i, other)| {
+        let way = other.nearest(ball.center) - ball.center;
+        let narrow = other.u.length().min(other.v.length());
+        let reach = way.length().max(narrow);
+        if ball.radius > NEAREST * reach {
+            return false;
+        }
+        // The lobe and the source that it mirrors blur each other, so their features are as wide as
+        // the wider one.
+        let ns = brdf.ns.min((reach / narrow).powi(2));
+        let spread = (ball.radius / reach).asin() + turn;
+        let dark = scene.regions[i].is_empty();
+        let mirrors = |from: DVec3| is_lobe_resolved(ns, rect.normal, from, toward, spread, MIRROR);
+        !glossy || dark || way.try_normalize().is_none_or(mirrors)
+    })
+}
+
+fn lies_behind(rect: &Rectangle, other: &Rectangle) -> bool {
+    WHOLE.iter().all(|x| rect.side(other.point(x.x, x.y)) <= 0.0)
 }

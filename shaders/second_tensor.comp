@@ -3,10 +3,6 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
-#include "light.glsl"
-#include "occlude.glsl"
-#include "functions.glsl"
-#include "cell_samples.glsl"
 #include "tensor.glsl"
 
 // Computes T2 of one light: the second reflection by basis of the receiver and column of the
@@ -14,26 +10,12 @@
 // In and out: as second_gather.comp, but T2 (tensor.glsl) in place of radiance. Blocks, pairings
 // and cells are those of second_gather.comp. Source: C (13)-(16).
 
-#ifndef WORKGROUP
-#define WORKGROUP 8
-#endif
-// 1: the scene has clouds that attenuate.
-#ifndef MARCH
-#define MARCH 1
-#endif
-// 1: the receivers have a lobe.
-#ifndef GLOSSY
-#define GLOSSY 1
-#endif
 // 1: some region has a lobe.
 #define SHINY 1
 // N_b: the number of basis functions.
 #ifndef N_BASES
 #define N_BASES 8
 #endif
-
-#include "iterations.glsl"
-layout(local_size_x = WORKGROUP) in;
 
 layout(push_constant) uniform Push {
     Grid grid;

@@ -384,7 +384,7 @@ fn wrong_pictures_are_noticed() {
             "1.0 - min(push.camera.near * size / q, 1.0)",
         ),
         ("surfaces.frag", "regions[in_i]", "regions[in_i / 2]"),
-        ("surfaces.vert", "-(top ? high.y : low.y)", "(top ? high.y : low.y)"),
+        ("surfaces.vert", "-corner.y", "corner.y"),
         ("surfaces.vert", "+ SNAP * push.pixel", "- 8.0 * push.pixel"),
         ("surfaces.vert", "(a.z >= near) != (b.z >= near)", "false"),
         ("surfaces.vert", "if (a.z >= near) {", "if (false) {"),

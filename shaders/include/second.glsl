@@ -1,5 +1,20 @@
 // The buffers and functions that second_gather.comp and second_tensor.comp share
 // (docs/explanation/model.md §7, §11 "second"). The includer declares the push constants first.
+// Needs records.glsl.
+
+#ifndef WORKGROUP
+#define WORKGROUP 8
+#endif
+// 1: the scene has clouds that attenuate.
+#ifndef MARCH
+#define MARCH 1
+#endif
+// 1: the receivers have a lobe.
+#ifndef GLOSSY
+#define GLOSSY 1
+#endif
+
+layout(local_size_x = WORKGROUP) in;
 
 READS(0, Block, blocks)
 READS(1, Pairing, pairings)
@@ -19,6 +34,11 @@ layout(binding = 14) uniform usamplerBuffer cell_samples;
 // Workgroups of each round, three numbers a round: a receiver that is not done counts for the next.
 UPDATES(15, uint, rounds)
 
+#include "light.glsl"
+#include "occlude.glsl"
+#include "functions.glsl"
+#include "cell_samples.glsl"
+#include "iterations.glsl"
 #include "regions.glsl"
 #include "lobe.glsl"
 #if MARCH

@@ -108,6 +108,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/reach.glsl",
     "include/records.glsl",
     "include/regions.glsl",
+    "include/scan.glsl",
     "include/second.glsl",
     "include/shell.glsl",
     "include/sort.glsl",

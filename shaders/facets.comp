@@ -15,7 +15,6 @@ layout(push_constant) uniform Push {
     uint n_particles;
     uint i_first_facet;
 } push;
-WRITES(5, Facet, facets)
 
 #include "shell.glsl"
 

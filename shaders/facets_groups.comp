@@ -16,9 +16,8 @@ layout(push_constant) uniform Push {
     uint i_first_facet;
 } push;
 // Particle at each place of the order.
-READS(5, uint, order)
-READS(6, Run, runs)
-WRITES(7, Facet, facets)
+READS(6, uint, order)
+READS(7, Run, runs)
 // By particle.
 WRITES(8, uint, i_facet)
 

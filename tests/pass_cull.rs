@@ -8,7 +8,7 @@ mod harness;
 use bounded::{Random, U};
 use glam::DVec3;
 use harness::Gpu;
-use nimbus::gpu::Compiler;
+use nimbus::gpu::{Compiler, DeviceCount};
 use nimbus::layout::cull::KeptRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
@@ -16,7 +16,7 @@ use nimbus::model::camera::Pose;
 use nimbus::model::cloud::SQRT_TAU;
 use nimbus::passes::blobs::{BlobVariant, BlobView};
 use nimbus::passes::cull::{Cull, CullBuffers, CullView, Order};
-use nimbus::passes::sort::{Count, Depths, DeviceCount, NO_COUNT, Sort, TILE};
+use nimbus::passes::sort::{Count, Depths, NO_COUNT, Sort, TILE};
 use nimbus::reference::Blob;
 use nimbus::reference::cull::{CullOutcome, CullTolerance, outcome};
 use nimbus::reference::view::View;
@@ -129,8 +129,14 @@ impl Scene {
         let view = CullView { blobs, size: [width, height], smallest };
         let order =
             Order { radius: RADIUS, n_bits: self.n_bits, sort_tile: TILE, splat_block: 256 };
-        let buffers = [&placed, &particles, &i_group, &drawn, &entries, &kept];
-        let buffers = CullBuffers::from_bindings(buffers);
+        let buffers = CullBuffers {
+            placed: &placed,
+            particles: &particles,
+            i_group: &i_group,
+            drawn: &drawn,
+            entries: &entries,
+            kept: &kept,
+        };
         gpu.run(|rec| pass.record(rec, &buffers, &view, &order, self.n()));
         Found {
             kept: gpu.download(&kept, 1)[0],

@@ -433,7 +433,17 @@ fn a_target_that_does_not_fit_is_refused() {
         gpu.commands.record(Barriers::Placed, |rec| match pass {
             Some(pass) => {
                 let start = if target.depth.is_some() { LoadOp::Load } else { LoadOp::Clear };
-                let buffers = BlobBuffers::from_bindings([&buffer; 9]);
+                let buffers = BlobBuffers {
+                    entries: &buffer,
+                    placed: &buffer,
+                    particles: &buffer,
+                    lit: &buffer,
+                    i_facet: &buffer,
+                    i_group: &buffer,
+                    drawn: &buffer,
+                    textured: &buffer,
+                    pool: &buffer,
+                };
                 let view =
                     BlobView { camera: &camera, cutoff: 3.0, threshold: 0.0, saturated: 0.0 };
                 let count = BlobCount { n: RecordCount::Known(0), i_first_facet: 0 };

@@ -6,6 +6,7 @@ READS(1, Particle, particles)
 READS(2, uint, i_group)
 READS(3, Group, groups)
 layout(binding = 4) uniform samplerBuffer density;
+WRITES(5, Facet, facets)
 
 #include "density.glsl"
 

@@ -68,11 +68,6 @@ impl LightTensors {
         Ok((fit, Some(tensors)))
     }
 
-    /// Writes the data of `packet` into the staging buffers of `slot`.
-    pub fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
-        self.buffers.coefficients.write(slot, &packet.coefficients)
-    }
-
     /// Returns the push constants of T1.
     pub fn first_push(&self, packet: &Packet, c: &FrameConstants) -> first::TensorPush {
         first::TensorPush {

@@ -130,8 +130,8 @@ impl Cull {
         let (fields, constants) = (TestPush::FIELDS, variant.constants());
         Ok(Cull {
             test: Kernel::with_macros(device, compiler, "cull.test", fields, &constants, &macros)?,
-            scan: Kernel::new(device, compiler, "cull.scan", ScanPush::FIELDS, &[])?,
-            write: Kernel::new(device, compiler, "cull.write", WritePush::FIELDS, &[])?,
+            scan: Kernel::new(device, compiler, "cull.scan", ScanPush::FIELDS)?,
+            write: Kernel::new(device, compiler, "cull.write", WritePush::FIELDS)?,
             scratch: Scratch::new(device, n_max.into())?,
             max_groups: device.limits().max_workgroups_x,
         })

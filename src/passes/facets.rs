@@ -34,7 +34,7 @@ record! {
 }
 
 bindings! {
-    /// The buffers of the facets of single particles.
+    /// The buffers of the facets of particles.
     pub struct ParticleBuffers {
         /// `PlacedRecord` by particle.
         placed,
@@ -48,30 +48,6 @@ bindings! {
         density,
         /// Output, `FacetRecord` by facet.
         facets,
-    }
-}
-
-bindings! {
-    /// The buffers of the facets of runs of particles.
-    pub struct RunBuffers {
-        /// `PlacedRecord` by particle.
-        placed,
-        /// `ParticleRecord` by particle.
-        particles,
-        /// `u32` group by particle.
-        i_group,
-        /// `GroupRecord` by group.
-        groups,
-        /// `f32` by cell: extinction per length.
-        density,
-        /// `u32` particle by place in Morton order.
-        order,
-        /// `RunRecord` by facet.
-        runs,
-        /// Output, `FacetRecord` by facet.
-        facets,
-        /// Output, `u32` facet by particle.
-        i_facet,
     }
 }
 
@@ -95,8 +71,8 @@ impl Facets {
         Ok(Facets {
             particles: kernel("facets", Push::FIELDS)?,
             runs: kernel("facets.groups", GroupsPush::FIELDS)?,
-            surfaces: Kernel::new(device, compiler, "facets.surfaces", SurfacesPush::FIELDS, &[])?,
-            terrain: Kernel::new(device, compiler, "facets.terrain", TerrainPush::FIELDS, &[])?,
+            surfaces: Kernel::new(device, compiler, "facets.surfaces", SurfacesPush::FIELDS)?,
+            terrain: Kernel::new(device, compiler, "facets.terrain", TerrainPush::FIELDS)?,
         })
     }
 
@@ -147,19 +123,23 @@ impl Facets {
         rec.dispatch(&self.particles, &buffers.by_binding(), &push, n_particles)
     }
 
-    /// Writes a facet for each of `n_facets` runs, from `i_first_facet` on.
+    /// Writes a facet for each of `n_facets` runs, from `i_first_facet` on. `order`: `u32` particle
+    /// by place in Morton order; `runs`: `RunRecord` by facet; `i_facet`: output, `u32` facet by
+    /// particle.
     ///
     /// # Errors
     /// Fails if a buffer does not fit the shader's binding.
     pub fn record_runs(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: &RunBuffers<'_>,
+        buffers: &ParticleBuffers<'_>,
+        [order, runs, i_facet]: [&Buffer; 3],
         grid: &GridRecord,
         n_facets: u32,
         i_first_facet: u32,
     ) -> Result<()> {
         let push = GroupsPush { grid: *grid, n_facets, i_first_facet };
-        rec.dispatch(&self.runs, &buffers.by_binding(), &push, n_facets)
+        let buffers = [&buffers.by_binding()[..], &[order, runs, i_facet]].concat();
+        rec.dispatch(&self.runs, &buffers, &push, n_facets)
     }
 }

@@ -5,7 +5,7 @@
 //! Error: a few ulp a light.
 
 use crate::error::Result;
-use crate::gpu::{Compiler, Device, Kernel, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::record;
 
 record! {
@@ -14,7 +14,7 @@ record! {
 }
 
 bindings! {
-    /// The buffers of [`First`].
+    /// The buffers of the pass.
     pub struct FirstBuffers {
         /// `FacetRecord` by facet.
         facets,
@@ -24,9 +24,10 @@ bindings! {
         transmittance,
         /// `RegionRecord` by region.
         regions,
-        /// `f32`: a row a lobe.
+        /// `f32`: a row a lobe; for [`FirstTensor`] the vectors of the basis, from row `i_vectors`
+        /// on.
         table,
-        /// Output, `LitRecord` by facet.
+        /// Output, `LitRecord` by facet; [`FirstTensor`] clears it.
         lit,
     }
 }
@@ -42,7 +43,7 @@ impl First {
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<First> {
-        Ok(First { kernel: Kernel::new(device, compiler, "first", Push::FIELDS, &[])? })
+        Ok(First { kernel: Kernel::new(device, compiler, "first", Push::FIELDS)? })
     }
 
     /// Writes the light of every facet.
@@ -71,26 +72,6 @@ record! {
     }
 }
 
-bindings! {
-    /// The buffers of [`FirstTensor`].
-    pub struct FirstTensorBuffers {
-        /// `FacetRecord` by facet.
-        facets,
-        /// `LightRecord` by light.
-        lights,
-        /// `f32` by facet and light.
-        transmittance,
-        /// `RegionRecord` by region.
-        regions,
-        /// `f32`: the vectors of the basis, from row `i_vectors` on.
-        table,
-        /// Output, `f32` by light and row.
-        t1,
-        /// Output, `LitRecord` by facet: cleared.
-        lit,
-    }
-}
-
 /// The pipeline that fills T1: the first reflection by light and basis function, for `contract` to
 /// sum (docs/explanation/passes.md "contract").
 pub struct FirstTensor {
@@ -103,20 +84,22 @@ impl FirstTensor {
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<FirstTensor> {
-        let kernel = Kernel::new(device, compiler, "first.tensor", TensorPush::FIELDS, &[])?;
+        let kernel = Kernel::new(device, compiler, "first.tensor", TensorPush::FIELDS)?;
         Ok(FirstTensor { kernel })
     }
 
-    /// Writes T1.
+    /// Writes `t1`, `f32` by light and row.
     ///
     /// # Errors
     /// Fails if a buffer does not fit the shader's binding.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: &FirstTensorBuffers<'_>,
+        buffers: &FirstBuffers<'_>,
+        t1: &Buffer,
         push: &TensorPush,
     ) -> Result<()> {
-        rec.dispatch(&self.kernel, &buffers.by_binding(), push, push.n_facets)
+        let buffers = [&buffers.by_binding()[..], &[t1]].concat();
+        rec.dispatch(&self.kernel, &buffers, push, push.n_facets)
     }
 }

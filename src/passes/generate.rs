@@ -39,7 +39,7 @@ impl Generate {
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Generate> {
-        Ok(Generate { kernel: Kernel::new(device, compiler, "generate", Push::FIELDS, &[])? })
+        Ok(Generate { kernel: Kernel::new(device, compiler, "generate", Push::FIELDS)? })
     }
 
     /// Generates `n_particles` from `i_first` on and leaves all others unchanged.

@@ -53,7 +53,7 @@ impl Grid {
         let fields = DepositPush::FIELDS;
         Ok(Grid {
             deposit: Kernel::with_macros(device, compiler, "grid.deposit", fields, &[], &width)?,
-            resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS, &[])?,
+            resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS)?,
             scratch: Scratch::new(device, n_cells)?,
             capacity: n_cells,
         })

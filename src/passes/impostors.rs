@@ -61,17 +61,18 @@ pub struct LayerView {
     pub depth: f32,
 }
 
-/// The buffers that entries are parted by.
-#[derive(Clone, Copy)]
-pub struct PartBuffers<'a> {
-    /// `[u32; 2]`: sort key and particle, far to near.
-    pub entries: &'a Buffer,
-    /// Input and output, `u32` by particle: whether it belongs to the layer.
-    pub members: &'a Buffer,
-    /// Output, `[u32; 2]`: entries of the layer.
-    pub far: &'a Buffer,
-    /// Output, `[u32; 2]`: the other entries.
-    pub near: &'a Buffer,
+bindings! {
+    /// The buffers that entries are parted by.
+    pub struct PartBuffers {
+        /// `[u32; 2]`: sort key and particle, far to near.
+        entries,
+        /// Input and output, `u32` by particle: whether it belongs to the layer.
+        members,
+        /// Output, `[u32; 2]`: entries of the layer.
+        far,
+        /// Output, `[u32; 2]`: the other entries.
+        near,
+    }
 }
 
 impl Impostors {
@@ -87,7 +88,7 @@ impl Impostors {
     ) -> Result<Impostors> {
         let blend = (format, if over_solids { BlendMode::OverTested } else { BlendMode::Over });
         Ok(Impostors {
-            part: Kernel::new(device, compiler, "impostors.part", PartPush::FIELDS, &[])?,
+            part: Kernel::new(device, compiler, "impostors.part", PartPush::FIELDS)?,
             show: DrawPipeline::new(device, compiler, "impostors", Push::FIELDS, &[], blend)?,
         })
     }
@@ -106,10 +107,9 @@ impl Impostors {
         n_entries: u32,
         last_key: Option<u32>,
     ) -> Result<()> {
-        let PartBuffers { entries, members, far, near } = buffers;
         if last_key.is_some() {
             // A particle that is not drawn is not a member.
-            rec.fill(members, 0);
+            rec.fill(buffers.members, 0);
         }
         let push = PartPush {
             n_entries,
@@ -117,7 +117,7 @@ impl Impostors {
             is_new: u32::from(last_key.is_some()),
             unused: 0,
         };
-        rec.dispatch(&self.part, &[entries, members, far, near], &push, n_entries)
+        rec.dispatch(&self.part, &buffers.by_binding(), &push, n_entries)
     }
 
     /// Draws `layer` (`[f32; 4]` by texel, rows from the top) into `target`, over the surfaces if

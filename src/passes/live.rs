@@ -25,7 +25,7 @@ impl Live {
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Live> {
-        Ok(Live { kernel: Kernel::new(device, compiler, "live", Push::FIELDS, &[])? })
+        Ok(Live { kernel: Kernel::new(device, compiler, "live", Push::FIELDS)? })
     }
 
     /// Writes the `n_particles` particles of disc `i_disc`.

@@ -13,13 +13,6 @@ macro_rules! bindings {
         pub struct $name<'a> { $($(#[$doc])* pub $field: &'a $crate::gpu::Buffer),* }
 
         impl<'a> $name<'a> {
-            /// Names the buffers of an array, which is in the order of the binding numbers.
-            pub fn from_bindings(
-                [$($field),*]: [&'a $crate::gpu::Buffer; [$(stringify!($field)),*].len()],
-            ) -> Self {
-                $name { $($field),* }
-            }
-
             /// Returns the buffers by binding number.
             pub fn by_binding(
                 &self,

@@ -56,7 +56,7 @@ impl Morton {
         Ok(Morton {
             facets: key(0)?,
             particles: key(1)?,
-            order: Kernel::new(device, compiler, "morton.order", OrderPush::FIELDS, &[])?,
+            order: Kernel::new(device, compiler, "morton.order", OrderPush::FIELDS)?,
         })
     }
 

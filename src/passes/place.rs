@@ -42,7 +42,7 @@ impl Place {
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Place> {
-        Ok(Place { kernel: Kernel::new(device, compiler, "place", Push::FIELDS, &[])? })
+        Ok(Place { kernel: Kernel::new(device, compiler, "place", Push::FIELDS)? })
     }
 
     /// Writes the place of every particle.

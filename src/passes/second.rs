@@ -233,8 +233,8 @@ impl Second {
         let macros = [&macros[..], sums.list()].concat();
         let gather = ("second.gather", GatherPush::FIELDS);
         Ok(Second {
-            sources: Kernel::new(device, compiler, "second.sources", SourcesPush::FIELDS, &[])?,
-            merge: Kernel::new(device, compiler, "second.merge", MergePush::FIELDS, &[])?,
+            sources: Kernel::new(device, compiler, "second.sources", SourcesPush::FIELDS)?,
+            merge: Kernel::new(device, compiler, "second.merge", MergePush::FIELDS)?,
             gather: Gather::new(device, compiler, gather, variant, &macros)?,
         })
     }

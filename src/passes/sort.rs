@@ -8,7 +8,7 @@
 
 use super::blobs::steps_per_depth;
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
+use crate::gpu::{Buffer, Compiler, Device, DeviceCount, Kernel, Recorder, buffers};
 use crate::layout::record;
 
 record! {
@@ -58,19 +58,8 @@ impl Scratch {
 pub enum Count<'a> {
     /// The host knows the number.
     Known(u32),
-    /// The device has written it.
+    /// The device has written it, and a workgroup for each tile.
     Counted(DeviceCount<'a>),
-}
-
-/// A number of entries that the device has written.
-#[derive(Clone, Copy)]
-pub struct DeviceCount<'a> {
-    /// `u32` words.
-    pub buffer: &'a Buffer,
-    /// Index of the word that holds the number of entries.
-    pub i_count: u32,
-    /// Index of the first of three words that hold the workgroups: (tiles, 1, 1).
-    pub i_groups: u32,
 }
 
 /// The depths that sort keys are made of.
@@ -136,7 +125,7 @@ impl Sort {
             Kernel::with_macros(device, compiler, name, DigitPush::FIELDS, &[], macros)
         };
         Ok(Sort {
-            key: Kernel::new(device, compiler, "sort.key", KeyPush::FIELDS, &[])?,
+            key: Kernel::new(device, compiler, "sort.key", KeyPush::FIELDS)?,
             count: kernel("sort.count", &macros)?,
             // The scan has an invocation a digit, in whatever subgroups that makes.
             scan: kernel("sort.scan", &macros[2..])?,

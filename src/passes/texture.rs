@@ -55,7 +55,7 @@ impl Texture {
         let (name, fields) = ("texture.transform", TransformPush::FIELDS);
         Ok(Texture {
             transform: Kernel::with_macros(device, compiler, name, fields, &[], &macros)?,
-            pack: Kernel::new(device, compiler, "texture.pack", PackPush::FIELDS, &[])?,
+            pack: Kernel::new(device, compiler, "texture.pack", PackPush::FIELDS)?,
             scratch: Scratch::new(device)?,
         })
     }

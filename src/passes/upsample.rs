@@ -39,15 +39,16 @@ pub struct Extents {
     pub n: u32,
 }
 
-/// The buffers of the surfaces beneath the blobs.
-#[derive(Clone, Copy)]
-pub struct SolidBuffers<'a> {
-    /// Pixels of the surfaces' full picture.
-    pub under: &'a Buffer,
-    /// `f32` by small pixel: near/z.
-    pub small_depths: &'a Buffer,
-    /// `f32` by full pixel: near/z.
-    pub depths: &'a Buffer,
+bindings! {
+    /// The buffers of the surfaces beneath the blobs.
+    pub struct SolidBuffers {
+        /// Pixels of the surfaces' full picture.
+        under,
+        /// `f32` by small pixel: near/z.
+        small_depths,
+        /// `f32` by full pixel: near/z.
+        depths,
+    }
 }
 
 /// The pipeline of the pass.
@@ -116,9 +117,8 @@ impl Upsample {
         [small, picture]: [&Buffer; 2],
         solids: Option<SolidBuffers<'_>>,
     ) -> Result<()> {
-        let solids = solids.map(|s| [s.under, s.small_depths, s.depths]);
-        let buffers: Vec<_> =
-            [small, picture].into_iter().chain(solids.into_iter().flatten()).collect();
+        let mut buffers = vec![small, picture];
+        buffers.extend(solids.iter().flat_map(SolidBuffers::by_binding));
         rec.dispatch(&self.kernel, &buffers, &self.push, self.n_invocations)
     }
 }

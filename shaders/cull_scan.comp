@@ -40,8 +40,9 @@ void main() {
     }
     // The last invocation has added up all tiles.
     if (t == SCANNED - 1u) {
-        kept[0].sort = uvec4(groups(before, push.sort_tile), 1, 1, before);
-        kept[0].draw = uvec4(4, before, 0, 0);
-        kept[0].splat = uvec4(groups(before, push.splat_block), 1, 1, 0);
+        uint n = before;
+        kept[0].sort = uvec4(groups(n, push.sort_tile), 1, 1, n);
+        kept[0].draw = uvec4(4, n, 0, 0);
+        kept[0].splat = uvec4(groups(n, push.splat_block), 1, 1, 0);
     }
 }

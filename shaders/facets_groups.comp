@@ -10,11 +10,6 @@
 // Means are taken about the first member, so that a run of one particle gives that particle's facet
 // to the bit.
 
-layout(push_constant) uniform Push {
-    Grid grid;
-    uint n_facets;
-    uint i_first_facet;
-} push;
 // Particle at each place of the order.
 READS(6, uint, order)
 READS(7, Run, runs)

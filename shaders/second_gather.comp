@@ -21,22 +21,6 @@
 #endif
 
 
-layout(push_constant) uniform Push {
-    Grid grid;
-    vec3 eye;
-    uint n_lights;
-    float pair_size;
-    uint pair_levels;
-    float step_length;
-    float backward;
-    uint pair_steps;
-    uint i_first_block;
-    float theta;
-    uint n_surfaces;
-    // Of the dispatches that make up a gather.
-    uint i_round;
-    uint n_rounds;
-} push;
 READS(11, Node, nodes)
 UPDATES(12, Lit, lit)
 

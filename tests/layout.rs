@@ -235,6 +235,7 @@ fn shared_constants_have_one_value() {
         ("include/records.glsl", "REGION_COLORED", f64::from(REGION_COLORED)),
         ("include/records.glsl", "REGION_TERRAIN", f64::from(REGION_TERRAIN)),
         ("include/records.glsl", "NO_LOBE", f64::from(NO_LOBE)),
+        ("include/records.glsl", "NO_PARTICLE", f64::from(u32::MAX)),
         ("include/texture.glsl", "TEXTURE_STREAM", f64::from(0x7465_7874u32)),
         ("include/texture.glsl", "FIELD_TEXELS", f64::from(texture::FIELD_TEXELS)),
         ("include/texture.glsl", "TEXTURE_SIDE", nimbus::reference::texture::SIDE as f64),

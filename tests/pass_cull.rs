@@ -14,9 +14,9 @@ use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::camera::Pose;
 use nimbus::model::cloud::SQRT_TAU;
-use nimbus::passes::blobs::{BlobVariant, BlobView};
+use nimbus::passes::blobs::{BlobVariant, BlobView, Depths};
 use nimbus::passes::cull::{Cull, CullBuffers, CullView, Order};
-use nimbus::passes::sort::{Count, Depths, NO_COUNT, Sort, TILE};
+use nimbus::passes::sort::{Count, NO_COUNT, Sort, TILE};
 use nimbus::reference::Blob;
 use nimbus::reference::cull::{CullOutcome, CullTolerance, outcome};
 use nimbus::reference::view::View;
@@ -111,6 +111,10 @@ impl Scene {
         self.placed.len() as u32
     }
 
+    fn depths(&self) -> Depths {
+        Depths { forward: self.camera.forward, radius: RADIUS, n_bits: self.n_bits }
+    }
+
     fn run_by(&self, gpu: &mut Gpu, compiler: Option<&Compiler>) -> Found {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let variant = BlobVariant {
@@ -127,8 +131,7 @@ impl Scene {
         let View { width, height, cutoff, threshold, smallest, .. } = self.view;
         let blobs = BlobView { camera: &self.camera, cutoff, threshold, saturated: 0.0 };
         let view = CullView { blobs, size: [width, height], smallest };
-        let order =
-            Order { radius: RADIUS, n_bits: self.n_bits, sort_tile: TILE, splat_block: 256 };
+        let order = Order { depths: self.depths(), sort_tile: TILE, splat_block: 256 };
         let buffers = CullBuffers {
             placed: &placed,
             particles: &particles,
@@ -152,8 +155,7 @@ impl Scene {
         let i_group = gpu.upload(&vec![0u32; self.placed.len()]);
         let entries = gpu.buffer::<Entry>(self.placed.len());
         let buffers = [&placed, &i_group, &drawn, &entries];
-        let depths = Depths { forward: self.camera.forward, radius: RADIUS, n_bits: self.n_bits };
-        gpu.run(|rec| sort.record_keys(rec, buffers, &depths, self.n()));
+        gpu.run(|rec| sort.record_keys(rec, buffers, &self.depths(), self.n()));
         gpu.download::<Entry>(&entries, self.placed.len()).iter().map(|e| e[0]).collect()
     }
 
@@ -425,7 +427,7 @@ fn wrong_shaders_are_noticed() {
         ("include/scan.glsl", "return sums[t] - total;", "return sums[t];"),
         ("cull_scan.comp", "push.splat_block), 1, 1, 0)", "push.splat_block), 1, 1, 1)"),
         ("cull_write.comp", "(bit - 1u)", "bit"),
-        ("cull_write.comp", "uvec2(key, i)", "uvec2(key, at)"),
+        ("cull_write.comp", "uvec2(key_at(i), i)", "uvec2(key_at(i), at)"),
         ("include/blob.glsl", "ceil(low - 0.5 - SNAP)", "ceil(low)"),
         ("include/blob.glsl", "min(low, high) > 0.0", "true"),
         (

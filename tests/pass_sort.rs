@@ -10,7 +10,8 @@ use harness::Gpu;
 use nimbus::gpu::{Compiler, DeviceCount};
 use nimbus::layout::particle::{DrawnRecord, PlacedRecord};
 use nimbus::passes;
-use nimbus::passes::sort::{Count, Depths, Sort, TILE};
+use nimbus::passes::blobs::Depths;
+use nimbus::passes::sort::{Count, Sort, TILE};
 use nimbus::reference::sort::{depths, key32, order};
 
 type Entry = [u32; 2];

@@ -1,5 +1,5 @@
 // The buffers and functions that second_gather.comp and second_tensor.comp share
-// (docs/explanation/model.md §7, §11 "second"). The includer declares the push constants first.
+// (docs/explanation/model.md §7, §11 "second").
 // Needs records.glsl.
 
 #ifndef WORKGROUP
@@ -16,6 +16,28 @@
 
 layout(local_size_x = WORKGROUP) in;
 
+layout(push_constant) uniform Push {
+    Grid grid;
+    vec3 eye;
+    uint n_lights;
+    float pair_size;
+    uint pair_levels;
+    float step_length;
+    float backward;
+    uint pair_steps;
+    uint i_first_block;
+    float theta;
+    uint n_surfaces;
+    // Of the dispatches that make up a gather.
+    uint i_round;
+    uint n_rounds;
+    // Of second_tensor.comp alone. is_first_light: 1 for the first light that has energy.
+    uint i_light;
+    uint i_vectors;
+    uint n_rows;
+    uint n_columns;
+    uint is_first_light;
+} push;
 READS(0, Block, blocks)
 READS(1, Pairing, pairings)
 READS(2, uint, occluders)

@@ -1,6 +1,11 @@
 // The facet on a blob's shell (docs/explanation/passes.md "facets"). Needs
-// records.glsl, functions.glsl and the push constants' grid.
+// records.glsl and functions.glsl.
 
+layout(push_constant) uniform Push {
+    Grid grid;
+    uint n_facets;
+    uint i_first_facet;
+} push;
 READS(0, Placed, placed)
 READS(1, Particle, particles)
 READS(2, uint, i_group)

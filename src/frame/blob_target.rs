@@ -6,9 +6,9 @@ use super::features::blob_variant;
 use super::tiling::Tiling;
 use crate::error::{Error, Result};
 use crate::gpu::{
-    BlendMode, Buffer, BufferSpec, Compiler, Device, Image, LoadOp, Recorder, Target,
+    BlendMode, Buffer, BufferSpec, Compiler, DEPTH_BYTES_PER_PIXEL, Device, Image, LoadOp,
+    Recorder, Target, TargetFormat,
 };
-use crate::gpu::{DEPTH_BYTES_PER_PIXEL, TargetFormat};
 use crate::model::scene::{Chunks, DrawPath, Scene};
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};
 use crate::passes::chunks;

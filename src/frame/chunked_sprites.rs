@@ -2,10 +2,9 @@
 //! (docs/explanation/passes.md "chunks").
 
 use crate::error::{Error, Result};
-use crate::gpu::TargetFormat;
 use crate::gpu::{
     BlendMode, Buffer, Compiler, Device, Image, InstanceCount, LoadOp, RecordCount, Recorder,
-    Target, buffers,
+    Target, TargetFormat, buffers,
 };
 use crate::layout::cull::KeptRecord;
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};

@@ -1,7 +1,7 @@
 //! The whole frame on one page: every dispatch and draw call in order, with its buffers.
 
 use super::buffers::SceneBuffers;
-use super::culling::{cull_order, cull_view};
+use super::culling::{cull_view, key_depths};
 use super::frame_passes::FramePasses;
 use super::gather::GatherScratch;
 use super::live::LiveParticles;
@@ -15,13 +15,14 @@ use crate::layout::cull::KeptRecord;
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::passes::blobs::{BlobBuffers, BlobCount};
 use crate::passes::contract::ContractBuffers;
-use crate::passes::cull::CullBuffers;
+use crate::passes::cull::{CullBuffers, Order};
 use crate::passes::facets;
 use crate::passes::first::{self, FirstBuffers};
 use crate::passes::morton;
 use crate::passes::place::PlaceBuffers;
 use crate::passes::second::{MergePush, SourcesPush};
-use crate::passes::sort::{Count, Depths};
+use crate::passes::sort::{Count, TILE};
+use crate::passes::tiles::BLOCK;
 use crate::passes::transmit::TransmitBuffers;
 
 /// Records a pass under its timer label if the plan runs it.
@@ -250,23 +251,23 @@ impl FramePasses {
         let FramePasses { culling, sort, texture, picture, buffers: b, constants: c, .. } = self;
         let SceneBuffers { placed, particles, i_group, drawn, entries, kept, .. } = &*b;
         let (blob_camera, blob_size) = picture.blob_camera(&packet.camera, c);
+        let depths = key_depths(packet);
         pass(rec, plan, Pass::Cull, |rec| {
             let Some(culling) = culling else { return Ok(()) };
             let buffers = CullBuffers { placed, particles, i_group, drawn, entries, kept };
             let view = cull_view(&blob_camera, blob_size, packet, c);
-            culling.cull.record(rec, &buffers, &view, &cull_order(packet), c.n_particles)
+            let order = Order { depths, sort_tile: TILE, splat_block: BLOCK };
+            culling.cull.record(rec, &buffers, &view, &order, c.n_particles)
         })?;
         pass(rec, plan, Pass::Sort, |rec| {
-            let (n_bits, n_drawn) = (packet.sort_bits, packet.n_drawn);
+            let n_bits = depths.n_bits;
             if culling.is_some() {
                 let (i_count, i_groups) = (KeptRecord::I_COUNT, KeptRecord::I_SORT);
                 let n = Count::Counted(DeviceCount { buffer: kept, i_count, i_groups });
                 return sort.record(rec, entries, n_bits, n).map(|_| ());
             }
-            let (forward, radius) = (packet.camera.forward, packet.radius);
-            let depths = Depths { forward, radius, n_bits };
             sort.record_keys(rec, [placed, i_group, drawn, entries], &depths, c.n_particles)?;
-            sort.record(rec, entries, n_bits, Count::Known(n_drawn)).map(|_| ())
+            sort.record(rec, entries, n_bits, Count::Known(packet.n_drawn)).map(|_| ())
         })?;
         pass(rec, plan, Pass::Texture, |rec| {
             texture.iter().try_for_each(|texture| texture.record(rec, &b.pool, c.texture_seed))

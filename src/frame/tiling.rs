@@ -2,8 +2,9 @@
 
 use super::features::{blob_variant, tau_max};
 use crate::error::{Error, Result};
-use crate::gpu::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, MemoryUsage, RecordCount, Recorder, Target};
+use crate::gpu::{
+    Buffer, Compiler, Device, MemoryUsage, RecordCount, Recorder, Target, TargetFormat,
+};
 use crate::model::scene::Scene;
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};
 use crate::passes::sort::{Count, Sort, TILE};

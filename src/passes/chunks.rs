@@ -8,21 +8,30 @@
 //! the target's format, and the light behind opaque pixels.
 
 use crate::error::Result;
-use crate::gpu::TargetFormat;
 use crate::gpu::{
     BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, Kernel, LoadOp, Recorder,
-    Target,
+    Target, TargetFormat,
 };
 use crate::layout::record;
 
 record! {
     /// Push constants of `chunks_order.comp`.
-    pub struct OrderPush { n_chunks: u32, stride: u32 }
+    pub struct OrderPush {
+        /// Number of chunks.
+        n_chunks: u32,
+        /// Room for the entries of a chunk.
+        stride: u32,
+    }
 }
 
 record! {
     /// Push constants of `chunks.vert` and `chunks.frag`.
-    pub struct Push { width: u32, saturated: f32 }
+    pub struct Push {
+        /// Columns of the picture.
+        width: u32,
+        /// Transmittance below which a pixel is opaque.
+        saturated: f32,
+    }
 }
 
 /// Format of the picture that chunks are composed in. With fewer bits, thin layers would leave no

@@ -10,7 +10,14 @@ use crate::layout::record;
 
 record! {
     /// Push constants of `first.comp`.
-    pub struct Push { eye: [f32; 3], n_facets: u32, n_lights: u32 }
+    pub struct Push {
+        /// Eye, relative to the lighting origin.
+        eye: [f32; 3],
+        /// Number of facets.
+        n_facets: u32,
+        /// Number of lights.
+        n_lights: u32,
+    }
 }
 
 bindings! {
@@ -63,11 +70,17 @@ impl First {
 record! {
     /// Push constants of `first_tensor.comp`.
     pub struct TensorPush {
+        /// Eye, relative to the lighting origin.
         eye: [f32; 3],
+        /// Number of facets.
         n_facets: u32,
+        /// Number of lights.
         n_lights: u32,
+        /// Number of basis functions.
         n_bases: u32,
+        /// Rows of T1 and T2.
         n_rows: u32,
+        /// First row of the basis' vectors in the table.
         i_vectors: u32,
     }
 }

@@ -10,29 +10,46 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::error::Result;
-use crate::gpu::TargetFormat;
 use crate::gpu::{
     BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, Kernel, LoadOp, Recorder,
-    Target,
+    Target, TargetFormat,
 };
 use crate::layout::record;
 
 record! {
     /// Push constants of `impostors_part.comp`.
-    pub struct PartPush { n_entries: u32, last_key: u32, is_new: u32, unused: u32 }
+    pub struct PartPush {
+        /// Number of entries.
+        n_entries: u32,
+        /// Greatest key of a far entry.
+        last_key: u32,
+        /// 1: entries are parted by their keys; 0: by the last decision.
+        is_new: u32,
+        /// Padding.
+        unused: u32,
+    }
 }
 
 record! {
     /// Push constants of `impostors.vert` and `impostors.frag`.
     pub struct Push {
+        /// First row of the homography: columns of the layer.
         column: [f32; 3],
+        /// near/z of the layer.
         depth: f32,
+        /// Second row of the homography: rows of the layer.
         row: [f32; 3],
+        /// Columns of the layer.
         width: u32,
+        /// Third row of the homography, the divisor.
         under: [f32; 3],
+        /// Rows of the layer.
         height: u32,
+        /// Middle of the picture, in pixels.
         middle: [f32; 2],
+        /// Least clip coordinates of the layer.
         low: [f32; 2],
+        /// Greatest clip coordinates of the layer.
         high: [f32; 2],
     }
 }

@@ -11,7 +11,12 @@ use crate::layout::record;
 
 record! {
     /// Push constants of `live.comp`.
-    pub struct Push { i_disc: u32, n_particles: u32 }
+    pub struct Push {
+        /// The disc.
+        i_disc: u32,
+        /// Number of particles.
+        n_particles: u32,
+    }
 }
 
 /// The pipeline of the pass.

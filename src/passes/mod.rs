@@ -83,6 +83,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/cells.glsl",
     "include/cull.glsl",
     "include/density.glsl",
+    "include/depths.glsl",
     "include/each.glsl",
     "include/first.glsl",
     "include/functions.glsl",

@@ -12,7 +12,10 @@ use crate::layout::record;
 
 record! {
     /// Push constants of `place.comp`.
-    pub struct Push { n_particles: u32 }
+    pub struct Push {
+        /// Number of particles.
+        n_particles: u32,
+    }
 }
 
 bindings! {

@@ -6,25 +6,21 @@
 //! docs/explanation/model.md §9, §11. Error: none in the sort; a key holds the depth to an ulp (32
 //! bits) or to 2⁻¹⁶ of the scene (16 bits).
 
-use super::blobs::steps_per_depth;
+use super::blobs::{Depths, KeyPush};
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, DeviceCount, Kernel, Recorder, buffers};
 use crate::layout::record;
 
 record! {
-    /// Push constants of `sort_key.comp`.
-    pub struct KeyPush {
-        forward: [f32; 3],
-        n_particles: u32,
-        depth_high: f32,
-        steps_per_depth: f32,
-        n_bits: u32,
-    }
-}
-
-record! {
     /// Push constants of `sort_count.comp`, `sort_scan.comp` and `sort_scatter.comp`.
-    pub struct DigitPush { n_entries: u32, i_count: u32, shift: u32 }
+    pub struct DigitPush {
+        /// Number of entries.
+        n_entries: u32,
+        /// Word that holds the number of entries, or [`NO_COUNT`].
+        i_count: u32,
+        /// First bit of the digit.
+        shift: u32,
+    }
 }
 
 /// The value of `i_count` where the host knows the number of entries; the shaders' NO_COUNT.
@@ -60,17 +56,6 @@ pub enum Count<'a> {
     Known(u32),
     /// The device has written it, and a workgroup for each tile.
     Counted(DeviceCount<'a>),
-}
-
-/// The depths that sort keys are made of.
-#[derive(Debug, Clone, Copy)]
-pub struct Depths {
-    /// The camera's forward axis.
-    pub forward: [f32; 3],
-    /// Bound of |view depth|; the range of 16-bit keys.
-    pub radius: f64,
-    /// Bits of a key: 16 or 32.
-    pub n_bits: u32,
 }
 
 /// The pipelines and scratch buffers of the pass.
@@ -148,15 +133,8 @@ impl Sort {
         depths: &Depths,
         n_particles: u32,
     ) -> Result<()> {
-        let Depths { forward, radius, n_bits } = *depths;
-        let push = KeyPush {
-            forward,
-            n_particles,
-            depth_high: radius as f32,
-            steps_per_depth: steps_per_depth(radius),
-            n_bits,
-        };
-        rec.dispatch(&self.key, &[placed, i_group, drawn, entries], &push, n_particles)
+        let (buffers, push) = ([placed, i_group, drawn, entries], depths.push(n_particles));
+        rec.dispatch(&self.key, &buffers, &push, n_particles)
     }
 
     /// Sorts `entries` by the low `n_bits` of their keys and returns the buffer that holds the

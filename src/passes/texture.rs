@@ -12,12 +12,20 @@ use crate::layout::record;
 
 record! {
     /// Push constants of `texture_transform.comp`.
-    pub struct TransformPush { seed: u32, along_columns: u32 }
+    pub struct TransformPush {
+        /// Seed of the pool.
+        seed: u32,
+        /// 0: along rows; 1: along columns.
+        along_columns: u32,
+    }
 }
 
 record! {
     /// Push constants of `texture_pack.comp`.
-    pub struct PackPush { n_texels: u32 }
+    pub struct PackPush {
+        /// Texels of the pool.
+        n_texels: u32,
+    }
 }
 
 /// Texels of all levels of a field; the shaders' FIELD_TEXELS.

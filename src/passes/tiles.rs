@@ -13,9 +13,9 @@ mod rounds;
 use super::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
 use crate::error::Result;
 use crate::gpu::{
-    Buffer, Compiler, Device, DeviceCount, Kernel, RecordCount, Recorder, Target, buffers,
+    Buffer, Compiler, Device, DeviceCount, Kernel, RecordCount, Recorder, Target, TargetFormat,
+    buffers, has_depth24,
 };
-use crate::gpu::{TargetFormat, has_depth24};
 use crate::layout::cull::KeptRecord;
 use crate::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 

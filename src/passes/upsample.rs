@@ -7,21 +7,29 @@
 //! roundings of the sum of the weights' magnitudes, and one rounding to the format.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
-use crate::gpu::{TargetFormat, has_depth24};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, TargetFormat, has_depth24};
 use crate::layout::record;
 
 record! {
     /// Push constants of `upsample.comp`.
     pub struct Push {
+        /// Columns of the picture.
         width: u32,
+        /// Rows of the picture.
         height: u32,
+        /// Columns of the smaller picture.
         small_width: u32,
+        /// Rows of the smaller picture.
         small_height: u32,
+        /// The x of `Extents::offsets`.
         offset_x: u32,
+        /// The y of `Extents::offsets`.
         offset_y: u32,
+        /// Runs of pixels in a row.
         n_runs: u32,
+        /// Pairs of rows between the same rows of the smaller picture.
         n_pairs: u32,
+        /// Last texel of the smaller picture.
         last_texel: u32,
     }
 }

@@ -1,7 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
-#include "variants.glsl"
 #include "blob.glsl"
 #include "cull.glsl"
 #include "one_subgroup.glsl"
@@ -48,7 +47,7 @@ bool is_kept(uint i) {
     float sigma = placed[i].sigma;
     float tau = SQRT_TAU * particles[i].kappa * sigma;
     if (WEIGHTED != 0) {
-        tau *= group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
+        tau *= weight_of(group, i);
     }
     Shape shape = shape_of(push.camera, ELLIPSOIDS != 0 ? particles[i].aspect : 1.0);
     if (ELLIPSOIDS != 0) {
@@ -62,14 +61,9 @@ bool is_kept(uint i) {
         reach = sqrt(2.0 * max(cut, 0.0));
     }
     uvec2 size = uvec2(push.width, push.height);
-    uvec4 pixels;
-    float widest = sigma;
-    if (ELLIPSOIDS != 0) {
-        pixels = silhouette_of(shape, push.camera, push.pixel, v, GROWTH * reach * sigma, size);
-        widest *= shape.wider;
-    } else {
-        pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach * sigma, size);
-    }
+    uvec4 pixels =
+        silhouette(shape, push.camera, push.pixel, v, GROWTH * reach * sigma, size);
+    float widest = ELLIPSOIDS != 0 ? sigma * shape.wider : sigma;
     bool is_in = pixels.x < pixels.y && pixels.z < pixels.w;
     return i < group.end && v.z >= push.camera.near && is_dense && widest >= push.smallest * v.z
            && is_in;

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
-#include "key.glsl"
+#include "depths.glsl"
 #include "cull.glsl"
 #include "each.glsl"
 
@@ -9,14 +9,6 @@
 // (docs/explanation/passes.md "cull"). In: cull_test's masks and cull_scan's offsets. Out: entries
 // (key, particle). Key: key.glsl.
 
-layout(push_constant) uniform Push {
-    vec3 forward;
-    uint n_particles;
-    float depth_high;
-    float steps_per_depth;
-    uint n_bits;
-} push;
-READS(0, Placed, placed)
 READS(1, uvec2, masks)
 // Kept particles of the tiles before.
 READS(2, uint, n_before)
@@ -29,11 +21,7 @@ void main() {
         uint bit = 1u << (i % 32u);
         if ((mask.x & bit) != 0u) {
             uint at = n_before[i / TILE] + mask.y + bitCount(mask.x & (bit - 1u));
-            uint key = key_of(
-                dot(push.forward, placed[i].position), push.n_bits, push.depth_high,
-                push.steps_per_depth
-            );
-            entries[at] = uvec2(key, i);
+            entries[at] = uvec2(key_at(i), i);
         }
     }
 }

@@ -10,17 +10,10 @@
 // Law: the normal opposes the gradient of the smoothed density where that is well conditioned, else
 // it points away from the cloud's centre. Source: C §2.4.
 
-layout(push_constant) uniform Push {
-    Grid grid;
-    uint n_particles;
-    uint i_first_facet;
-} push;
-WRITES(5, Facet, facets)
-
 #include "shell.glsl"
 
 void main() {
-    FOR_EACH(i, push.n_particles) {
+    FOR_EACH(i, push.n_facets) {
         vec3 p = placed[i].position;
         float sigma = placed[i].sigma;
         Group group = groups[i_group[i]];

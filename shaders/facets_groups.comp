@@ -10,15 +10,9 @@
 // Means are taken about the first member, so that a run of one particle gives that particle's facet
 // to the bit.
 
-layout(push_constant) uniform Push {
-    Grid grid;
-    uint n_facets;
-    uint i_first_facet;
-} push;
 // Particle at each place of the order.
-READS(5, uint, order)
-READS(6, Run, runs)
-WRITES(7, Facet, facets)
+READS(6, uint, order)
+READS(7, Run, runs)
 // By particle.
 WRITES(8, uint, i_facet)
 

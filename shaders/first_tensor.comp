@@ -17,9 +17,9 @@ layout(push_constant) uniform Push {
     uint n_rows;
     uint i_vectors;
 } push;
+WRITES(5, Lit, lit)
 // [light][row]
-WRITES(5, float, t1)
-WRITES(6, Lit, lit)
+WRITES(6, float, t1)
 
 #include "first.glsl"
 

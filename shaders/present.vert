@@ -1,7 +1,6 @@
 #version 460
+#extension GL_GOOGLE_include_directive : require
+#include "strip.glsl"
 
 // Covers the whole window.
-void main() {
-    vec2 at = vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1);
-    gl_Position = vec4(2.0 * at - 1.0, 0.0, 1.0);
-}
+void main() { gl_Position = vec4(corner_of_strip(vec2(-1.0), vec2(1.0)), 0.0, 1.0); }

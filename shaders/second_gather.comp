@@ -3,10 +3,6 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
-#include "light.glsl"
-#include "occlude.glsl"
-#include "functions.glsl"
-#include "cell_samples.glsl"
 
 // Gathers the second reflection as radiance at once, without tensors (docs/explanation/model.md §7,
 // §11 "second"). A workgroup takes a block of receivers of one region and goes through the regions
@@ -15,46 +11,16 @@
 // that stayed too wide. Law: I = sum over sources of Lambda G V. Source: C (16). Bound: pair_size
 // and theta limit the form factors' error; `unresolved` bounds the rest.
 
-#ifndef WORKGROUP
-#define WORKGROUP 8
-#endif
-// 1: the scene has clouds that attenuate.
-#ifndef MARCH
-#define MARCH 1
-#endif
 // 1: sources are the nodes of a tree, 0: facets.
 #ifndef TREE
 #define TREE 1
-#endif
-// 1: the receivers have a lobe.
-#ifndef GLOSSY
-#define GLOSSY 1
 #endif
 // 1: some region has a lobe.
 #ifndef SHINY
 #define SHINY 1
 #endif
 
-#include "iterations.glsl"
 
-layout(local_size_x = WORKGROUP) in;
-
-layout(push_constant) uniform Push {
-    Grid grid;
-    vec3 eye;
-    uint n_lights;
-    float pair_size;
-    uint pair_levels;
-    float step_length;
-    float backward;
-    uint pair_steps;
-    uint i_first_block;
-    float theta;
-    uint n_surfaces;
-    // Of the dispatches that make up a gather.
-    uint i_round;
-    uint n_rounds;
-} push;
 READS(11, Node, nodes)
 UPDATES(12, Lit, lit)
 

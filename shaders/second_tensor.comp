@@ -3,10 +3,6 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
-#include "light.glsl"
-#include "occlude.glsl"
-#include "functions.glsl"
-#include "cell_samples.glsl"
 #include "tensor.glsl"
 
 // Computes T2 of one light: the second reflection by basis of the receiver and column of the
@@ -14,17 +10,6 @@
 // In and out: as second_gather.comp, but T2 (tensor.glsl) in place of radiance. Blocks, pairings
 // and cells are those of second_gather.comp. Source: C (13)-(16).
 
-#ifndef WORKGROUP
-#define WORKGROUP 8
-#endif
-// 1: the scene has clouds that attenuate.
-#ifndef MARCH
-#define MARCH 1
-#endif
-// 1: the receivers have a lobe.
-#ifndef GLOSSY
-#define GLOSSY 1
-#endif
 // 1: some region has a lobe.
 #define SHINY 1
 // N_b: the number of basis functions.
@@ -32,29 +17,6 @@
 #define N_BASES 8
 #endif
 
-#include "iterations.glsl"
-layout(local_size_x = WORKGROUP) in;
-
-layout(push_constant) uniform Push {
-    Grid grid;
-    vec3 eye;
-    uint n_lights;
-    float pair_size;
-    uint pair_levels;
-    float step_length;
-    float backward;
-    uint pair_steps;
-    uint i_first_block;
-    uint i_light;
-    uint i_vectors;
-    uint n_rows;
-    uint n_columns;
-    uint n_surfaces;
-    // As in second_gather.comp. is_first_light: 1 for the first light that has energy.
-    uint i_round;
-    uint n_rounds;
-    uint is_first_light;
-} push;
 UPDATES(11, Lit, lit)
 // Indexed by second_at() of tensor.glsl.
 UPDATES(12, float, t2)
@@ -149,26 +111,26 @@ void add_unresolved(
     n_unresolved += 1.0;
 }
 
+// Stores a sum; later dispatches add to the first one's.
+void store(uint k, float sum) { t2[k] = (push.i_round == 0u ? 0.0 : t2[k]) + sum; }
+
 // Stores the sums of receiver j as columns of its rows.
 void store_pairing(uint j, Region own, Region emitter) {
-    // Later dispatches add to the first one's sums.
-    float keep = push.i_round == 0u ? 0.0 : 1.0;
     uint n_plain = emitter.kind == REGION_COLORED ? 3u : 1u;
     uint n_vectors = emitter.i_lobe == NO_LOBE ? 0u : N_VECTORS;
     [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
         uint row = own.i_row + r * own.n_facets + j - own.i_first_facet;
         uint k =
             second_at(push.i_light, row, push.n_rows, push.n_columns) + emitter.i_column * TILE;
-        t2[k] = (keep > 0.0 ? t2[k] : 0.0) + plain[r].x;
+        store(k, plain[r].x);
         if (n_plain == 3u) {
-            t2[k + TILE] = (keep > 0.0 ? t2[k + TILE] : 0.0) + plain[r].y;
-            t2[k + 2u * TILE] = (keep > 0.0 ? t2[k + 2u * TILE] : 0.0) + plain[r].z;
+            store(k + TILE, plain[r].y);
+            store(k + 2u * TILE, plain[r].z);
         }
 #if N_BASES > 1
         [[unroll]] for (uint b = 0u; b < N_VECTORS; ++b) {
             if (b < n_vectors) {
-                t2[k + (n_plain + b) * TILE] =
-                    (keep > 0.0 ? t2[k + (n_plain + b) * TILE] : 0.0) + shiny[b * N_RESPONSES + r];
+                store(k + (n_plain + b) * TILE, shiny[b * N_RESPONSES + r]);
             }
         }
 #endif

@@ -2,6 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 #include "buffers.glsl"
 #include "sort.glsl"
+#define SCANNED N_DIGITS
+#include "scan.glsl"
 
 // Scans table[digit][tile] to an exclusive prefix sum in one workgroup, an invocation a digit
 // (docs/explanation/passes.md "sort"). Exact: integers.
@@ -9,8 +11,6 @@
 layout(local_size_x = 1 << DIGIT_BITS) in;
 
 UPDATES(1, uint, table)
-
-shared uint sums[N_DIGITS];
 
 void main() {
     uint n_tiles = n_tiles();
@@ -20,16 +20,7 @@ void main() {
     for (uint tile = 0; tile < n_tiles; ++tile) {
         total += table[row + tile];
     }
-    sums[d] = total;
-    barrier();
-    // Hillis-Steele prefix sum over the digits.
-    for (uint reach = 1; reach < N_DIGITS; reach *= 2) {
-        uint left = d >= reach ? sums[d - reach] : 0u;
-        barrier();
-        sums[d] += left;
-        barrier();
-    }
-    uint before = sums[d] - total;
+    uint before = sum_before(total);
     for (uint tile = 0; tile < n_tiles; ++tile) {
         uint count = table[row + tile];
         table[row + tile] = before;

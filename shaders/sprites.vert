@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
-#include "variants.glsl"
 #include "blob.glsl"
+#include "strip.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
 #include "texture.glsl"
@@ -45,8 +45,7 @@ void main() {
     vec3 v = along_camera(push.camera, c);
     float tau = SQRT_TAU * particles[i].kappa * sigma;
     if (WEIGHTED != 0) {
-        Drawn group = drawn[i_group[i]];
-        tau *= group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
+        tau *= weight_of(drawn[i_group[i]], i);
     }
     float scale = 0.5 * (v.z / sigma) * (v.z / sigma);
     out_blob = vec4(v.xy / v.z, scale, tau);
@@ -77,21 +76,14 @@ void main() {
         return;
     }
     float r = GROWTH * reach * sigma;
-    vec2 across, upward;
-    if (ELLIPSOIDS != 0) {
-        across = tangents_of(shape, v, 0, r);
-        upward = tangents_of(shape, v, 1, r);
-    } else {
-        across = tangents(v.x, v.z, r);
-        upward = tangents(v.y, v.z, r);
-    }
+    vec2 across = tangents_along(shape, v, 0, r), upward = tangents_along(shape, v, 1, r);
     vec2 x = (across + vec2(-SNAP, SNAP) * push.pixel.x) / push.camera.tan_x;
     vec2 y = (upward + vec2(-SNAP, SNAP) * push.pixel.y) / push.camera.tan_y;
     // Clamped to the screen: huge quads cost the rasteriser its accuracy.
     x = clamp(x, -1.0, 1.0);
     y = clamp(y, -1.0, 1.0);
-    bool right = (gl_VertexIndex & 1) != 0, top = (gl_VertexIndex & 2) != 0;
+    vec2 corner = corner_of_strip(vec2(x.x, y.x), vec2(x.y, y.y));
     // At most 1: near/near, rounded up, would be clipped.
     float depth = BEHIND != 0 ? min(push.camera.near / v.z, 1.0) : 0.0;
-    gl_Position = vec4(right ? x.y : x.x, -(top ? y.y : y.x), depth, 1.0);
+    gl_Position = vec4(corner.x, -corner.y, depth, 1.0);
 }

@@ -3,6 +3,7 @@
 #include "records.glsl"
 #include "camera.glsl"
 #include "plane.glsl"
+#include "strip.glsl"
 
 // Draws a screen-aligned quad around the visible part of each rectangle (docs/explanation/passes.md
 // "surfaces"). The fragment shader's own test decides which pixels the rectangle covers, so that
@@ -74,8 +75,8 @@ void main() {
     }
     low = clamp(low / tangents, -1.0, 1.0);
     high = clamp(high / tangents, -1.0, 1.0);
-    bool right = (gl_VertexIndex & 1) != 0, top = (gl_VertexIndex & 2) != 0;
-    gl_Position = vec4(right ? high.x : low.x, -(top ? high.y : low.y), 0.0, 1.0);
+    vec2 corner = corner_of_strip(low, high);
+    gl_Position = vec4(corner.x, -corner.y, 0.0, 1.0);
     if (!all(lessThan(low, high))) {
         // Draws nothing: a quad without area.
         gl_Position = vec4(2.0, 2.0, 0.0, 1.0);

@@ -25,6 +25,14 @@ float field_at(uint part, uint level, uvec2 at) {
         .r;
 }
 
+// Returns the field at the texel's four corners.
+vec4 corners_at(uint part, uint level, uvec2 at) {
+    return vec4(
+        field_at(part, level, at), field_at(part, level, at + uvec2(1, 0)),
+        field_at(part, level, at + uvec2(0, 1)), field_at(part, level, at + uvec2(1, 1))
+    );
+}
+
 uint quanta(float low, float high) {
     ivec2 q = ivec2(round(clamp(QUANTA * vec2(low, high), -32767.0, 32767.0)));
     return uint(q.x & 0xFFFF) | (uint(q.y) << 16);
@@ -38,23 +46,14 @@ void main() {
         uint within = rest - level_offset(level), log_side = 8u - level;
         uvec2 at = uvec2(within & ((1u << log_side) - 1u), within >> log_side);
         uint part = 2u * (i_field / 2u) * FIELD_TEXELS + (i_field & 1u);
-        vec4 own = vec4(
-            field_at(part, level, at), field_at(part, level, at + uvec2(1, 0)),
-            field_at(part, level, at + uvec2(0, 1)), field_at(part, level, at + uvec2(1, 1))
-        );
+        vec4 own = corners_at(part, level, at);
         vec4 above = vec4(0.0);
         if (level < uint(LAST_LEVEL)) {
             // The texel lies in one quarter of a texel of the next level. Its corners are that
             // one's corner, the middles of two edges, and the middle.
-            uvec2 c = at >> 1;
-            vec2 a =
-                vec2(field_at(part, level + 1u, c), field_at(part, level + 1u, c + uvec2(1, 0)));
-            vec2 b = vec2(
-                field_at(part, level + 1u, c + uvec2(0, 1)),
-                field_at(part, level + 1u, c + uvec2(1, 1))
-            );
+            vec4 of = corners_at(part, level + 1u, at >> 1);
             vec4 share = 0.5 * vec4(at.x & 1u, (at.x & 1u) + 1u, at.y & 1u, (at.y & 1u) + 1u);
-            vec2 near = a + share.z * (b - a), far = a + share.w * (b - a);
+            vec2 near = of.xy + share.z * (of.zw - of.xy), far = of.xy + share.w * (of.zw - of.xy);
             above = vec4(mix(near.xx, near.yy, share.xy), mix(far.xx, far.yy, share.xy));
         }
         pool[i] = uvec4(

@@ -30,11 +30,6 @@
 #ifndef THIN
 #define THIN 0
 #endif
-// 1: surfaces hide what lies behind them; 2: and their depth has 24 bits.
-#ifndef BEHIND
-#define BEHIND 0
-#endif
-
 // 1: a splat ends where its optical depth falls under a threshold.
 #ifndef THRESHOLD
 #define THRESHOLD 0
@@ -138,11 +133,12 @@ float depth_of[RUN];
 #endif
 
 void compose(Loaded splat, float y) {
-    vec4 place = splat.place, light = splat.light;
+    // Centre's slopes, scale, tau; radiance, near/z.
+    vec4 place = uintBitsToFloat(splat.fours[0]), light = uintBitsToFloat(splat.fours[1]);
     vec2 s = place.xy;
     float dy = y - s.y;
 #if ELLIPSOIDS
-    vec4 conic = splat.conic;
+    vec4 conic = uintBitsToFloat(splat.fours[N_FOURS - 1]);
     float a = -conic.x, b = -conic.y * dy, c = -conic.z * dy * dy;
     float lowest = min_exponent;
 #else
@@ -183,8 +179,8 @@ void compose(Loaded splat, float y) {
 #if TEXTURED
         e[j] += 1.44269504089
                 * texture_exponent(
-                    vec2(dx[j], dy), splat.turn, uvec2(splat.gain.w, splat.side),
-                    uintBitsToFloat(splat.gain.xyz)
+                    vec2(dx[j], dy), uintBitsToFloat(splat.fours[2]),
+                    uvec2(splat.fours[3].w, splat.fours[4].x), uintBitsToFloat(splat.fours[3].xyz)
                 );
         e[j] = clamp(e[j], -125.0, 125.0);
 #endif
@@ -205,8 +201,8 @@ void compose(Loaded splat, float y) {
 void compose_some(uint k, uint n, uint spare, float y) {
     uint t = gl_LocalInvocationID.x;
     Loaded splat = load_splat(int(k + t < n ? found[k + t] : spare));
-    splat.place.w = k + t < n ? splat.place.w : 0.0;
-    splat.light.xyz = k + t < n ? splat.light.xyz : vec3(0.0);
+    splat.fours[0].w = k + t < n ? splat.fours[0].w : 0u;
+    splat.fours[1].xyz = k + t < n ? splat.fours[1].xyz : uvec3(0);
     uint end = min(n - k, INVOCATIONS);
 #if ONE_SUBGROUP
     // By twos: a loop writes its carried values again in each iteration.
@@ -228,24 +224,14 @@ void compose_some(uint k, uint n, uint spare, float y) {
 }
 
 vec4 load(uint p) {
-#if !BEHIND
-    return vec4(0.0);
-#elif PIXEL_WORDS == 1
-    return unpackUnorm4x8(under[p]);
-#elif PIXEL_WORDS == 2
-    return vec4(unpackHalf2x16(under[2 * p]), unpackHalf2x16(under[2 * p + 1]));
+#if BEHIND
+    uvec4 words = uvec4(0);
+    [[unroll]] for (uint k = 0; k < PIXEL_WORDS; ++k) { words[k] = under[PIXEL_WORDS * p + k]; }
+    return pixel_of(words, 0);
 #else
-    return uintBitsToFloat(
-        uvec4(under[4 * p], under[4 * p + 1], under[4 * p + 2], under[4 * p + 3])
-    );
+    return vec4(0.0);
 #endif
 }
-
-#if BEHIND == 2
-float depth_at(uint p) { return float(depths[p] & 0xffffffu) / 16777215.0; }
-#elif BEHIND
-float depth_at(uint p) { return uintBitsToFloat(depths[p]); }
-#endif
 
 // Returns pixel j of the row over what stands behind it.
 vec4 seen(uint j, uint p) { return vec4(color[j], alpha[j]) + (1.0 - alpha[j]) * load(p); }
@@ -286,7 +272,7 @@ void draw_tile(uvec4 range, uint i_tile) {
         alpha[j] = 0.0;
 #endif
 #if BEHIND
-        depth_of[j] = depth_at(p);
+        depth_of[j] = depths_of(uvec4(depths[p])).x;
 #endif
     }
     // These loops test at their ends, as do those within: llvmpipe runs one more empty iteration

@@ -2,7 +2,6 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
-#include "variants.glsl"
 #include "blob.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
@@ -77,8 +76,7 @@ uint project(uint i, uint r) {
     float sigma = place.w;
     float tau = SQRT_TAU * shade.w * sigma;
     if (WEIGHTED != 0) {
-        Drawn group = drawn[i_group[i]];
-        tau *= group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
+        tau *= weight_of(drawn[i_group[i]], i);
     }
     if (!(v.z >= push.camera.near) || !(tau > 0.0)) {
         return 0u;
@@ -99,13 +97,8 @@ uint project(uint i, uint r) {
     }
     vec2 s = v.xy / v.z;
     uvec2 size = uvec2(push.width, push.height);
-    uvec4 pixels;
-    if (ELLIPSOIDS != 0) {
-        pixels =
-            silhouette_of(shape, push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, size);
-    } else {
-        pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, size);
-    }
+    uvec4 pixels =
+        silhouette(shape, push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, size);
     uvec2 columns = pixels.xy, rows = pixels.zw;
     if (columns.x == columns.y || rows.x == rows.y) {
         return 0u;

@@ -178,8 +178,8 @@ fn faulty_shaders_exceed_the_bounds() {
         ("sprites.frag", "rest + in_conic.w * up * up", "rest + up * up"),
         (
             "sprites.vert",
-            "upward = tangents_of(shape, v, 1, r);",
-            "upward = tangents_of(shape, v, 0, r);",
+            "upward = tangents_along(shape, v, 1, r);",
+            "upward = tangents_along(shape, v, 0, r);",
         ),
     ];
     let tiles = [

@@ -83,7 +83,7 @@ fn wrong_functions(gpu: &Gpu, from: &str, to: &str) -> Kernel {
     let mut sources = Sources::embedded(&[&[("functions.comp", FUNCTIONS)], SHADERS].concat());
     assert!(sources.replace("include/functions.glsl", from, to));
     let compiler = Compiler::new(sources, None).unwrap();
-    Kernel::new(&gpu.device, &compiler, "functions", Push::FIELDS, &[]).unwrap()
+    Kernel::new(&gpu.device, &compiler, "functions", Push::FIELDS).unwrap()
 }
 
 /// Returns `n` numbers of either sign whose magnitudes are spread evenly over the exponents from
@@ -118,7 +118,7 @@ fn philox_gives_the_published_words() {
         let mut sources = Sources::embedded(&[&[("kat.comp", KAT)], SHADERS].concat());
         assert!(sources.replace("include/philox.glsl", from, to));
         let compiler = Compiler::new(sources, None).unwrap();
-        let wrong = Kernel::new(&gpu.device, &compiler, "kat", Push::FIELDS, &[]).unwrap();
+        let wrong = Kernel::new(&gpu.device, &compiler, "kat", Push::FIELDS).unwrap();
         assert_ne!(answers(&mut gpu, &wrong).0, found);
     }
 }

@@ -31,8 +31,14 @@ fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
     let (density, modes) = (gpu.buffer::<f32>(512), gpu.buffer::<ModeRecord>(1));
     let record = GridRecord::from(&spec);
     let recorded = gpu.commands.record(barriers, |rec| {
-        let buffers = [&particles, &i_group, &groups, &modes, &placed];
-        place.record(rec, &place::PlaceBuffers::from_bindings(buffers), 64)?;
+        let buffers = place::PlaceBuffers {
+            particles: &particles,
+            i_group: &i_group,
+            groups: &groups,
+            modes: &modes,
+            placed: &placed,
+        };
+        place.record(rec, &buffers, 64)?;
         grid.record(rec, [&placed, &particles, &density], &record, 64, 1.0)
     });
     recorded.unwrap();
@@ -170,14 +176,14 @@ fn shader_errors_carry_file_and_line() {
     {
         let compiler = Gpu::wrong_compiler(file, from, &format!("nonsense {from}"));
         let user = if file.starts_with("include") { "facets.comp" } else { file };
-        let refused = compiler.compile(user, Optimize::Yes).err().unwrap();
+        let refused = compiler.compile(user, Optimize::Yes, &[]).err().unwrap();
         let Error::Shader { name, what } = refused else { panic!("{refused:?}") };
         assert_eq!(name, user);
         assert!(what.contains(&format!("{file}:{}:", line_of(file, from))), "{what}");
     }
     let compiler = Compiler::new(passes::sources(), None).unwrap();
     for file in ["absent.comp", "include/records.glsl"] {
-        assert!(matches!(compiler.compile(file, Optimize::Yes), Err(Error::Shader { .. })));
+        assert!(matches!(compiler.compile(file, Optimize::Yes, &[]), Err(Error::Shader { .. })));
     }
 }
 
@@ -185,7 +191,7 @@ fn shader_errors_carry_file_and_line() {
 fn a_host_interface_that_differs_from_the_shaders_is_refused() {
     let mut gpu = Gpu::new();
     let new = |push: &[nimbus::gpu::Field]| {
-        Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", push, &[]).err()
+        Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", push).err()
     };
     assert!(new(grid::ResolvePush::FIELDS).is_none());
     let wrong: [&[nimbus::gpu::Field]; 4] = [
@@ -203,8 +209,7 @@ fn a_host_interface_that_differs_from_the_shaders_is_refused() {
     }
     // Recording refuses a missing buffer, and push constants of another size.
     let kernel =
-        Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS, &[])
-            .unwrap();
+        Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS).unwrap();
     let (sums, density) = (gpu.buffer::<[u32; 2]>(8), gpu.buffer::<f32>(8));
     let push = grid::ResolvePush { n_cells: 8, density_per_quantum: 1.0 };
     let too_few =
@@ -226,8 +231,7 @@ fn a_host_interface_that_differs_from_the_shaders_is_refused() {
 fn a_dispatch_of_several_rows_of_workgroups_processes_every_record() {
     let mut gpu = Gpu::new();
     let kernel =
-        Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS, &[])
-            .unwrap();
+        Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS).unwrap();
     // Two rows and a part of a workgroup.
     let in_a_row =
         u64::from(gpu.device.limits().max_workgroups_x) * u64::from(kernel.local_size_x());
@@ -260,7 +264,7 @@ fn host_access_is_checked_against_the_buffers_size() {
     assert!(matches!(readback.read::<u32>(5), Err(Error::Limit { .. })));
     assert!(matches!(readback.read::<u32>(usize::MAX / 2), Err(Error::Limit { .. })));
     let device = Buffer::new::<u32>(&gpu.device, "test.device", 4, MemoryUsage::Device).unwrap();
-    assert!(device.bytes() == 16 && device.name() == "test.device");
+    assert_eq!(device.bytes(), 16);
 }
 
 fn cached_files(folder: &Path) -> Vec<std::path::PathBuf> {
@@ -274,7 +278,7 @@ fn the_spirv_cache_is_read_checked_and_repaired() {
     let folder = tempfile::tempdir().unwrap();
     let cache = folder.path().join("below/spirv");
     let compiler = |sources: Sources| Compiler::new(sources, Some(cache.clone())).unwrap();
-    let compile = |c: &Compiler| c.compile("place.comp", Optimize::Yes).unwrap();
+    let compile = |c: &Compiler| c.compile("place.comp", Optimize::Yes, &[]).unwrap();
     let words = compile(&compiler(passes::sources()));
     let files = cached_files(&cache);
     assert_eq!(files.len(), 1);
@@ -296,7 +300,7 @@ fn the_spirv_cache_is_read_checked_and_repaired() {
     let mut sources = passes::sources();
     assert!(sources.replace("include/each.glsl", "Runs its body", "Runs this body"));
     compile(&compiler(sources));
-    compiler(passes::sources()).compile("place.comp", Optimize::No).unwrap();
+    compiler(passes::sources()).compile("place.comp", Optimize::No, &[]).unwrap();
     let files = cached_files(&cache);
     assert_eq!(files.len(), 3);
     assert!(files.iter().all(|f| f.extension().is_some_and(|e| e == "spv")), "{files:?}");
@@ -309,8 +313,9 @@ fn the_spirv_cache_is_read_checked_and_repaired() {
 #[test]
 fn a_folder_of_shaders_replaces_the_embedded_ones() {
     let folder = tempfile::tempdir().unwrap();
-    let compile =
-        |s: Sources| Compiler::new(s, None).unwrap().compile("place.comp", Optimize::Yes).unwrap();
+    let compile = |s: Sources| {
+        Compiler::new(s, None).unwrap().compile("place.comp", Optimize::Yes, &[]).unwrap()
+    };
     let embedded = compile(passes::sources());
     let empty = passes::sources().with_dir(folder.path()).err().unwrap();
     assert!(matches!(&empty, Error::Io { what, .. } if what.contains("place.comp")), "{empty}");
@@ -331,7 +336,10 @@ fn a_folder_of_shaders_replaces_the_embedded_ones() {
     std::fs::create_dir(folder.path().join("include")).unwrap();
     std::fs::write(folder.path().join("include/records.glsl"), "nonsense").unwrap();
     let sources = passes::sources().with_dir(folder.path()).unwrap();
-    let refused =
-        Compiler::new(sources, None).unwrap().compile("place.comp", Optimize::Yes).err().unwrap();
+    let refused = Compiler::new(sources, None)
+        .unwrap()
+        .compile("place.comp", Optimize::Yes, &[])
+        .err()
+        .unwrap();
     assert!(refused.to_string().contains("include/records.glsl:1:"), "{refused}");
 }

@@ -89,7 +89,7 @@ fn compare(file: &str, found: &Reflection, push: &[Field], elements: &str) -> Ve
 }
 
 fn unoptimised(compiler: &Compiler, file: &str) -> Reflection {
-    reflect(file, &compiler.compile(file, Optimize::No).unwrap()).unwrap()
+    reflect(file, &compiler.compile(file, Optimize::No, &[]).unwrap()).unwrap()
 }
 
 fn embedded() -> Compiler {
@@ -236,7 +236,7 @@ fn shared_constants_have_one_value() {
         ("include/records.glsl", "REGION_COLORED", f64::from(REGION_COLORED)),
         ("include/records.glsl", "REGION_TERRAIN", f64::from(REGION_TERRAIN)),
         ("include/records.glsl", "NO_LOBE", f64::from(NO_LOBE)),
-        ("include/records.glsl", "NO_PARTICLE", f64::from(nimbus::layout::particle::NO_PARTICLE)),
+        ("include/records.glsl", "NO_PARTICLE", f64::from(u32::MAX)),
         ("include/texture.glsl", "TEXTURE_STREAM", f64::from(0x7465_7874u32)),
         ("include/texture.glsl", "FIELD_TEXELS", f64::from(texture::FIELD_TEXELS)),
         ("include/texture.glsl", "TEXTURE_SIDE", nimbus::reference::texture::SIDE as f64),
@@ -330,7 +330,7 @@ fn wrong_declarations_are_reported() {
         assert!(sources.replace(in_text, passage, &passage.replace(from, to)), "{in_text}: {from}");
         let compiler = Compiler::new(sources, None).unwrap();
         let (_, push, elements) = INTERFACES.iter().find(|(f, _, _)| *f == file).unwrap();
-        match compiler.compile(file, Optimize::No) {
+        match compiler.compile(file, Optimize::No, &[]) {
             Ok(words) => {
                 let complaints = compare(file, &reflect(file, &words).unwrap(), push, elements);
                 assert!(!complaints.is_empty(), "{file}: {to} was not reported");

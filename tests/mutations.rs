@@ -116,16 +116,16 @@ const FAULTS: &[Fault] = &[
     ),
     (
         "a prefix sum that starts one digit late",
-        "sort_scan.comp",
-        "d >= reach ? sums[d - reach] : 0u",
-        "d > reach ? sums[d - reach] : 0u",
+        "include/scan.glsl",
+        "t >= reach ? sums[t - reach] : 0u",
+        "t > reach ? sums[t - reach] : 0u",
         "sorting/random",
     ),
     (
         "no barrier between reading and writing a prefix sum",
-        "sort_scan.comp",
-        "uint left = d >= reach ? sums[d - reach] : 0u;\n        barrier();",
-        "uint left = d >= reach ? sums[d - reach] : 0u;",
+        "include/scan.glsl",
+        "uint left = t >= reach ? sums[t - reach] : 0u;\n        barrier();",
+        "uint left = t >= reach ? sums[t - reach] : 0u;",
         "sorting/random",
     ),
     (

@@ -136,7 +136,8 @@ impl Case {
             n_rows: self.n_rows,
             n_columns: self.n_columns,
         };
-        let named = ContractBuffers::from_bindings(buffers.each_ref());
+        let [facets, lights, regions, coefficients, t1, t2, spans, lit] = buffers.each_ref();
+        let named = ContractBuffers { facets, lights, regions, coefficients, t1, t2, spans, lit };
         gpu.run(|rec| pass.record(rec, &named, &push));
         let lit: Vec<LitRecord> = gpu.download(&buffers[7], self.facets.len());
         assert!((0..).zip(&lit).all(|(j, l)| (l.n_unresolved, l.unresolved) == (j as f32, 0.5)));

@@ -10,15 +10,15 @@ mod wrong;
 use bounded::{Random, U};
 use glam::DVec3;
 use harness::Gpu;
-use nimbus::gpu::Compiler;
+use nimbus::gpu::{Compiler, DeviceCount};
 use nimbus::layout::cull::KeptRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::camera::Pose;
 use nimbus::model::cloud::SQRT_TAU;
-use nimbus::passes::blobs::{BlobVariant, BlobView};
+use nimbus::passes::blobs::{BlobVariant, BlobView, Depths};
 use nimbus::passes::cull::{Cull, CullBuffers, CullView, Order};
-use nimbus::passes::sort::{Count, Depths, DeviceCount, NO_COUNT, Sort, TILE};
+use nimbus::passes::sort::{Count, NO_COUNT, Sort, TILE};
 use nimbus::reference::Blob;
 use nimbus::reference::cull::{CullOutcome, CullTolerance, outcome};
 use nimbus::reference::view::View;
@@ -113,6 +113,10 @@ impl Scene {
         self.placed.len() as u32
     }
 
+    fn depths(&self) -> Depths {
+        Depths { forward: self.camera.forward, radius: RADIUS, n_bits: self.n_bits }
+    }
+
     fn run_by(&self, gpu: &mut Gpu, compiler: Option<&Compiler>) -> Found {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let variant = BlobVariant {
@@ -129,10 +133,15 @@ impl Scene {
         let View { width, height, cutoff, threshold, smallest, .. } = self.view;
         let blobs = BlobView { camera: &self.camera, cutoff, threshold, saturated: 0.0 };
         let view = CullView { blobs, size: [width, height], smallest };
-        let order =
-            Order { radius: RADIUS, n_bits: self.n_bits, sort_tile: TILE, splat_block: 256 };
-        let buffers = [&placed, &particles, &i_group, &drawn, &entries, &kept];
-        let buffers = CullBuffers::from_bindings(buffers);
+        let order = Order { depths: self.depths(), sort_tile: TILE, splat_block: 256 };
+        let buffers = CullBuffers {
+            placed: &placed,
+            particles: &particles,
+            i_group: &i_group,
+            drawn: &drawn,
+            entries: &entries,
+            kept: &kept,
+        };
         gpu.run(|rec| pass.record(rec, &buffers, &view, &order, self.n()));
         Found {
             kept: gpu.download(&kept, 1)[0],
@@ -148,8 +157,7 @@ impl Scene {
         let i_group = gpu.upload(&vec![0u32; self.placed.len()]);
         let entries = gpu.buffer::<Entry>(self.placed.len());
         let buffers = [&placed, &i_group, &drawn, &entries];
-        let depths = Depths { forward: self.camera.forward, radius: RADIUS, n_bits: self.n_bits };
-        gpu.run(|rec| sort.record_keys(rec, buffers, &depths, self.n()));
+        gpu.run(|rec| sort.record_keys(rec, buffers, &self.depths(), self.n()));
         gpu.download::<Entry>(&entries, self.placed.len()).iter().map(|e| e[0]).collect()
     }
 

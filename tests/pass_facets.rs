@@ -161,7 +161,7 @@ fn a_wrong_shader_is_noticed() {
         (
             "facets.comp",
             "push.i_first_facet + i]",
-            "push.i_first_facet + (i + 1) % push.n_particles]",
+            "push.i_first_facet + (i + 1) % push.n_facets]",
         ),
         ("include/density.glsl", "mix(low, high, f.x)", "mix(low, high, f.y)"),
     ];

@@ -94,7 +94,8 @@ impl Case {
             gpu.upload(&[LitRecord::default(); N_FACETS]),
         ];
         let push = Push { eye: EYE, n_facets: N_FACETS as u32, n_lights: self.lights.len() as u32 };
-        let named = FirstBuffers::from_bindings(buffers.each_ref());
+        let [facets, lights, transmittance, regions, table, lit] = buffers.each_ref();
+        let named = FirstBuffers { facets, lights, transmittance, regions, table, lit };
         gpu.run(|rec| first.record(rec, &named, &push));
         gpu.download(&buffers[5], N_FACETS)
     }

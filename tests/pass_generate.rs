@@ -348,7 +348,7 @@ fn the_number_of_invocations_does_not_matter() {
     let law = law(Form::Printed);
     let boxes = paper_boxes("cubes-615.dat");
     let expected = generate(&mut gpu, &boxes, &law);
-    let kernel = Kernel::new(&gpu.device, &gpu.compiler, "generate", Push::FIELDS, &[]).unwrap();
+    let kernel = Kernel::new(&gpu.device, &gpu.compiler, "generate", Push::FIELDS).unwrap();
     let (list, i_group) = records(&boxes, &law);
     let (list, i_group) = (gpu.upload(&list), gpu.upload(&i_group));
     let push = Push { i_first: 0, n_particles: 615, max_attempts: MAX_ATTEMPTS };

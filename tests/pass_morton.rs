@@ -98,8 +98,13 @@ impl Cloud {
             (gpu.upload(&i_group), gpu.upload(&groups), gpu.upload(&self.records()));
         let entries = gpu.buffer::<Entry>(N);
         let n = self.positions.len();
-        let buffers = [&placed, &i_group, &groups, &bounds, &entries];
-        let buffers = ParticleBuffers::from_bindings(buffers);
+        let buffers = ParticleBuffers {
+            placed: &placed,
+            i_group: &i_group,
+            groups: &groups,
+            bounds: &bounds,
+            entries: &entries,
+        };
         gpu.run(|rec| pass.record_particles(rec, &buffers, n as u32, self.bounds.len() as u32));
         gpu.download(&entries, n)
     }

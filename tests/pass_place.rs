@@ -112,7 +112,13 @@ fn run(gpu: &mut Gpu, compiler: &Compiler, scene: &Scene) -> Vec<PlacedRecord> {
     let modes =
         if scene.modes.is_empty() { gpu.buffer::<ModeRecord>(1) } else { gpu.upload(&scene.modes) };
     let (groups, placed) = (gpu.upload(&scene.records), gpu.buffer::<PlacedRecord>(n));
-    let buffers = PlaceBuffers::from_bindings([&particles, &i_group, &groups, &modes, &placed]);
+    let buffers = PlaceBuffers {
+        particles: &particles,
+        i_group: &i_group,
+        groups: &groups,
+        modes: &modes,
+        placed: &placed,
+    };
     gpu.run(|rec| pass.record(rec, &buffers, n as u32));
     gpu.download(&placed, n)
 }

@@ -128,7 +128,7 @@ fn show(
     let pictures = [pixels(), others()].map(|pixels| gpu.upload(&bytes_of(from, &pixels)));
     let mut window = Image::color_target(&gpu.device, "test.window", WINDOW[0], WINDOW[1], into)
         .expect("a window");
-    let n = 4 * window.n_pixels();
+    let n = 4 * u64::from(WINDOW[0]) * u64::from(WINDOW[1]);
     let read =
         Buffer::new::<u8>(&gpu.device, "test.codes", n, MemoryUsage::Readback).expect("room");
     let shown = Shown {

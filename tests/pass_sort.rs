@@ -7,10 +7,11 @@ mod harness;
 use bounded::{Bounded, Random, dot, exact3};
 use glam::DVec3;
 use harness::Gpu;
-use nimbus::gpu::Compiler;
+use nimbus::gpu::{Compiler, DeviceCount};
 use nimbus::layout::particle::{DrawnRecord, PlacedRecord};
 use nimbus::passes;
-use nimbus::passes::sort::{Count, Depths, DeviceCount, Sort, TILE};
+use nimbus::passes::blobs::Depths;
+use nimbus::passes::sort::{Count, Sort, TILE};
 use nimbus::reference::sort::{depths, key32, order};
 
 type Entry = [u32; 2];

@@ -235,7 +235,7 @@ fn wrong_pictures_are_noticed() {
         ("sprites.frag", "exp(exponent)", "(1.0 + exponent)"),
         ("include/blob.glsl", "GROWTH = 1.0 + 1e-4", "GROWTH = 0.97"),
         ("include/blob.glsl", "min(low, high) > 0.0", "true"),
-        ("sprites.vert", "-(top ? y.y : y.x)", "(top ? y.y : y.x)"),
+        ("sprites.vert", "-corner.y", "corner.y"),
         ("sprites.vert", "entries[push.i_first + gl_InstanceIndex].y", "gl_InstanceIndex"),
     ] {
         let mut sources = passes::sources();
@@ -271,7 +271,7 @@ fn what_is_drawn_in_part_has_weights() {
         ("? group.last_weight : 1.0", "? 1.0 : 1.0"),
         ("i + 1u ==", "i =="),
     ] {
-        let wrong = Gpu::wrong_compiler("sprites.vert", from, to);
+        let wrong = Gpu::wrong_compiler("include/blob.glsl", from, to);
         let values = picture.draw(&mut gpu, Some(&wrong), TargetFormat::Rgba32f);
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
     }

@@ -295,7 +295,7 @@ fn wrong_pictures_are_noticed() {
             "1.0 - min(push.camera.near * size / q, 1.0)",
         ),
         ("surfaces.frag", "regions[in_i]", "regions[in_i / 2]"),
-        ("surfaces.vert", "-(top ? high.y : low.y)", "(top ? high.y : low.y)"),
+        ("surfaces.vert", "-corner.y", "corner.y"),
         ("surfaces.vert", "+ SNAP * push.pixel", "- 8.0 * push.pixel"),
         ("surfaces.vert", "(a.z >= near) != (b.z >= near)", "false"),
         ("surfaces.vert", "if (a.z >= near) {", "if (false) {"),
@@ -344,7 +344,17 @@ fn a_target_that_does_not_fit_is_refused() {
         gpu.commands.record(Barriers::Placed, |rec| match pass {
             Some(pass) => {
                 let start = if target.depth.is_some() { LoadOp::Load } else { LoadOp::Clear };
-                let buffers = BlobBuffers::from_bindings([&buffer; 9]);
+                let buffers = BlobBuffers {
+                    entries: &buffer,
+                    placed: &buffer,
+                    particles: &buffer,
+                    lit: &buffer,
+                    i_facet: &buffer,
+                    i_group: &buffer,
+                    drawn: &buffer,
+                    textured: &buffer,
+                    pool: &buffer,
+                };
                 let view =
                     BlobView { camera: &camera, cutoff: 3.0, threshold: 0.0, saturated: 0.0 };
                 let count = BlobCount { n: RecordCount::Known(0), i_first_facet: 0 };

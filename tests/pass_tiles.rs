@@ -92,8 +92,8 @@ fn textures_of_every_size() {
     let (truths, bounds) = picture.tiled_truth(FORMATS[2].1, tiled.saturated);
     let wrong = Gpu::wrong_compiler(
         "tiles.comp",
-        "uvec2(splat.gain.w, splat.side)",
-        "uvec2(0u, splat.side)",
+        "uvec2(splat.fours[3].w, splat.fours[4].x)",
+        "uvec2(0u, splat.fours[4].x)",
     );
     let values = picture.draw_by(&mut gpu, Some(&wrong), FORMATS[2].0, Way::Tiles(tiled));
     assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "another field");
@@ -175,7 +175,7 @@ fn wrong_pictures_are_noticed() {
         ("tiles.comp", "min_exponent = -push.cut", "min_exponent = -0.9 * push.cut"),
         ("tiles.comp", "* inv_norm[j]", ""),
         ("tiles.comp", "alpha[j] += here;", "alpha[j] += 0.999 * here;"),
-        ("tiles.comp", "k + t < n ? splat.place.w", "k + t <= n ? splat.place.w"),
+        ("tiles.comp", "k + t < n ? splat.fours[0].w", "k + t <= n ? splat.fours[0].w"),
         (
             "include/tile_splats.glsl",
             "n + subgroupBallotBitCount(hits)",

@@ -193,7 +193,7 @@ const NO_CONTRACTION: u32 = 42;
 /// Operations of a shader's SPIR-V that may not be fused or removed.
 fn n_kept_as_written(file: &str, sums: Sums) -> usize {
     let compiler = Compiler::new(passes::sources(), None).unwrap();
-    let words = compiler.compile_with(file, Optimize::Yes, SumMacros::from(sums).list()).unwrap();
+    let words = compiler.compile(file, Optimize::Yes, SumMacros::from(sums).list()).unwrap();
     let (mut at, mut n) = (5, 0);
     while at < words.len() {
         n += usize::from(words[at] & 0xffff == OP_DECORATE && words[at + 2] == NO_CONTRACTION);

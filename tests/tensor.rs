@@ -28,7 +28,7 @@ use nimbus::model::basis::{Basis, N_NODES, Sampling};
 use nimbus::model::light::Light;
 use nimbus::model::material::MaterialKey;
 use nimbus::model::scene::Scene;
-use nimbus::passes::first::{FirstTensor, FirstTensorBuffers, TensorPush};
+use nimbus::passes::first::{FirstBuffers, FirstTensor, TensorPush};
 use nimbus::reference::first;
 
 fn scene(overrides: &[&str]) -> Scene {

@@ -11,14 +11,6 @@ vec4 row_of_falloffs(Light light, vec3 o, vec3 u, float height) {
     return height * inverse * cone * cone / max(d2, light.radius * light.radius);
 }
 
-// Returns the share of a directional light's or the sky's energy; v is the share that is not in
-// shadow.
-vec4 share_by(Light light, vec3 normal, vec4 v) {
-    float cosine = dot(normal, light.toward);
-    return light.kind == LIGHT_SKY ? v * (0.5 + 0.5 * cosine) + light.constant
-                                   : v * max(cosine, 0.0);
-}
-
 // Returns the share of a light's energy that arrives at each point of a facet, past the surfaces of
 // the mask that shadows_on() found. through: transmittance of the clouds.
 CellSamples arriving(
@@ -41,15 +33,15 @@ CellSamples arriving(
     }
     // The cell is flat, so the lamp's height over it is the same everywhere.
     vec3 o = light.position - cell.middle;
-    float height = max(dot(normal, o), 0.0);
+    float height = max(dot(normal, o), 0.0), cosine = dot(normal, light.toward);
     return CellSamples(
         lamp ? s.a * row_of_falloffs(light, o - ALONG.x * cell.v, cell.u, height)
-             : share_by(light, normal, s.a),
+             : share_by(light, cosine, s.a),
         lamp ? s.b * row_of_falloffs(light, o - ALONG.y * cell.v, cell.u, height)
-             : share_by(light, normal, s.b),
+             : share_by(light, cosine, s.b),
         lamp ? s.c * row_of_falloffs(light, o - ALONG.z * cell.v, cell.u, height)
-             : share_by(light, normal, s.c),
+             : share_by(light, cosine, s.c),
         lamp ? s.d * row_of_falloffs(light, o - ALONG.w * cell.v, cell.u, height)
-             : share_by(light, normal, s.d)
+             : share_by(light, cosine, s.d)
     );
 }

@@ -1,7 +1,8 @@
 // A blob as the camera sees it; both draw paths start from it (docs/explanation/passes.md
-// "sprites").
+// "sprites"). Needs records.glsl.
 
 #include "camera.glsl"
+#include "variants.glsl"
 
 const float SQRT_TAU = 2.50662827463;
 // Silhouettes are drawn this much larger, so that rounding never cuts a pixel that the pixel's own
@@ -21,6 +22,11 @@ vec2 tangents(float a, float z, float r) {
         }
     }
     return vec2(-1e9, 1e9);
+}
+
+// Returns the factor on kappa of particle i, which its group draws.
+float weight_of(Drawn group, uint i) {
+    return group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
 }
 
 // An ellipsoid with an axis along y: values that follow from its aspect a and the camera
@@ -73,6 +79,14 @@ vec2 tangents_of(Shape shape, vec3 v, int k, float r) {
     return vec2(-1e9, 1e9);
 }
 
+// Returns the same of a blob of any form; r is its reach across y.
+vec2 tangents_along(Shape shape, vec3 v, int k, float r) {
+    if (ELLIPSOIDS != 0) {
+        return tangents_of(shape, v, k, r);
+    }
+    return tangents(v[k], v.z, r);
+}
+
 // Returns the first pixel and the one after the last whose centres lie within [low, high], in
 // pixels from the first one's edge.
 uvec2 pixels_within(float low, float high, uint n) {
@@ -82,17 +96,11 @@ uvec2 pixels_within(float low, float high, uint n) {
 }
 
 // Returns (first, end) of the columns and of the rows whose centres lie in the rectangle around a
-// circle of radius r about v (along_camera). Both are empty where the rectangle holds no centre.
-uvec4 silhouette(Camera camera, vec2 pixel, vec3 v, float r, uvec2 size) {
-    vec2 x = (tangents(v.x, v.z, r) + camera.tan_x) / pixel.x;
-    vec2 y = (camera.tan_y - tangents(v.y, v.z, r).yx) / pixel.y;
-    return uvec4(pixels_within(x.x, x.y, size.x), pixels_within(y.x, y.y, size.y));
-}
-
-// Returns the same for an ellipsoid; r is its reach across y.
-uvec4 silhouette_of(Shape shape, Camera camera, vec2 pixel, vec3 v, float r, uvec2 size) {
-    vec2 x = (tangents_of(shape, v, 0, r) + camera.tan_x) / pixel.x;
-    vec2 y = (camera.tan_y - tangents_of(shape, v, 1, r).yx) / pixel.y;
+// blob at v (along_camera) that reaches r across y. Both are empty where the rectangle holds no
+// centre.
+uvec4 silhouette(Shape shape, Camera camera, vec2 pixel, vec3 v, float r, uvec2 size) {
+    vec2 x = (tangents_along(shape, v, 0, r) + camera.tan_x) / pixel.x;
+    vec2 y = (camera.tan_y - tangents_along(shape, v, 1, r).yx) / pixel.y;
     return uvec4(pixels_within(x.x, x.y, size.x), pixels_within(y.x, y.y, size.y));
 }
 

@@ -1,6 +1,6 @@
 // Limits on the loop iterations of a gather in one dispatch: some drivers end loops after some ten
-// thousand iterations without a message (src/frame/exchange.rs sets the limits). Invocations that
-// run in step count together.
+// thousand iterations without a message (src/frame/gather_lists.rs sets the limits). Invocations
+// that run in step count together.
 
 // 1: the invocations of a subgroup share their counts.
 #ifndef TOGETHER

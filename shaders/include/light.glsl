@@ -19,10 +19,14 @@ Arrival arrival_at(Light light, vec3 p) {
     return Arrival(toward, d, cone * cone / (reach * reach));
 }
 
-// Returns the irradiance on a facet of normal n as a share of the light's energy; v is the
-// transmittance toward the light.
-float share_of(Light light, Arrival a, vec3 n, float v) {
-    float cosine = dot(n, a.toward);
+// Returns the irradiance on facets at `cosine` to the light as a share of its energy; v is what
+// arrives of the energy before the cosine.
+vec4 share_by(Light light, float cosine, vec4 v) {
     return light.kind == LIGHT_SKY ? v * (0.5 + 0.5 * cosine) + light.constant
-                                   : v * a.falloff * max(cosine, 0.0);
+                                   : v * max(cosine, 0.0);
+}
+
+// Returns the same for a facet of normal n; v is the transmittance toward the light.
+float share_of(Light light, Arrival a, vec3 n, float v) {
+    return share_by(light, dot(n, a.toward), vec4(a.falloff * v)).x;
 }

@@ -21,10 +21,20 @@ bool holds(Region r, vec3 x) {
     return abs(dot(o, r.u)) <= dot(r.u, r.u) && abs(dot(o, r.v)) <= dot(r.v, r.v);
 }
 
+bool are_opposite(float a, float b) { return (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0); }
+
+// Returns how far o, relative to the rectangle's centre, lies outside the rectangle along the axis
+// where that is farthest; negative inside.
+float outside_by(Region r, vec3 o) {
+    vec2 squares = vec2(dot(r.u, r.u), dot(r.v, r.v));
+    vec2 outside = (abs(vec2(dot(o, r.u), dot(o, r.v))) - squares) * inversesqrt(squares);
+    return max(outside.x, outside.y);
+}
+
 // Whether the rectangle hides p and q from each other.
 bool hides(Region r, vec3 p, vec3 q) {
     float a = side_of(r, p), b = side_of(r, q);
-    bool apart = (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0);
+    bool apart = are_opposite(a, b);
     return apart && holds(r, p + (q - p) * (a / (a - b)));
 }
 
@@ -37,11 +47,8 @@ vec2 hides_ball(Region r, vec3 p, vec3 q, float radius) {
     float across = 1.0 / max(abs(a - b), 1e-30);
     float part = a / (a - b);
     vec3 o = p + d * part - r.center;
-    float uu = dot(r.u, r.u), vv = dot(r.v, r.v);
-    vec2 beside = abs(vec2(dot(o, r.u), dot(o, r.v)));
-    bool apart = (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0);
-    vec2 outside = (beside - vec2(uu, vv)) * inversesqrt(vec2(uu, vv));
-    float most = max(outside.x, outside.y);
+    bool apart = are_opposite(a, b);
+    float most = outside_by(r, o);
     float reach = radius * abs(part) * max(length(d) * across, 1.0);
     bool edge_facets = abs(b) < radius ? most < reach : apart && abs(most) < reach;
     float soft = clamp(0.5 - SOFT * most / max(reach, 1e-30), 0.0, 1.0);
@@ -51,7 +58,7 @@ vec2 hides_ball(Region r, vec3 p, vec3 q, float radius) {
 // Whether the rectangle meets the ray from p along d.
 bool shades(Region r, vec3 p, vec3 d) {
     float a = side_of(r, p), b = dot(r.normal, d);
-    bool toward = (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0);
+    bool toward = are_opposite(a, b);
     return toward && holds(r, p - d * (a / b));
 }
 
@@ -60,11 +67,9 @@ bool shades(Region r, vec3 p, vec3 d) {
 bvec2 shades_ball(Region r, vec3 p, vec3 d, float radius) {
     float a = side_of(r, p), b = dot(r.normal, d);
     vec3 o = p - d * (a / b) - r.center;
-    float uu = dot(r.u, r.u), vv = dot(r.v, r.v);
-    vec2 outside = (abs(vec2(dot(o, r.u), dot(o, r.v))) - vec2(uu, vv)) * inversesqrt(vec2(uu, vv));
-    float most = max(outside.x, outside.y);
+    float most = outside_by(r, o);
     float reach = radius / max(abs(b), 1e-30);
-    bool toward = (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0);
+    bool toward = are_opposite(a, b);
     return bvec2(
         toward && most <= 0.0, abs(a) < radius ? most < reach : toward && abs(most) < reach
     );

@@ -9,6 +9,10 @@
 #ifndef TOGETHER
 #define TOGETHER 1
 #endif
+// 1: surfaces' depths are read; 2: and have 24 bits.
+#ifndef BEHIND
+#define BEHIND 0
+#endif
 // 1: the device has 64-bit words.
 #ifndef WORDS_64
 #define WORDS_64 0
@@ -35,6 +39,15 @@ vec4 pixel_of(uvec4 words, uint m) {
     return unpackUnorm4x8(words[m]);
 #elif PIXEL_WORDS == 2
     return vec4(unpackHalf2x16(words[2 * m]), unpackHalf2x16(words[2 * m + 1]));
+#else
+    return uintBitsToFloat(words);
+#endif
+}
+
+// Returns depths near/z of surfaces.
+vec4 depths_of(uvec4 words) {
+#if BEHIND == 2
+    return vec4(words & 0xffffffu) / 16777215.0;
 #else
     return uintBitsToFloat(words);
 #endif

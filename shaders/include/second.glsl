@@ -1,6 +1,43 @@
 // The buffers and functions that second_gather.comp and second_tensor.comp share
-// (docs/explanation/model.md §7, §11 "second"). The includer declares the push constants first.
+// (docs/explanation/model.md §7, §11 "second").
+// Needs records.glsl.
 
+#ifndef WORKGROUP
+#define WORKGROUP 8
+#endif
+// 1: the scene has clouds that attenuate.
+#ifndef MARCH
+#define MARCH 1
+#endif
+// 1: the receivers have a lobe.
+#ifndef GLOSSY
+#define GLOSSY 1
+#endif
+
+layout(local_size_x = WORKGROUP) in;
+
+layout(push_constant) uniform Push {
+    Grid grid;
+    vec3 eye;
+    uint n_lights;
+    float pair_size;
+    uint pair_levels;
+    float step_length;
+    float backward;
+    uint pair_steps;
+    uint i_first_block;
+    float theta;
+    uint n_surfaces;
+    // Of the dispatches that make up a gather.
+    uint i_round;
+    uint n_rounds;
+    // Of second_tensor.comp alone. is_first_light: 1 for the first light that has energy.
+    uint i_light;
+    uint i_vectors;
+    uint n_rows;
+    uint n_columns;
+    uint is_first_light;
+} push;
 READS(0, Block, blocks)
 READS(1, Pairing, pairings)
 READS(2, uint, occluders)
@@ -19,6 +56,11 @@ layout(binding = 14) uniform usamplerBuffer cell_samples;
 // Workgroups of each round, three numbers a round: a receiver that is not done counts for the next.
 UPDATES(15, uint, rounds)
 
+#include "light.glsl"
+#include "occlude.glsl"
+#include "functions.glsl"
+#include "cell_samples.glsl"
+#include "iterations.glsl"
 #include "regions.glsl"
 #include "lobe.glsl"
 #if MARCH

@@ -1,11 +1,17 @@
 // The facet on a blob's shell (docs/explanation/passes.md "facets"). Needs
-// records.glsl, functions.glsl and the push constants' grid.
+// records.glsl and functions.glsl.
 
+layout(push_constant) uniform Push {
+    Grid grid;
+    uint n_facets;
+    uint i_first_facet;
+} push;
 READS(0, Placed, placed)
 READS(1, Particle, particles)
 READS(2, uint, i_group)
 READS(3, Group, groups)
 layout(binding = 4) uniform samplerBuffer density;
+WRITES(5, Facet, facets)
 
 #include "density.glsl"
 
@@ -32,9 +38,7 @@ vec3 unit_or(vec3 v, vec3 otherwise) {
 // Returns the unit normal against the gradient of the density smoothed to 2 scale where that is
 // well conditioned, else away from the cloud's centre.
 vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
-#if ELLIPSOIDS
-    vec3 axes = vec3(1.0, aspect, 1.0);
-#endif
+    vec3 axes = vec3(1.0, ELLIPSOIDS != 0 ? aspect : 1.0, 1.0);
     vec3 gradient = vec3(0.0);
     float sum = 0.0;
     // A quadrature of degree 5 on the sphere: 6 axes and 8 diagonals.
@@ -50,21 +54,14 @@ vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
                 * 0.57735026919;
             w = 3.0 / 40.0;
         }
-#if ELLIPSOIDS
         float rho = w * density_at(p + SMOOTH_SIGMA * scale * (axes * d));
-#else
-        float rho = w * density_at(p + SMOOTH_SIGMA * scale * d);
-#endif
         gradient += rho * d;
         sum += rho;
     }
-    float slope = length(gradient);
-    float condition = sum > 0.0 ? slope / sum : 0.0;
-#if ELLIPSOIDS
+    float condition = sum > 0.0 ? length(gradient) / sum : 0.0;
     // The gradient was taken in coordinates that make the ellipsoid a ball.
     gradient /= axes;
-    slope = length(gradient);
-#endif
+    float slope = length(gradient);
     vec3 outward = unit_or(p - cloud_center, vec3(0.0, 1.0, 0.0));
     float t = smoothstep(CONDITION_LOW, CONDITION_HIGH, condition);
     return t > 0.0 ? unit_or(t * (-gradient / slope) + (1.0 - t) * outward, outward) : outward;

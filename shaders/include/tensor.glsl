@@ -1,6 +1,6 @@
 // The layout of T2: [light][row / TILE][column][row % TILE]. Rows of neighbouring facets lie side
 // by side, and a sum over columns walks on through memory. The number of rows is a multiple of TILE
-// (src/frame/tensor.rs).
+// (src/frame/tensor_shape.rs).
 
 const uint TILE = 64u;
 

@@ -2,22 +2,11 @@
 // operations, or by shared memory (docs/explanation/passes.md "tiles"). Needs the buffers of
 // tiles.comp.
 
-// A splat as it lies in the buffers.
+// A splat as it lies in the buffers, by fours: a Splat, a SplatTexture where splats have textures,
+// and the conic of an ellipsoid.
+const uint N_FOURS = 2 + 3 * TEXTURED + ELLIPSOIDS;
 struct Loaded {
-    // Centre's slopes, scale, tau.
-    vec4 place;
-    // Radiance, near/z.
-    vec4 light;
-#if TEXTURED
-    vec4 turn;
-    // Gain; first texel.
-    uvec4 gain;
-    // Log2 of the level's side.
-    uint side;
-#endif
-#if ELLIPSOIDS
-    vec4 conic;
-#endif
+    uvec4 fours[N_FOURS];
 };
 
 // Splats that reach the tile, collected before they are composed.
@@ -38,8 +27,7 @@ uint append(uint n, bool hit, uint r) {
 bool all_agree(bool b) { return subgroupAll(b); }
 #else
 shared uint votes[INVOCATIONS];
-// As words: bits that are no float stay what they are.
-shared uvec4 shared_splats[2 + 3 * TEXTURED + ELLIPSOIDS][INVOCATIONS];
+shared uvec4 shared_splats[N_FOURS][INVOCATIONS];
 
 uint append(uint n, bool hit, uint r) {
     uint t = gl_LocalInvocationID.x;
@@ -71,15 +59,14 @@ bool all_agree(bool b) {
 
 Loaded load_splat(int r) {
     Loaded splat;
-    splat.place = uintBitsToFloat(texelFetch(splats, 2 * r));
-    splat.light = uintBitsToFloat(texelFetch(splats, 2 * r + 1));
+    [[unroll]] for (int k = 0; k < 2; ++k) { splat.fours[k] = texelFetch(splats, 2 * r + k); }
 #if TEXTURED
-    splat.turn = uintBitsToFloat(texelFetch(splat_textures, 3 * r));
-    splat.gain = texelFetch(splat_textures, 3 * r + 1);
-    splat.side = texelFetch(splat_textures, 3 * r + 2).x;
+    [[unroll]] for (int k = 0; k < 3; ++k) {
+        splat.fours[2 + k] = texelFetch(splat_textures, 3 * r + k);
+    }
 #endif
 #if ELLIPSOIDS
-    splat.conic = uintBitsToFloat(texelFetch(conics, r));
+    splat.fours[N_FOURS - 1] = texelFetch(conics, r);
 #endif
     return splat;
 }
@@ -87,45 +74,20 @@ Loaded load_splat(int r) {
 #if ONE_SUBGROUP
 // Returns the splat that invocation m has loaded.
 Loaded of_invocation(Loaded splat, uint m) {
-    splat.place = subgroupShuffle(splat.place, m);
-    splat.light = subgroupShuffle(splat.light, m);
-#if TEXTURED
-    splat.turn = subgroupShuffle(splat.turn, m);
-    splat.gain = subgroupShuffle(splat.gain, m);
-    splat.side = subgroupShuffle(splat.side, m);
-#endif
-#if ELLIPSOIDS
-    splat.conic = subgroupShuffle(splat.conic, m);
-#endif
+    [[unroll]] for (uint k = 0; k < N_FOURS; ++k) {
+        splat.fours[k] = subgroupShuffle(splat.fours[k], m);
+    }
     return splat;
 }
 #else
 void share_splat(Loaded splat, uint t) {
-    shared_splats[0][t] = floatBitsToUint(splat.place);
-    shared_splats[1][t] = floatBitsToUint(splat.light);
-#if TEXTURED
-    shared_splats[2][t] = floatBitsToUint(splat.turn);
-    shared_splats[3][t] = splat.gain;
-    shared_splats[4][t] = uvec4(splat.side);
-#endif
-#if ELLIPSOIDS
-    shared_splats[2 + 3 * TEXTURED][t] = floatBitsToUint(splat.conic);
-#endif
+    [[unroll]] for (uint k = 0; k < N_FOURS; ++k) { shared_splats[k][t] = splat.fours[k]; }
     barrier();
 }
 
 Loaded of_invocation(uint m) {
     Loaded splat;
-    splat.place = uintBitsToFloat(shared_splats[0][m]);
-    splat.light = uintBitsToFloat(shared_splats[1][m]);
-#if TEXTURED
-    splat.turn = uintBitsToFloat(shared_splats[2][m]);
-    splat.gain = shared_splats[3][m];
-    splat.side = shared_splats[4][m].x;
-#endif
-#if ELLIPSOIDS
-    splat.conic = uintBitsToFloat(shared_splats[2 + 3 * TEXTURED][m]);
-#endif
+    [[unroll]] for (uint k = 0; k < N_FOURS; ++k) { splat.fours[k] = shared_splats[k][m]; }
     return splat;
 }
 #endif

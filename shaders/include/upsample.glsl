@@ -12,10 +12,6 @@
 #ifndef SHIFT
 #define SHIFT 0
 #endif
-// 1: there are surfaces; 2: and their depth has 24 bits.
-#ifndef BEHIND
-#define BEHIND 0
-#endif
 
 #define PICTURE 1
 #include "pixels.glsl"
@@ -50,14 +46,6 @@ float weight(uint k, float t) {
 layout(binding = 2) uniform usamplerBuffer under;
 layout(binding = 3) uniform usamplerBuffer small_depths;
 layout(binding = 4) uniform usamplerBuffer depths;
-
-vec4 depths_of(uvec4 words) {
-#if BEHIND == 2
-    return vec4(words & 0xffffffu) / 16777215.0;
-#else
-    return uintBitsToFloat(words);
-#endif
-}
 
 vec4 small_depths_at(uint texel) {
     return depths_of(

@@ -1,14 +1,14 @@
 //! A target that blobs are drawn into. The full picture, the smaller one of `draw.resolution` and
 //! impostor layers are such targets.
 
-use super::chunked_sprites::{ChunkCount, ChunkedSprites};
+use super::chunked_sprites::{ChunkBuffers, ChunkCount, ChunkedSprites};
 use super::features::blob_variant;
 use super::tiling::Tiling;
 use crate::error::{Error, Result};
 use crate::gpu::{
-    BlendMode, Buffer, BufferSpec, Compiler, Device, Image, LoadOp, Recorder, Target,
+    BlendMode, Buffer, BufferSpec, Compiler, DEPTH_BYTES_PER_PIXEL, Device, Image, LoadOp,
+    Recorder, Target, TargetFormat,
 };
-use crate::gpu::{DEPTH_BYTES_PER_PIXEL, TargetFormat};
 use crate::model::scene::{Chunks, DrawPath, Scene};
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};
 use crate::passes::chunks;
@@ -62,7 +62,7 @@ impl TargetSpec {
             let n_max = scene.n_particles() as u32;
             specs.push(image("chunks.composed", chunks::FORMAT.bytes_per_pixel(), 1));
             specs.push(image("chunks.depth", DEPTH_BYTES_PER_PIXEL, 1));
-            specs.extend(ChunkedSprites::specs(n_pixels, n_max, self.n_chunks));
+            specs.extend(ChunkBuffers::specs(n_pixels, n_max, self.n_chunks));
         }
         specs
     }

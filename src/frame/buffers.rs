@@ -8,9 +8,8 @@ use crate::gpu::{Buffer, Recorder, buffers};
 use crate::layout::cull::KeptRecord;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
-use crate::layout::particle::TexturedRecord;
 use crate::layout::particle::{
-    BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord,
+    BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, TexturedRecord,
 };
 use crate::model::basis::N_NODES;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};

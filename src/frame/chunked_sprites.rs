@@ -2,10 +2,9 @@
 //! (docs/explanation/passes.md "chunks").
 
 use crate::error::{Error, Result};
-use crate::gpu::TargetFormat;
 use crate::gpu::{
-    BlendMode, Buffer, BufferSpec, Compiler, Device, Image, InstanceCount, LoadOp, RecordCount,
-    Recorder, Target, buffers,
+    BlendMode, Buffer, Compiler, Device, Image, InstanceCount, LoadOp, RecordCount, Recorder,
+    Target, TargetFormat, buffers,
 };
 use crate::layout::cull::KeptRecord;
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
@@ -14,7 +13,7 @@ use crate::passes::sprites::{Range, Sprites};
 
 buffers! {
     /// The reordered entries and the picture that chunks are composed in.
-    struct ChunkBuffers(n_pixels: u64, n_max: u32, n_chunks: u32) {
+    pub(super) struct ChunkBuffers(n_pixels: u64, n_max: u32, n_chunks: u32) {
         texels: Buffer => [f32; 4], n_pixels, "chunks.texels", Texels;
         /// Entries near to far.
         nearest: Buffer => [u32; 2],
@@ -82,11 +81,6 @@ impl ChunkedSprites {
             )),
             error => error,
         })
-    }
-
-    /// Lists the sizes of the buffers.
-    pub(super) fn specs(n_pixels: u64, n_max: u32, n_chunks: u32) -> Vec<BufferSpec> {
-        ChunkBuffers::specs(n_pixels, n_max, n_chunks)
     }
 
     /// Draws the first `count` entries over what `start` leaves of `target`, whose depth is

@@ -9,9 +9,8 @@ use crate::gpu::{BufferSpec, Compiler, Device, buffers};
 use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
 use crate::model::scene::Scene;
-use crate::passes::cull::{self, Cull, CullView, Order};
-use crate::passes::sort::TILE;
-use crate::passes::tiles::BLOCK;
+use crate::passes::blobs::Depths;
+use crate::passes::cull::{self, Cull, CullView};
 
 buffers! {
     /// The numbers of kept particles that the host reads.
@@ -66,7 +65,8 @@ pub(super) fn cull_view<'a>(
     CullView { blobs: c.view(camera), size, smallest: c.smallest * pixels }
 }
 
-/// Returns the sort keys of kept particles, and the workgroups of the passes that follow.
-pub(super) fn cull_order(packet: &Packet) -> Order {
-    Order { radius: packet.radius, n_bits: packet.sort_bits, sort_tile: TILE, splat_block: BLOCK }
+/// Returns the depths that sort keys are made of.
+pub(super) fn key_depths(packet: &Packet) -> Depths {
+    let Packet { radius, sort_bits: n_bits, .. } = *packet;
+    Depths { forward: packet.camera.forward, radius, n_bits }
 }

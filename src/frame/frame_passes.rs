@@ -102,14 +102,12 @@ impl FramePasses {
         if let (Some(uploads), Some(placed)) = (&mut self.placed_uploads, &packet.placed) {
             uploads.placed.write(slot, placed)?;
         }
-        if let Some(runs) = &mut self.runs {
-            runs.sort.write(slot, packet)?;
-        }
-        if let Some(order) = self.gather.as_mut().and_then(|gather| gather.order.as_mut()) {
-            order.write(slot, packet)?;
+        let order = self.gather.iter_mut().filter_map(|gather| gather.order.as_mut());
+        for sort in self.runs.iter_mut().map(|runs| &mut runs.sort).chain(order) {
+            sort.buffers.bounds.write(slot, &packet.bounds)?;
         }
         match &mut self.tensors {
-            Some(tensors) => tensors.write(slot, packet),
+            Some(tensors) => tensors.buffers.coefficients.write(slot, &packet.coefficients),
             None => Ok(()),
         }
     }

@@ -308,9 +308,12 @@ impl ImpostorCache {
     }
 }
 
+fn f64s(v: [f32; 3]) -> DVec3 {
+    Vec3::from(v).as_dvec3()
+}
+
 /// Returns the camera in f64, exactly as shaders have it.
 pub fn view_of(camera: &CameraRecord) -> View {
-    let f64s = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     View {
         eye: f64s(camera.eye),
         right: f64s(camera.right),
@@ -374,7 +377,6 @@ fn last_key(z: f64, radius: f64, sort_bits: u32) -> Option<(u32, f64)> {
 /// Returns whether a surface or terrain is neither nearer nor farther than all of a range of
 /// depths.
 fn is_among(region: &RegionRecord, view: &View, [nearest, farthest]: [f64; 2]) -> bool {
-    let f64s = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let z = (f64s(region.center) - view.eye).dot(view.forward);
     let half = match region.kind {
         REGION_TERRAIN => (f64s(region.u) * view.forward).abs().element_sum(),

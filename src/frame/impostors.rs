@@ -7,8 +7,7 @@ use super::impostor_cache::{CacheRules, CachedLayer, ImpostorCache, LayerUse, vi
 use super::packet::Packet;
 use super::plan::{Decision, Pass, Plan, Reason};
 use crate::error::{Error, Result};
-use crate::gpu::TargetFormat;
-use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Recorder, Target, buffers};
+use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Recorder, Target, TargetFormat, buffers};
 use crate::model::film::FilmFormat;
 use crate::model::scene::Scene;
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};

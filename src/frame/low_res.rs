@@ -12,7 +12,6 @@ use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Recorder, buffers};
 use crate::layout::frame::CameraRecord;
 use crate::model::resolution::{LowResLayout, Resolution};
 use crate::model::scene::Scene;
-use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};
 use crate::passes::upsample::{Extents, SolidBuffers, Upsample};
 
 buffers! {
@@ -65,8 +64,10 @@ impl Sizes {
 
 /// The smaller target of the blobs.
 pub(super) struct LowResTarget {
-    small: LowResLayout,
-    target: BlobTarget,
+    /// Columns and rows of the two pictures.
+    pub small: LowResLayout,
+    /// The smaller picture.
+    pub target: BlobTarget,
     /// Surfaces and terrain as the small pixels see them: depth alone.
     solids: Option<Solids>,
     upsample: Upsample,
@@ -127,11 +128,6 @@ impl LowResTarget {
         }
     }
 
-    /// Returns columns and rows of the smaller picture.
-    pub fn size(&self) -> [u32; 2] {
-        self.small.size
-    }
-
     /// Draws the depth of surfaces or terrain for the small pixels.
     pub fn record_solids(
         &mut self,
@@ -147,17 +143,6 @@ impl LowResTarget {
         // Copied before blobs are drawn, which may overwrite it.
         self.target.record_copy_solids(rec, 0, None, &self.buffers.small_depths);
         Ok(())
-    }
-
-    /// Draws the first `count` entries into the smaller picture, of which `view` has the camera.
-    pub fn record_blobs(
-        &mut self,
-        rec: &mut Recorder<'_>,
-        buffers: &BlobBuffers<'_>,
-        view: &BlobView<'_>,
-        count: BlobCount<'_>,
-    ) -> Result<()> {
-        self.target.record_blobs(rec, 0, false, buffers, view, count)
     }
 
     /// Upsamples the blobs over the surfaces and terrain of `full` into finished picture `i`.

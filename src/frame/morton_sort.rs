@@ -1,9 +1,8 @@
 //! The sort of particles or facets along a Morton curve.
 
-use super::packet::Packet;
 use super::staging::{StagedBuffer, upload};
 use crate::error::Result;
-use crate::gpu::{Buffer, BufferSpec, Commands, Compiler, Device, Recorder, buffers};
+use crate::gpu::{Buffer, BufferSpec, Commands, Compiler, Device, buffers};
 use crate::layout::facet::{RegionBoundsRecord, RunRecord};
 use crate::model::scene::Scene;
 use crate::passes::morton::Morton;
@@ -42,16 +41,6 @@ impl MortonSort {
     pub fn specs(scene: &Scene, n: u64) -> Vec<BufferSpec> {
         let buffers = MortonBuffers::specs(n, scene.n_regions() as u64);
         [buffers, sort::Scratch::specs_of_bytes(n)].concat()
-    }
-
-    /// Writes the data of `packet` into the staging buffers of `slot`.
-    pub fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
-        self.buffers.bounds.write(slot, &packet.bounds)
-    }
-
-    /// Copies the staged data to where shaders read it.
-    pub fn record_copies(&self, rec: &mut Recorder<'_>, slot: usize) {
-        self.buffers.bounds.record_copy(rec, slot);
     }
 }
 

@@ -58,8 +58,7 @@ pub fn run(
         }
         // The channel ends that this value owns are dropped at the end of the block, which ends
         // both threads.
-        let (started, under_way) = (VecDeque::new(), VecDeque::new());
-        DrawingThread { renderer: &mut *renderer, grant, submit, started, under_way }
+        DrawingThread { renderer: &mut *renderer, grant, submit, under_way: VecDeque::new() }
             .run(&events, on_frame)
     });
     renderer.drain();
@@ -127,33 +126,30 @@ struct DrawingThread<'a> {
     renderer: &'a mut Renderer,
     grant: SyncSender<()>,
     submit: SyncSender<Submission>,
-    started: VecDeque<FrameStart>,
-    /// Submissions of the same frames.
-    under_way: VecDeque<Submission>,
+    /// The frames in flight.
+    under_way: VecDeque<(FrameStart, Submission)>,
 }
 
 impl DrawingThread<'_> {
     fn run(mut self, events: &Receiver<Event>, on_frame: &mut OnFrame<'_>) -> Result<()> {
         let (mut last_end, mut played) = (Instant::now(), None);
-        while played.is_none() || !self.started.is_empty() {
+        while played.is_none() || !self.under_way.is_empty() {
             // Receiving fails after both threads have ended, and both send an event before.
             let Ok(event) = events.recv() else { break };
             match event {
                 Event::Packet(packet) => {
                     let mut start = FrameStart::new(&packet);
                     let pending = self.renderer.begin(*packet)?;
-                    for before in &self.under_way {
+                    for (_, before) in &self.under_way {
                         start.queue_depth += u32::from(!before.is_done()?);
                     }
-                    self.started.push_back(start);
-                    self.under_way.push_back(pending.clone());
+                    self.under_way.push_back((start, pending.clone()));
                     // The channel has room for every frame in flight. Sending fails after the
                     // waiting thread has ended, which has sent its error.
                     let _ = self.submit.send(pending);
                 }
                 Event::Ended(end) => {
-                    let Some(start) = self.started.pop_front() else { continue };
-                    self.under_way.pop_front();
+                    let Some((start, _)) = self.under_way.pop_front() else { continue };
                     let times = start.end(self.renderer.end()?, end, &mut last_end);
                     if !on_frame(times, self.renderer)? {
                         return Ok(());

@@ -73,7 +73,7 @@ impl Picture {
         c: &FrameConstants,
     ) -> (CameraRecord, [u32; 2]) {
         match &self.low_res {
-            Some(low_res) => (low_res.camera(camera), low_res.size()),
+            Some(low_res) => (low_res.camera(camera), low_res.small.size),
             None => (*camera, c.size),
         }
     }

@@ -1,27 +1,28 @@
 //! The whole frame on one page: every dispatch and draw call in order, with its buffers.
 
 use super::buffers::SceneBuffers;
-use super::culling::{cull_order, cull_view};
+use super::culling::{cull_view, key_depths};
 use super::frame_passes::FramePasses;
 use super::gather::GatherScratch;
 use super::live::LiveParticles;
-use super::morton_sort::{KEY_BITS, MortonBuffers, MortonSort, RunBuffers};
+use super::morton_sort::{FacetRuns, KEY_BITS, MortonBuffers, MortonSort, RunBuffers};
 use super::packet::Packet;
 use super::plan::{Pass, Plan};
 use super::tensors::{TensorBuffers, bright_lights};
 use crate::error::Result;
-use crate::gpu::{RecordCount, Recorder};
+use crate::gpu::{DeviceCount, RecordCount, Recorder};
 use crate::layout::cull::KeptRecord;
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::passes::blobs::{BlobBuffers, BlobCount};
 use crate::passes::contract::ContractBuffers;
-use crate::passes::cull::CullBuffers;
+use crate::passes::cull::{CullBuffers, Order};
 use crate::passes::facets;
-use crate::passes::first::{self, FirstBuffers, FirstTensorBuffers};
+use crate::passes::first::{self, FirstBuffers};
 use crate::passes::morton;
 use crate::passes::place::PlaceBuffers;
 use crate::passes::second::{MergePush, SourcesPush};
-use crate::passes::sort::{Count, Depths, DeviceCount};
+use crate::passes::sort::{Count, TILE};
+use crate::passes::tiles::BLOCK;
 use crate::passes::transmit::TransmitBuffers;
 
 /// Records a pass under its timer label if the plan runs it.
@@ -57,14 +58,12 @@ impl FramePasses {
     /// Copies the host's data of the frame to where shaders read it.
     fn record_copies(&self, rec: &mut Recorder<'_>, slot: usize) {
         self.buffers.record_copies(rec, slot);
-        if let Some(runs) = &self.runs {
-            runs.sort.record_copies(rec, slot);
-        }
         if let Some(LiveParticles::Device { buffers, .. }) = &self.live {
             buffers.discs.record_copy(rec, slot);
         }
-        if let Some(order) = self.gather.as_ref().and_then(|gather| gather.order.as_ref()) {
-            order.record_copies(rec, slot);
+        let order = self.gather.iter().filter_map(|gather| gather.order.as_ref());
+        for sort in self.runs.iter().map(|runs| &runs.sort).chain(order) {
+            sort.buffers.bounds.record_copy(rec, slot);
         }
         if let Some(tensors) = &self.tensors {
             tensors.buffers.coefficients.record_copy(rec, slot);
@@ -140,33 +139,16 @@ impl FramePasses {
         })?;
         pass(rec, plan, Pass::Facets, |rec| {
             let (n_surface, n_solid) = (c.n_surface_facets, c.n_solid_facets);
+            let (grid, from) = (
+                &packet.grid,
+                facets::ParticleBuffers { placed, particles, i_group, groups, density, facets },
+            );
             match runs {
-                Some(of) => {
-                    let RunBuffers { order, runs } = &of.buffers;
-                    let buffers = facets::RunBuffers {
-                        placed,
-                        particles,
-                        i_group,
-                        groups,
-                        density,
-                        order,
-                        runs,
-                        facets,
-                        i_facet,
-                    };
-                    pass_facets.record_runs(rec, &buffers, &packet.grid, of.n_runs, n_solid)?;
+                Some(FacetRuns { buffers: RunBuffers { order, runs }, n_runs, .. }) => {
+                    let by_run = [order, runs, i_facet];
+                    pass_facets.record_runs(rec, &from, by_run, grid, *n_runs, n_solid)?
                 }
-                None => {
-                    let buffers = facets::ParticleBuffers {
-                        placed,
-                        particles,
-                        i_group,
-                        groups,
-                        density,
-                        facets,
-                    };
-                    pass_facets.record(rec, &buffers, &packet.grid, n, n_solid)?;
-                }
+                None => pass_facets.record(rec, &from, grid, n, n_solid)?,
             }
             pass_facets.record_surfaces(rec, [regions, i_region, facets], n_surface)?;
             let n_ground = n_solid - n_surface;
@@ -193,19 +175,14 @@ impl FramePasses {
                 TransmitBuffers { facets, lights, regions, density, transmittance, through };
             transmit.record(rec, &buffers, &packet.grid, &c.march)
         })?;
-        pass(rec, plan, Pass::First, |rec| match tensors {
-            Some(tensors) => {
-                let t1 = &tensors.buffers.t1;
-                let buffers =
-                    FirstTensorBuffers { facets, lights, transmittance, regions, table, t1, lit };
-                tensors.first.record(rec, &buffers, &tensors.first_push(packet, c))
+        pass(rec, plan, Pass::First, |rec| {
+            let buffers = FirstBuffers { facets, lights, transmittance, regions, table, lit };
+            if let Some(tensors) = tensors {
+                let push = tensors.first_push(packet, c);
+                return tensors.first.record(rec, &buffers, &tensors.buffers.t1, &push);
             }
-            None => {
-                let (eye, n_facets) = (packet.camera.eye, c.march.n_facets);
-                let push = first::Push { eye, n_facets, n_lights: c.march.n_lights };
-                let buffers = FirstBuffers { facets, lights, transmittance, regions, table, lit };
-                first.record(rec, &buffers, &push)
-            }
+            let (eye, n_facets) = (packet.camera.eye, c.march.n_facets);
+            first.record(rec, &buffers, &first::Push { eye, n_facets, n_lights: c.march.n_lights })
         })?;
         pass(rec, plan, Pass::Second, |rec| self.record_second(rec, packet, plan))?;
         pass(rec, plan, Pass::Contract, |rec| {
@@ -274,23 +251,23 @@ impl FramePasses {
         let FramePasses { culling, sort, texture, picture, buffers: b, constants: c, .. } = self;
         let SceneBuffers { placed, particles, i_group, drawn, entries, kept, .. } = &*b;
         let (blob_camera, blob_size) = picture.blob_camera(&packet.camera, c);
+        let depths = key_depths(packet);
         pass(rec, plan, Pass::Cull, |rec| {
             let Some(culling) = culling else { return Ok(()) };
             let buffers = CullBuffers { placed, particles, i_group, drawn, entries, kept };
             let view = cull_view(&blob_camera, blob_size, packet, c);
-            culling.cull.record(rec, &buffers, &view, &cull_order(packet), c.n_particles)
+            let order = Order { depths, sort_tile: TILE, splat_block: BLOCK };
+            culling.cull.record(rec, &buffers, &view, &order, c.n_particles)
         })?;
         pass(rec, plan, Pass::Sort, |rec| {
-            let (n_bits, n_drawn) = (packet.sort_bits, packet.n_drawn);
+            let n_bits = depths.n_bits;
             if culling.is_some() {
                 let (i_count, i_groups) = (KeptRecord::I_COUNT, KeptRecord::I_SORT);
                 let n = Count::Counted(DeviceCount { buffer: kept, i_count, i_groups });
                 return sort.record(rec, entries, n_bits, n).map(|_| ());
             }
-            let (forward, radius) = (packet.camera.forward, packet.radius);
-            let depths = Depths { forward, radius, n_bits };
             sort.record_keys(rec, [placed, i_group, drawn, entries], &depths, c.n_particles)?;
-            sort.record(rec, entries, n_bits, Count::Known(n_drawn)).map(|_| ())
+            sort.record(rec, entries, n_bits, Count::Known(packet.n_drawn)).map(|_| ())
         })?;
         pass(rec, plan, Pass::Texture, |rec| {
             texture.iter().try_for_each(|texture| texture.record(rec, &b.pool, c.texture_seed))
@@ -327,7 +304,10 @@ impl FramePasses {
         let (blobs, has_layer) = (BlobBuffers { entries, ..all }, layer.is_some());
         for draws in [Pass::Sprites, Pass::Tiles] {
             pass(rec, plan, draws, |rec| match &mut picture.low_res {
-                Some(low_res) => low_res.record_blobs(rec, &blobs, &c.view(&blob_camera), count),
+                Some(low_res) => {
+                    let view = c.view(&blob_camera);
+                    low_res.target.record_blobs(rec, 0, false, &blobs, &view, count)
+                }
                 None => picture.full.record_blobs(rec, i, has_layer, &blobs, &view, count),
             })?;
         }

@@ -6,7 +6,6 @@ use std::time::Instant;
 use tracing::info_span;
 
 use super::clock::ms;
-use super::features::SceneFeatures;
 use super::frame_passes::FramePasses;
 use super::limits;
 use super::packet::Packet;
@@ -94,11 +93,6 @@ impl Renderer {
             last_end: Instant::now(),
             failed: false,
         })
-    }
-
-    /// Returns the properties of the scene.
-    pub fn features(&self) -> &SceneFeatures {
-        &self.passes.features
     }
 
     /// Draws one frame and waits for it.

@@ -3,8 +3,7 @@
 use super::buffers::SceneBuffers;
 use super::plan::Pass;
 use crate::error::Result;
-use crate::gpu::TargetFormat;
-use crate::gpu::{Compiler, Device, LoadOp, Recorder, Target};
+use crate::gpu::{Compiler, Device, LoadOp, Recorder, Target, TargetFormat};
 use crate::layout::frame::CameraRecord;
 use crate::model::scene::Scene;
 use crate::passes::surfaces::Surfaces;

@@ -12,7 +12,7 @@ use crate::layout::frame::LightRecord;
 use crate::model::scene::Scene;
 use crate::passes::contract::{self, Contract};
 use crate::passes::first::{self, FirstTensor};
-use crate::passes::second::{GatherPush, SecondTensor, TensorPush};
+use crate::passes::second::{GatherPush, SecondTensor};
 
 buffers! {
     /// The tensors and what sums them.
@@ -68,11 +68,6 @@ impl LightTensors {
         Ok((fit, Some(tensors)))
     }
 
-    /// Writes the data of `packet` into the staging buffers of `slot`.
-    pub fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
-        self.buffers.coefficients.write(slot, &packet.coefficients)
-    }
-
     /// Returns the push constants of T1.
     pub fn first_push(&self, packet: &Packet, c: &FrameConstants) -> first::TensorPush {
         first::TensorPush {
@@ -86,25 +81,14 @@ impl LightTensors {
     }
 
     /// Returns the push constants of T2 for the light `i_light`, from those of a gather at once.
-    pub fn second_push(&self, of: &GatherPush, i_light: u32, is_first_light: bool) -> TensorPush {
-        TensorPush {
-            grid: of.grid,
-            eye: of.eye,
-            n_lights: of.n_lights,
-            pair_size: of.pair_size,
-            pair_levels: of.pair_levels,
-            step_length: of.step_length,
-            backward: of.backward,
-            pair_steps: of.pair_steps,
-            i_first_block: of.i_first_block,
+    pub fn second_push(&self, of: &GatherPush, i_light: u32, is_first_light: bool) -> GatherPush {
+        GatherPush {
             i_light,
             i_vectors: self.i_vectors,
             n_rows: self.shape.n_rows as u32,
             n_columns: self.shape.n_columns,
-            n_surfaces: of.n_surfaces,
-            i_round: of.i_round,
-            n_rounds: of.n_rounds,
             is_first_light: u32::from(is_first_light),
+            ..*of
         }
     }
 

@@ -2,12 +2,13 @@
 
 use super::features::{blob_variant, tau_max};
 use crate::error::{Error, Result};
-use crate::gpu::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, MemoryUsage, RecordCount, Recorder, Target};
+use crate::gpu::{
+    Buffer, Compiler, Device, MemoryUsage, RecordCount, Recorder, Target, TargetFormat,
+};
 use crate::model::scene::Scene;
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};
-use crate::passes::sort::{Count, DeviceCount, Sort, TILE};
-use crate::passes::tiles::{Division, RoundPairs, Tiles, Variant, invocations};
+use crate::passes::sort::{Count, Sort, TILE};
+use crate::passes::tiles::{Division, Tiles, Variant, invocations};
 
 /// The tile passes and their pictures.
 pub struct Tiling {
@@ -99,10 +100,8 @@ impl Tiling {
         }
         tiles.record_splats(rec, buffers, view, count, TILE)?;
         for i_round in 0..tiles.n_rounds() {
-            let RoundPairs { entries, round: buffer, i_count, i_groups } =
-                tiles.record_pairs(rec, i_round, count.n, view)?;
-            let n = Count::Counted(DeviceCount { buffer, i_count, i_groups });
-            let sorted = sort.record(rec, entries, *n_bits, n)?;
+            let (entries, n) = tiles.record_pairs(rec, i_round, count.n, view)?;
+            let sorted = sort.record(rec, entries, *n_bits, Count::Counted(n))?;
             tiles.record_compose(rec, i_round, [sorted, picture, buffers.pool], view)?;
         }
         Ok(())

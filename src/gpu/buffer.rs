@@ -125,11 +125,6 @@ impl Buffer {
         self.bytes
     }
 
-    /// Returns the name, `room.thing`.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
     /// Copies `data` to the start of an upload buffer. The GPU must not be reading it.
     ///
     /// # Errors

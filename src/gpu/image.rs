@@ -169,11 +169,6 @@ impl Image {
     pub fn size(&self) -> (u32, u32) {
         (self.extent.width, self.extent.height)
     }
-
-    /// Returns the number of pixels.
-    pub fn n_pixels(&self) -> u64 {
-        u64::from(self.extent.width) * u64::from(self.extent.height)
-    }
 }
 
 /// Returns the extent, if the device takes an image of it.

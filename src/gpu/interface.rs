@@ -47,7 +47,7 @@ impl Stage {
         flags: vk::ShaderStageFlags,
         macros: &[(&str, u32)],
     ) -> Result<Stage> {
-        let words = compiler.compile_with(&file, Optimize::Yes, macros)?;
+        let words = compiler.compile(&file, Optimize::Yes, macros)?;
         let reflection = reflect(&file, &words)?;
         let shared = device.shared();
         let info = vk::ShaderModuleCreateInfo::default().code(&words);

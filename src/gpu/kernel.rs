@@ -18,23 +18,17 @@ pub struct Kernel {
 impl Kernel {
     /// Makes the kernel `room.thing` from `room_thing.comp` (`room` from `room.comp`).
     ///
-    /// `push` are the host's push constants in order; `constants` the specialization constants by
-    /// id.
+    /// `push` are the host's push constants in order.
     ///
     /// # Errors
     /// The shader does not compile, its interface differs from the host's, or its workgroup breaks
     /// a limit of the device.
-    pub fn new(
-        device: &Device,
-        compiler: &Compiler,
-        name: &str,
-        push: &[Field],
-        constants: &[(u32, u32)],
-    ) -> Result<Kernel> {
-        Kernel::with_macros(device, compiler, name, push, constants, &[])
+    pub fn new(device: &Device, compiler: &Compiler, name: &str, push: &[Field]) -> Result<Kernel> {
+        Kernel::with_macros(device, compiler, name, push, &[], &[])
     }
 
-    /// Makes a variant of the kernel, by macros that its text asks for.
+    /// Makes a variant of the kernel, by specialization constants (id and value) and by macros that
+    /// its text asks for.
     ///
     /// # Errors
     /// As for [`Kernel::new`].

@@ -50,7 +50,7 @@ pub use interface::Field;
 pub use kernel::Kernel;
 #[cfg(feature = "window")]
 pub use overlay::{Backdrop, Overlay, Widgets};
-pub use recorder::{RecordCount, Recorder};
+pub use recorder::{DeviceCount, RecordCount, Recorder};
 pub use reflect::{Binding, BindingKind, Member, Reflection, Struct, reflect};
 pub use shader::{Compiler, Optimize, Sources, cache_folder, hex};
 #[cfg(feature = "window")]

@@ -36,6 +36,15 @@ pub(super) enum Event {
     Failed(Error),
 }
 
+impl From<Error> for Event {
+    fn from(error: Error) -> Event {
+        Event::Failed(error)
+    }
+}
+
+/// A result of the thread; its error is the event that ends the thread.
+type PresentResult<T> = std::result::Result<T, Event>;
+
 /// An image whose commands were submitted.
 pub(super) struct Drawn {
     pub i_image: usize,
@@ -71,13 +80,10 @@ impl Presenter {
         // Room for every slot's image and for the last event.
         let (report, events) = sync_channel(FRAMES_IN_FLIGHT + 1);
         let work = move || {
-            let last = match queue.run(&from_drawing, &report) {
-                Ok(Exit::Outdated) => Event::Outdated,
-                Ok(Exit::Disconnected) => return,
-                Err(error) => Event::Failed(error),
-            };
-            // Sending fails only after the swapchain is dropped, and then nobody needs the event.
-            let _ = report.send(last);
+            if let Err(last) = queue.run(&from_drawing, &report) {
+                // Sending fails only after the swapchain is dropped: nobody needs the event then.
+                let _ = report.send(last);
+            }
         };
         let thread = std::thread::Builder::new().name("show".into()).spawn(work);
         let thread = thread.map_err(|e| Error::vulkan("starting the show thread", e))?;
@@ -99,18 +105,13 @@ impl Presenter {
     }
 }
 
-/// Why the thread ends.
-enum Exit {
-    Disconnected,
-    Outdated,
-}
-
 /// Longest wait for an image in one call, so that a drawn image does not wait longer to be
 /// presented.
 const ACQUIRE_TIMEOUT: Duration = Duration::from_millis(1);
 
 impl PresentQueue {
-    fn run(&self, drawn: &Receiver<Drawn>, report: &SyncSender<Event>) -> Result<Exit> {
+    /// Presents and acquires until the swapchain is dropped, or the event that is returned.
+    fn run(&self, drawn: &Receiver<Drawn>, report: &SyncSender<Event>) -> PresentResult<()> {
         // Slots without an image, and their last submissions.
         let mut idle: VecDeque<(usize, Option<Submission>)> =
             (0..FRAMES_IN_FLIGHT).map(|i| (i, None)).collect();
@@ -123,15 +124,13 @@ impl PresentQueue {
             };
             match next {
                 Ok(Drawn { i_image, i_slot, submission, handed_over }) => {
-                    let is_current = self.present(i_image);
+                    let presented = self.present(i_image);
                     drop(handed_over);
-                    if !is_current? {
-                        return Ok(Exit::Outdated);
-                    }
+                    presented?;
                     idle.push_back((i_slot, Some(submission)));
                     continue;
                 }
-                Err(RecvTimeoutError::Disconnected) => return Ok(Exit::Disconnected),
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
                 Err(RecvTimeoutError::Timeout) => {}
             }
             let Some((i_slot, last)) = idle.front() else { continue };
@@ -143,20 +142,17 @@ impl PresentQueue {
                 continue;
             }
             let i_slot = *i_slot;
-            match self.acquire(i_slot)? {
-                Acquired::Image(i_image) => {
-                    idle.pop_front();
-                    if report.send(Event::Acquired { i_image, i_slot }).is_err() {
-                        return Ok(Exit::Disconnected);
-                    }
+            if let Some(i_image) = self.acquire(i_slot)? {
+                idle.pop_front();
+                if report.send(Event::Acquired { i_image, i_slot }).is_err() {
+                    return Ok(());
                 }
-                Acquired::Late => {}
-                Acquired::Outdated => return Ok(Exit::Outdated),
             }
         }
     }
 
-    fn acquire(&self, i_slot: usize) -> Result<Acquired> {
+    /// Returns an image's place in the swapchain; none where the window system has none yet.
+    fn acquire(&self, i_slot: usize) -> PresentResult<Option<usize>> {
         let (timeout, ready) = (ACQUIRE_TIMEOUT.as_nanos() as u64, self.ready[i_slot]);
         // The layer's synchronization validation (1.4.309) loses an acquire that runs while another
         // thread submits, and reports WRITE_AFTER_PRESENT at the next present of the image
@@ -166,15 +162,14 @@ impl PresentQueue {
         match unsafe { self.loader.acquire_next_image(self.raw, timeout, ready, vk::Fence::null()) }
         {
             // A suboptimal image is presented all the same: its semaphore is signalled.
-            Ok((i_image, _)) => Ok(Acquired::Image(i_image as usize)),
-            Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => Ok(Acquired::Late),
-            Err(e) if is_outdated(e) => Ok(Acquired::Outdated),
-            Err(e) => Err(Error::vulkan("vkAcquireNextImageKHR", e)),
+            Ok((i_image, _)) => Ok(Some(i_image as usize)),
+            Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => Ok(None),
+            Err(e) => Err(failed("vkAcquireNextImageKHR", e)),
         }
     }
 
-    /// Presents an image; false where the window has another size by now.
-    fn present(&self, i_image: usize) -> Result<bool> {
+    /// Presents an image.
+    fn present(&self, i_image: usize) -> PresentResult<()> {
         let (drawn, chains, images) = ([self.drawn[i_image]], [self.raw], [i_image as u32]);
         let info = vk::PresentInfoKHR::default()
             .wait_semaphores(&drawn)
@@ -182,19 +177,18 @@ impl PresentQueue {
             .image_indices(&images);
         let queue = self.shared.lock_queue();
         match unsafe { self.loader.queue_present(*queue, &info) } {
-            Ok(is_suboptimal) => Ok(!is_suboptimal),
-            Err(e) if is_outdated(e) => Ok(false),
-            Err(e) => Err(Error::vulkan("vkQueuePresentKHR", e)),
+            Ok(false) => Ok(()),
+            // The window has another size by now.
+            Ok(true) => Err(Event::Outdated),
+            Err(e) => Err(failed("vkQueuePresentKHR", e)),
         }
     }
 }
 
-enum Acquired {
-    Image(usize),
-    Late,
-    Outdated,
-}
-
-fn is_outdated(e: vk::Result) -> bool {
-    matches!(e, vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::ERROR_SURFACE_LOST_KHR)
+/// Returns the event of a failed call.
+fn failed(call: &str, e: vk::Result) -> Event {
+    match e {
+        vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::ERROR_SURFACE_LOST_KHR => Event::Outdated,
+        _ => Event::Failed(Error::vulkan(call, e)),
+    }
 }

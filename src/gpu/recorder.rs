@@ -27,6 +27,17 @@ pub enum RecordCount<'a> {
     Indirect(&'a Buffer),
 }
 
+/// A number of records that the device has written.
+#[derive(Clone, Copy)]
+pub struct DeviceCount<'a> {
+    /// `u32` words.
+    pub buffer: &'a Buffer,
+    /// Index of the word that holds the number.
+    pub i_count: u32,
+    /// Index of the first of three words that hold the workgroups for the records: (n, 1, 1).
+    pub i_groups: u32,
+}
+
 /// Records commands into a command buffer.
 pub struct Recorder<'a> {
     pub(super) commands: &'a mut Commands,

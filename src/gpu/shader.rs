@@ -132,24 +132,11 @@ impl Compiler {
         cache_folder("spirv")
     }
 
-    /// Returns the shader texts.
-    pub fn sources(&self) -> &Sources {
-        &self.sources
-    }
-
-    /// Returns the SPIR-V of `file`, whose extension names the stage.
+    /// Returns the SPIR-V of `file`, whose extension names the stage, with `macros` defined.
     ///
     /// # Errors
     /// The text does not compile; the error carries the compiler's file:line.
-    pub fn compile(&self, file: &str, optimize: Optimize) -> Result<Vec<u32>> {
-        self.compile_with(file, optimize, &[])
-    }
-
-    /// Returns the SPIR-V of `file` with `macros` defined.
-    ///
-    /// # Errors
-    /// The text does not compile; the error carries the compiler's file:line.
-    pub fn compile_with(
+    pub fn compile(
         &self,
         file: &str,
         optimize: Optimize,

@@ -55,9 +55,6 @@ record! {
     }
 }
 
-/// In place of a particle's number: an entry that draws nothing.
-pub const NO_PARTICLE: u32 = u32::MAX;
-
 /// [`BoxRecord::form`] of offsets about the centre. The shaders' `FORM_*` have the same values.
 pub const FORM_CENTRED: u32 = 0;
 /// [`BoxRecord::form`] of P's formulas as printed.

@@ -1,8 +1,9 @@
-//! The arguments that `sprites`, `chunks`, `tiles` and `cull` share: buffers, variant and view of
-//! the blobs that they draw or select.
+//! The arguments that `sprites`, `chunks`, `tiles`, `cull` and `sort` share: buffers, variant, view
+//! and depths of the blobs that they draw, select or sort.
 
 use crate::gpu::RecordCount;
 use crate::layout::frame::CameraRecord;
+use crate::layout::record;
 
 bindings! {
     /// The buffers that blobs are drawn from.
@@ -83,8 +84,39 @@ pub struct BlobCount<'a> {
     pub i_first_facet: u32,
 }
 
-/// Returns the factor from view depths within ± `radius` to 16-bit sort keys.
-pub(super) fn steps_per_depth(radius: f64) -> f32 {
-    // A scene without extent has one depth: any finite factor gives one key.
-    if radius > 0.0 { (65536.0 / (2.0 * radius)) as f32 } else { 0.0 }
+record! {
+    /// Push constants of `sort_key.comp` and `cull_write.comp`.
+    pub struct KeyPush {
+        /// The camera's forward axis.
+        forward: [f32; 3],
+        /// Number of particles.
+        n_particles: u32,
+        /// Bound of |view depth|.
+        depth_high: f32,
+        /// Steps of a 16-bit key per length.
+        steps_per_depth: f32,
+        /// Bits of a key: 16 or 32.
+        n_bits: u32,
+    }
+}
+
+/// The depths that sort keys are made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Depths {
+    /// The camera's forward axis.
+    pub forward: [f32; 3],
+    /// Bound of |view depth|; the range of 16-bit keys.
+    pub radius: f64,
+    /// Bits of a key: 16 or 32.
+    pub n_bits: u32,
+}
+
+impl Depths {
+    /// Returns the push constants that make keys of `n_particles`.
+    pub(super) fn push(&self, n_particles: u32) -> KeyPush {
+        let Depths { forward, radius, n_bits } = *self;
+        // A scene without extent has one depth: any finite factor gives one key.
+        let steps_per_depth = if radius > 0.0 { (65536.0 / (2.0 * radius)) as f32 } else { 0.0 };
+        KeyPush { forward, n_particles, depth_high: radius as f32, steps_per_depth, n_bits }
+    }
 }

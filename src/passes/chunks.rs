@@ -8,21 +8,30 @@
 //! the target's format, and the light behind opaque pixels.
 
 use crate::error::Result;
-use crate::gpu::TargetFormat;
 use crate::gpu::{
     BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, Kernel, LoadOp, Recorder,
-    Target,
+    Target, TargetFormat,
 };
 use crate::layout::record;
 
 record! {
     /// Push constants of `chunks_order.comp`.
-    pub struct OrderPush { n_chunks: u32, stride: u32 }
+    pub struct OrderPush {
+        /// Number of chunks.
+        n_chunks: u32,
+        /// Room for the entries of a chunk.
+        stride: u32,
+    }
 }
 
 record! {
     /// Push constants of `chunks.vert` and `chunks.frag`.
-    pub struct Push { width: u32, saturated: f32 }
+    pub struct Push {
+        /// Columns of the picture.
+        width: u32,
+        /// Transmittance below which a pixel is opaque.
+        saturated: f32,
+    }
 }
 
 /// Format of the picture that chunks are composed in. With fewer bits, thin layers would leave no
@@ -36,17 +45,18 @@ pub struct Chunks {
     show: DrawPipeline,
 }
 
-/// The buffers of the reordered entries.
-#[derive(Clone, Copy)]
-pub struct OrderBuffers<'a> {
-    /// `[u32; 2]`: sort key and particle, far to near.
-    pub entries: &'a Buffer,
-    /// `KeptRecord`: number of entries.
-    pub kept: &'a Buffer,
-    /// Output, `[u32; 2]`: the entries near to far, `stride` places a chunk.
-    pub nearest: &'a Buffer,
-    /// Output, `[u32; 4]` by chunk: arguments of its draw call.
-    pub draws: &'a Buffer,
+bindings! {
+    /// The buffers of the reordered entries.
+    pub struct OrderBuffers {
+        /// `[u32; 2]`: sort key and particle, far to near.
+        entries,
+        /// `KeptRecord`: number of entries.
+        kept,
+        /// Output, `[u32; 2]`: the entries near to far, `stride` places a chunk.
+        nearest,
+        /// Output, `[u32; 4]` by chunk: arguments of its draw call.
+        draws,
+    }
 }
 
 impl Chunks {
@@ -59,7 +69,7 @@ impl Chunks {
             DrawPipeline::new(device, compiler, "chunks", Push::FIELDS, &[(0, is_pick)], blend)
         };
         Ok(Chunks {
-            order: Kernel::new(device, compiler, "chunks.order", OrderPush::FIELDS, &[])?,
+            order: Kernel::new(device, compiler, "chunks.order", OrderPush::FIELDS)?,
             pick: draw(1, (FORMAT, BlendMode::DepthOnly))?,
             show: draw(0, (format, BlendMode::Over))?,
         })
@@ -76,11 +86,10 @@ impl Chunks {
         n_chunks: u32,
         stride: u32,
     ) -> Result<()> {
-        let OrderBuffers { entries, kept, nearest, draws } = buffers;
         let push = OrderPush { n_chunks, stride };
         // At most n_chunks × stride entries.
         let n_records = n_chunks.max(n_chunks * stride);
-        rec.dispatch(&self.order, &[entries, kept, nearest, draws], &push, n_records)
+        rec.dispatch(&self.order, &buffers.by_binding(), &push, n_records)
     }
 
     /// Sets the depth of `target` to 1 where the transmittance of `composed`, a copy of its color,
@@ -110,7 +119,6 @@ impl Chunks {
         target: Target<'_>,
         start: LoadOp,
     ) -> Result<()> {
-        let target = Target::color(target.color);
         let push = Push { width: target.color.size().0, saturated: 0.0 };
         rec.draw(&self.show, target, start, &[composed], &push, InstanceCount::Known(1))
     }

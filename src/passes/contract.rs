@@ -16,7 +16,16 @@ pub const TILE: u32 = 64;
 
 record! {
     /// Push constants of `contract.comp`.
-    pub struct Push { n_facets: u32, n_lights: u32, n_rows: u32, n_columns: u32 }
+    pub struct Push {
+        /// Number of facets.
+        n_facets: u32,
+        /// Number of lights.
+        n_lights: u32,
+        /// Rows of T1 and T2.
+        n_rows: u32,
+        /// Columns of T2.
+        n_columns: u32,
+    }
 }
 
 bindings! {

@@ -6,7 +6,7 @@
 //! docs/explanation/passes.md "cull". Error: none that a pixel shows; the error of a smallest size
 //! is bounded there.
 
-use super::blobs::{BlobVariant, BlobView, steps_per_depth};
+use super::blobs::{BlobVariant, BlobView, Depths, KeyPush};
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
 use crate::layout::frame::CameraRecord;
@@ -15,30 +15,36 @@ use crate::layout::record;
 record! {
     /// Push constants of `cull_test.comp`.
     pub struct TestPush {
+        /// The camera.
         camera: CameraRecord,
+        /// Sides of a pixel, as slopes.
         pixel: [f32; 2],
+        /// Radius of a blob's footprint, in σ.
         cutoff: f32,
+        /// One over the optical depth at which a blob ends.
         inv_threshold: f32,
+        /// Least σ over view depth, as a slope.
         smallest: f32,
+        /// Number of particles.
         n_particles: u32,
+        /// Columns of the picture.
         width: u32,
+        /// Rows of the picture.
         height: u32,
     }
 }
 
 record! {
     /// Push constants of `cull_scan.comp`.
-    pub struct ScanPush { n_tiles: u32, sort_tile: u32, splat_block: u32, max_groups: u32 }
-}
-
-record! {
-    /// Push constants of `cull_write.comp`.
-    pub struct WritePush {
-        forward: [f32; 3],
-        n_particles: u32,
-        depth_high: f32,
-        steps_per_depth: f32,
-        n_bits: u32,
+    pub struct ScanPush {
+        /// Tiles of particles.
+        n_tiles: u32,
+        /// Entries that a workgroup of the sort takes.
+        sort_tile: u32,
+        /// Splats that a workgroup makes.
+        splat_block: u32,
+        /// The most workgroups along x of a dispatch.
+        max_groups: u32,
     }
 }
 
@@ -93,10 +99,8 @@ pub struct CullView<'a> {
 /// The sort keys of kept particles, and the workgroups of the passes that follow.
 #[derive(Debug, Clone, Copy)]
 pub struct Order {
-    /// Bound of |view depth|; the range of 16-bit keys.
-    pub radius: f64,
-    /// Bits of a sort key: 16 or 32.
-    pub n_bits: u32,
+    /// The depths that keys are made of.
+    pub depths: Depths,
     /// Entries that a workgroup of the sort takes.
     pub sort_tile: u32,
     /// Splats that a workgroup makes.
@@ -130,8 +134,8 @@ impl Cull {
         let (fields, constants) = (TestPush::FIELDS, variant.constants());
         Ok(Cull {
             test: Kernel::with_macros(device, compiler, "cull.test", fields, &constants, &macros)?,
-            scan: Kernel::new(device, compiler, "cull.scan", ScanPush::FIELDS, &[])?,
-            write: Kernel::new(device, compiler, "cull.write", WritePush::FIELDS, &[])?,
+            scan: Kernel::new(device, compiler, "cull.scan", ScanPush::FIELDS)?,
+            write: Kernel::new(device, compiler, "cull.write", KeyPush::FIELDS)?,
             scratch: Scratch::new(device, n_max.into())?,
             max_groups: device.limits().max_workgroups_x,
         })
@@ -151,19 +155,13 @@ impl Cull {
     ) -> Result<()> {
         let CullBuffers { placed, particles, i_group, drawn, entries, kept } = *buffers;
         let Scratch { masks, totals } = &self.scratch;
-        let Order { radius, n_bits, sort_tile, splat_block } = *order;
+        let Order { depths, sort_tile, splat_block } = *order;
         let n_tiles = n_particles.div_ceil(TILE);
         let tested = [placed, particles, i_group, drawn, masks, totals];
         rec.dispatch_groups(&self.test, &tested, &view.push(n_particles), n_tiles)?;
         let scan = ScanPush { n_tiles, sort_tile, splat_block, max_groups: self.max_groups };
         rec.dispatch_groups(&self.scan, &[totals, kept], &scan, 1)?;
-        let write = WritePush {
-            forward: view.blobs.camera.forward,
-            n_particles,
-            depth_high: radius as f32,
-            steps_per_depth: steps_per_depth(radius),
-            n_bits,
-        };
+        let write = depths.push(n_particles);
         rec.dispatch(&self.write, &[placed, masks, totals, entries], &write, n_particles)
     }
 }

@@ -14,27 +14,37 @@ use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
 record! {
-    /// Push constants of `facets.comp`.
-    pub struct Push { grid: GridRecord, n_particles: u32, i_first_facet: u32 }
-}
-
-record! {
-    /// Push constants of `facets_groups.comp`.
-    pub struct GroupsPush { grid: GridRecord, n_facets: u32, i_first_facet: u32 }
+    /// Push constants of `facets.comp` and `facets_groups.comp`.
+    pub struct Push {
+        /// The density grid.
+        grid: GridRecord,
+        /// Number of particles, or of runs.
+        n_facets: u32,
+        /// First facet that the pass writes.
+        i_first_facet: u32,
+    }
 }
 
 record! {
     /// Push constants of `facets_surfaces.comp`.
-    pub struct SurfacesPush { n_facets: u32 }
+    pub struct SurfacesPush {
+        /// Number of facets of surfaces.
+        n_facets: u32,
+    }
 }
 
 record! {
     /// Push constants of `facets_terrain.comp`.
-    pub struct TerrainPush { n_facets: u32, i_first_facet: u32 }
+    pub struct TerrainPush {
+        /// Number of facets of terrains.
+        n_facets: u32,
+        /// First facet that the pass writes.
+        i_first_facet: u32,
+    }
 }
 
 bindings! {
-    /// The buffers of the facets of single particles.
+    /// The buffers of the facets of particles.
     pub struct ParticleBuffers {
         /// `PlacedRecord` by particle.
         placed,
@@ -48,30 +58,6 @@ bindings! {
         density,
         /// Output, `FacetRecord` by facet.
         facets,
-    }
-}
-
-bindings! {
-    /// The buffers of the facets of runs of particles.
-    pub struct RunBuffers {
-        /// `PlacedRecord` by particle.
-        placed,
-        /// `ParticleRecord` by particle.
-        particles,
-        /// `u32` group by particle.
-        i_group,
-        /// `GroupRecord` by group.
-        groups,
-        /// `f32` by cell: extinction per length.
-        density,
-        /// `u32` particle by place in Morton order.
-        order,
-        /// `RunRecord` by facet.
-        runs,
-        /// Output, `FacetRecord` by facet.
-        facets,
-        /// Output, `u32` facet by particle.
-        i_facet,
     }
 }
 
@@ -90,13 +76,12 @@ impl Facets {
     /// Fails if a shader does not compile or a pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler, has_ellipsoids: bool) -> Result<Facets> {
         let macros = [("ELLIPSOIDS", u32::from(has_ellipsoids))];
-        let kernel =
-            |name, fields| Kernel::with_macros(device, compiler, name, fields, &[], &macros);
+        let kernel = |name| Kernel::with_macros(device, compiler, name, Push::FIELDS, &[], &macros);
         Ok(Facets {
-            particles: kernel("facets", Push::FIELDS)?,
-            runs: kernel("facets.groups", GroupsPush::FIELDS)?,
-            surfaces: Kernel::new(device, compiler, "facets.surfaces", SurfacesPush::FIELDS, &[])?,
-            terrain: Kernel::new(device, compiler, "facets.terrain", TerrainPush::FIELDS, &[])?,
+            particles: kernel("facets")?,
+            runs: kernel("facets.groups")?,
+            surfaces: Kernel::new(device, compiler, "facets.surfaces", SurfacesPush::FIELDS)?,
+            terrain: Kernel::new(device, compiler, "facets.terrain", TerrainPush::FIELDS)?,
         })
     }
 
@@ -131,7 +116,7 @@ impl Facets {
         rec.dispatch(&self.terrain, &[regions, ground, facets], &push, n_facets)
     }
 
-    /// Writes a facet for each particle, from `i_first_facet` on.
+    /// Writes a facet for each of `n_facets` particles, from `i_first_facet` on.
     ///
     /// # Errors
     /// Fails if a buffer does not fit the shader's binding.
@@ -140,26 +125,30 @@ impl Facets {
         rec: &mut Recorder<'_>,
         buffers: &ParticleBuffers<'_>,
         grid: &GridRecord,
-        n_particles: u32,
+        n_facets: u32,
         i_first_facet: u32,
     ) -> Result<()> {
-        let push = Push { grid: *grid, n_particles, i_first_facet };
-        rec.dispatch(&self.particles, &buffers.by_binding(), &push, n_particles)
+        let push = Push { grid: *grid, n_facets, i_first_facet };
+        rec.dispatch(&self.particles, &buffers.by_binding(), &push, n_facets)
     }
 
-    /// Writes a facet for each of `n_facets` runs, from `i_first_facet` on.
+    /// Writes a facet for each of `n_facets` runs, from `i_first_facet` on. `order`: `u32` particle
+    /// by place in Morton order; `runs`: `RunRecord` by facet; `i_facet`: output, `u32` facet by
+    /// particle.
     ///
     /// # Errors
     /// Fails if a buffer does not fit the shader's binding.
     pub fn record_runs(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: &RunBuffers<'_>,
+        buffers: &ParticleBuffers<'_>,
+        [order, runs, i_facet]: [&Buffer; 3],
         grid: &GridRecord,
         n_facets: u32,
         i_first_facet: u32,
     ) -> Result<()> {
-        let push = GroupsPush { grid: *grid, n_facets, i_first_facet };
-        rec.dispatch(&self.runs, &buffers.by_binding(), &push, n_facets)
+        let push = Push { grid: *grid, n_facets, i_first_facet };
+        let buffers = [&buffers.by_binding()[..], &[order, runs, i_facet]].concat();
+        rec.dispatch(&self.runs, &buffers, &push, n_facets)
     }
 }

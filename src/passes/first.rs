@@ -5,16 +5,23 @@
 //! Error: a few ulp a light.
 
 use crate::error::Result;
-use crate::gpu::{Compiler, Device, Kernel, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::record;
 
 record! {
     /// Push constants of `first.comp`.
-    pub struct Push { eye: [f32; 3], n_facets: u32, n_lights: u32 }
+    pub struct Push {
+        /// Eye, relative to the lighting origin.
+        eye: [f32; 3],
+        /// Number of facets.
+        n_facets: u32,
+        /// Number of lights.
+        n_lights: u32,
+    }
 }
 
 bindings! {
-    /// The buffers of [`First`].
+    /// The buffers of the pass.
     pub struct FirstBuffers {
         /// `FacetRecord` by facet.
         facets,
@@ -24,9 +31,10 @@ bindings! {
         transmittance,
         /// `RegionRecord` by region.
         regions,
-        /// `f32`: a row a lobe.
+        /// `f32`: a row a lobe; for [`FirstTensor`] the vectors of the basis, from row `i_vectors`
+        /// on.
         table,
-        /// Output, `LitRecord` by facet.
+        /// Output, `LitRecord` by facet; [`FirstTensor`] clears it.
         lit,
     }
 }
@@ -42,7 +50,7 @@ impl First {
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<First> {
-        Ok(First { kernel: Kernel::new(device, compiler, "first", Push::FIELDS, &[])? })
+        Ok(First { kernel: Kernel::new(device, compiler, "first", Push::FIELDS)? })
     }
 
     /// Writes the light of every facet.
@@ -62,32 +70,18 @@ impl First {
 record! {
     /// Push constants of `first_tensor.comp`.
     pub struct TensorPush {
+        /// Eye, relative to the lighting origin.
         eye: [f32; 3],
+        /// Number of facets.
         n_facets: u32,
+        /// Number of lights.
         n_lights: u32,
+        /// Number of basis functions.
         n_bases: u32,
+        /// Rows of T1 and T2.
         n_rows: u32,
+        /// First row of the basis' vectors in the table.
         i_vectors: u32,
-    }
-}
-
-bindings! {
-    /// The buffers of [`FirstTensor`].
-    pub struct FirstTensorBuffers {
-        /// `FacetRecord` by facet.
-        facets,
-        /// `LightRecord` by light.
-        lights,
-        /// `f32` by facet and light.
-        transmittance,
-        /// `RegionRecord` by region.
-        regions,
-        /// `f32`: the vectors of the basis, from row `i_vectors` on.
-        table,
-        /// Output, `f32` by light and row.
-        t1,
-        /// Output, `LitRecord` by facet: cleared.
-        lit,
     }
 }
 
@@ -103,20 +97,22 @@ impl FirstTensor {
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<FirstTensor> {
-        let kernel = Kernel::new(device, compiler, "first.tensor", TensorPush::FIELDS, &[])?;
+        let kernel = Kernel::new(device, compiler, "first.tensor", TensorPush::FIELDS)?;
         Ok(FirstTensor { kernel })
     }
 
-    /// Writes T1.
+    /// Writes `t1`, `f32` by light and row.
     ///
     /// # Errors
     /// Fails if a buffer does not fit the shader's binding.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: &FirstTensorBuffers<'_>,
+        buffers: &FirstBuffers<'_>,
+        t1: &Buffer,
         push: &TensorPush,
     ) -> Result<()> {
-        rec.dispatch(&self.kernel, &buffers.by_binding(), push, push.n_facets)
+        let buffers = [&buffers.by_binding()[..], &[t1]].concat();
+        rec.dispatch(&self.kernel, &buffers, push, push.n_facets)
     }
 }

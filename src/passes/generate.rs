@@ -12,7 +12,14 @@ use crate::layout::record;
 
 record! {
     /// Push constants of `generate.comp`.
-    pub struct Push { i_first: u32, n_particles: u32, max_attempts: u32 }
+    pub struct Push {
+        /// First particle.
+        i_first: u32,
+        /// Number of particles.
+        n_particles: u32,
+        /// Attempts after which a particle is folded back.
+        max_attempts: u32,
+    }
 }
 
 /// The bit of a particle's status that says that it was folded back; the other bits count attempts.
@@ -39,7 +46,7 @@ impl Generate {
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Generate> {
-        Ok(Generate { kernel: Kernel::new(device, compiler, "generate", Push::FIELDS, &[])? })
+        Ok(Generate { kernel: Kernel::new(device, compiler, "generate", Push::FIELDS)? })
     }
 
     /// Generates `n_particles` from `i_first` on and leaves all others unchanged.

@@ -13,12 +13,24 @@ use crate::layout::record;
 
 record! {
     /// Push constants of `grid_deposit.comp`.
-    pub struct DepositPush { grid: GridRecord, n_particles: u32, quanta_per_mass: f32 }
+    pub struct DepositPush {
+        /// The density grid.
+        grid: GridRecord,
+        /// Number of particles.
+        n_particles: u32,
+        /// Quanta of a unit of mass.
+        quanta_per_mass: f32,
+    }
 }
 
 record! {
     /// Push constants of `grid_resolve.comp`.
-    pub struct ResolvePush { n_cells: u32, density_per_quantum: f32 }
+    pub struct ResolvePush {
+        /// Number of cells.
+        n_cells: u32,
+        /// Extinction per length of a quantum.
+        density_per_quantum: f32,
+    }
 }
 
 /// Quanta of the heaviest particle's mass: 2³¹ in one cell fits a 32-bit word with room for
@@ -53,7 +65,7 @@ impl Grid {
         let fields = DepositPush::FIELDS;
         Ok(Grid {
             deposit: Kernel::with_macros(device, compiler, "grid.deposit", fields, &[], &width)?,
-            resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS, &[])?,
+            resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS)?,
             scratch: Scratch::new(device, n_cells)?,
             capacity: n_cells,
         })

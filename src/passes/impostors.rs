@@ -10,29 +10,46 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::error::Result;
-use crate::gpu::TargetFormat;
 use crate::gpu::{
     BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, Kernel, LoadOp, Recorder,
-    Target,
+    Target, TargetFormat,
 };
 use crate::layout::record;
 
 record! {
     /// Push constants of `impostors_part.comp`.
-    pub struct PartPush { n_entries: u32, last_key: u32, is_new: u32, unused: u32 }
+    pub struct PartPush {
+        /// Number of entries.
+        n_entries: u32,
+        /// Greatest key of a far entry.
+        last_key: u32,
+        /// 1: entries are parted by their keys; 0: by the last decision.
+        is_new: u32,
+        /// Padding.
+        unused: u32,
+    }
 }
 
 record! {
     /// Push constants of `impostors.vert` and `impostors.frag`.
     pub struct Push {
+        /// First row of the homography: columns of the layer.
         column: [f32; 3],
+        /// near/z of the layer.
         depth: f32,
+        /// Second row of the homography: rows of the layer.
         row: [f32; 3],
+        /// Columns of the layer.
         width: u32,
+        /// Third row of the homography, the divisor.
         under: [f32; 3],
+        /// Rows of the layer.
         height: u32,
+        /// Middle of the picture, in pixels.
         middle: [f32; 2],
+        /// Least clip coordinates of the layer.
         low: [f32; 2],
+        /// Greatest clip coordinates of the layer.
         high: [f32; 2],
     }
 }
@@ -61,17 +78,18 @@ pub struct LayerView {
     pub depth: f32,
 }
 
-/// The buffers that entries are parted by.
-#[derive(Clone, Copy)]
-pub struct PartBuffers<'a> {
-    /// `[u32; 2]`: sort key and particle, far to near.
-    pub entries: &'a Buffer,
-    /// Input and output, `u32` by particle: whether it belongs to the layer.
-    pub members: &'a Buffer,
-    /// Output, `[u32; 2]`: entries of the layer.
-    pub far: &'a Buffer,
-    /// Output, `[u32; 2]`: the other entries.
-    pub near: &'a Buffer,
+bindings! {
+    /// The buffers that entries are parted by.
+    pub struct PartBuffers {
+        /// `[u32; 2]`: sort key and particle, far to near.
+        entries,
+        /// Input and output, `u32` by particle: whether it belongs to the layer.
+        members,
+        /// Output, `[u32; 2]`: entries of the layer.
+        far,
+        /// Output, `[u32; 2]`: the other entries.
+        near,
+    }
 }
 
 impl Impostors {
@@ -87,7 +105,7 @@ impl Impostors {
     ) -> Result<Impostors> {
         let blend = (format, if over_solids { BlendMode::OverTested } else { BlendMode::Over });
         Ok(Impostors {
-            part: Kernel::new(device, compiler, "impostors.part", PartPush::FIELDS, &[])?,
+            part: Kernel::new(device, compiler, "impostors.part", PartPush::FIELDS)?,
             show: DrawPipeline::new(device, compiler, "impostors", Push::FIELDS, &[], blend)?,
         })
     }
@@ -106,10 +124,9 @@ impl Impostors {
         n_entries: u32,
         last_key: Option<u32>,
     ) -> Result<()> {
-        let PartBuffers { entries, members, far, near } = buffers;
         if last_key.is_some() {
             // A particle that is not drawn is not a member.
-            rec.fill(members, 0);
+            rec.fill(buffers.members, 0);
         }
         let push = PartPush {
             n_entries,
@@ -117,7 +134,7 @@ impl Impostors {
             is_new: u32::from(last_key.is_some()),
             unused: 0,
         };
-        rec.dispatch(&self.part, &[entries, members, far, near], &push, n_entries)
+        rec.dispatch(&self.part, &buffers.by_binding(), &push, n_entries)
     }
 
     /// Draws `layer` (`[f32; 4]` by texel, rows from the top) into `target`, over the surfaces if

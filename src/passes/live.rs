@@ -11,7 +11,12 @@ use crate::layout::record;
 
 record! {
     /// Push constants of `live.comp`.
-    pub struct Push { i_disc: u32, n_particles: u32 }
+    pub struct Push {
+        /// The disc.
+        i_disc: u32,
+        /// Number of particles.
+        n_particles: u32,
+    }
 }
 
 /// The pipeline of the pass.
@@ -25,7 +30,7 @@ impl Live {
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Live> {
-        Ok(Live { kernel: Kernel::new(device, compiler, "live", Push::FIELDS, &[])? })
+        Ok(Live { kernel: Kernel::new(device, compiler, "live", Push::FIELDS)? })
     }
 
     /// Writes the `n_particles` particles of disc `i_disc`.

@@ -13,13 +13,6 @@ macro_rules! bindings {
         pub struct $name<'a> { $($(#[$doc])* pub $field: &'a $crate::gpu::Buffer),* }
 
         impl<'a> $name<'a> {
-            /// Names the buffers of an array, which is in the order of the binding numbers.
-            pub fn from_bindings(
-                [$($field),*]: [&'a $crate::gpu::Buffer; [$(stringify!($field)),*].len()],
-            ) -> Self {
-                $name { $($field),* }
-            }
-
             /// Returns the buffers by binding number.
             pub fn by_binding(
                 &self,
@@ -90,6 +83,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/cells.glsl",
     "include/cull.glsl",
     "include/density.glsl",
+    "include/depths.glsl",
     "include/each.glsl",
     "include/first.glsl",
     "include/functions.glsl",
@@ -108,6 +102,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/reach.glsl",
     "include/records.glsl",
     "include/regions.glsl",
+    "include/scan.glsl",
     "include/second.glsl",
     "include/shell.glsl",
     "include/sort.glsl",

@@ -12,12 +12,22 @@ use crate::layout::record;
 
 record! {
     /// Push constants of `morton_key.comp`.
-    pub struct KeyPush { n_points: u32, region_bits: u32, axis_bits: u32 }
+    pub struct KeyPush {
+        /// Number of facets or particles.
+        n_points: u32,
+        /// Bits of a key's region.
+        region_bits: u32,
+        /// Bits of a key's axis.
+        axis_bits: u32,
+    }
 }
 
 record! {
     /// Push constants of `morton_order.comp`.
-    pub struct OrderPush { n_entries: u32 }
+    pub struct OrderPush {
+        /// Number of entries.
+        n_entries: u32,
+    }
 }
 
 bindings! {
@@ -56,7 +66,7 @@ impl Morton {
         Ok(Morton {
             facets: key(0)?,
             particles: key(1)?,
-            order: Kernel::new(device, compiler, "morton.order", OrderPush::FIELDS, &[])?,
+            order: Kernel::new(device, compiler, "morton.order", OrderPush::FIELDS)?,
         })
     }
 

@@ -12,7 +12,10 @@ use crate::layout::record;
 
 record! {
     /// Push constants of `place.comp`.
-    pub struct Push { n_particles: u32 }
+    pub struct Push {
+        /// Number of particles.
+        n_particles: u32,
+    }
 }
 
 bindings! {
@@ -42,7 +45,7 @@ impl Place {
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Place> {
-        Ok(Place { kernel: Kernel::new(device, compiler, "place", Push::FIELDS, &[])? })
+        Ok(Place { kernel: Kernel::new(device, compiler, "place", Push::FIELDS)? })
     }
 
     /// Writes the place of every particle.

@@ -8,23 +8,30 @@
 //! next; 11 more roundings for a difference.
 
 use crate::error::Result;
-use crate::gpu::TargetFormat;
 use crate::gpu::{
     BlendMode, Buffer, Compiler, Device, DrawPipeline, Image, InstanceCount, LoadOp, Recorder,
-    Target,
+    Target, TargetFormat,
 };
 use crate::layout::record;
 
 record! {
     /// Push constants of `present.vert` and `present.frag`.
     pub struct Push {
+        /// Linear RGB.
         background: [f32; 3],
+        /// Factor of the radiance.
         exposure: f32,
+        /// Columns and rows of the picture.
         size: [u32; 2],
+        /// The window's pixel of the picture's top left pixel.
         corner: [i32; 2],
+        /// 0: neutral; 1: linear.
         tone_map: u32,
+        /// 0: none; 1: split; 2: difference; 3: the second picture.
         compare: u32,
+        /// Column of the dividing line.
         split: i32,
+        /// Factor of a difference.
         gain: f32,
     }
 }

@@ -4,62 +4,74 @@
 //! Out: I_i and L2 in `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16),
 //! docs/explanation/model.md §7, §11. Error: that of the sum, see "sums" there.
 
-use bytemuck::Pod;
-
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Field, Kernel, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
 use crate::layout::sums::SumMacros;
 
 record! {
     /// Push constants of `second_sources.comp`.
-    pub struct SourcesPush { n_facets: u32, n_lights: u32, n_surfaces: u32 }
-}
-
-record! {
-    /// Push constants of `second_merge.comp`.
-    pub struct MergePush { i_first: u32, n_merges: u32, n_lights: u32 }
-}
-
-record! {
-    /// Push constants of `second_gather.comp`.
-    pub struct GatherPush {
-        grid: GridRecord,
-        eye: [f32; 3],
+    pub struct SourcesPush {
+        /// Number of facets.
+        n_facets: u32,
+        /// Number of lights.
         n_lights: u32,
-        pair_size: f32,
-        pair_levels: u32,
-        step_length: f32,
-        backward: f32,
-        pair_steps: u32,
-        i_first_block: u32,
-        theta: f32,
+        /// Number of surfaces.
         n_surfaces: u32,
-        i_round: u32,
-        n_rounds: u32,
     }
 }
 
 record! {
-    /// Push constants of `second_tensor.comp`.
-    pub struct TensorPush {
-        grid: GridRecord,
-        eye: [f32; 3],
+    /// Push constants of `second_merge.comp`.
+    pub struct MergePush {
+        /// First entry of `merges`.
+        i_first: u32,
+        /// Number of clusters.
+        n_merges: u32,
+        /// Number of lights.
         n_lights: u32,
+    }
+}
+
+record! {
+    /// Push constants of `second_gather.comp` and `second_tensor.comp`.
+    pub struct GatherPush {
+        /// The density grid.
+        grid: GridRecord,
+        /// Eye, relative to the lighting origin.
+        eye: [f32; 3],
+        /// Number of lights.
+        n_lights: u32,
+        /// Greatest width of a source over its distance.
         pair_size: f32,
+        /// The most subdivisions of a facet.
         pair_levels: u32,
+        /// Length of a step of the march.
         step_length: f32,
+        /// Share 1 − g of extinction that counts.
         backward: f32,
+        /// The most steps of a march between two facets.
         pair_steps: u32,
+        /// First block of receivers.
         i_first_block: u32,
-        i_light: u32,
-        i_vectors: u32,
-        n_rows: u32,
-        n_columns: u32,
+        /// Opening angle of clusters.
+        theta: f32,
+        /// Number of surfaces.
         n_surfaces: u32,
+        /// The round.
         i_round: u32,
+        /// Number of rounds.
         n_rounds: u32,
+        /// The light of a tensor, as all that follows.
+        i_light: u32,
+        /// First row of the basis' vectors in the table.
+        i_vectors: u32,
+        /// Rows of T1 and T2.
+        n_rows: u32,
+        /// Columns of T2.
+        n_columns: u32,
+        /// 1 for the first light that has energy.
         is_first_light: u32,
     }
 }
@@ -170,7 +182,7 @@ impl Gather {
     fn new(
         device: &Device,
         compiler: &Compiler,
-        (name, fields): (&str, &[Field]),
+        name: &str,
         variant: &GatherVariant,
         macros: &[(&'static str, u32)],
     ) -> Result<Gather> {
@@ -187,25 +199,24 @@ impl Gather {
                 ("TOGETHER", u32::from(device.limits().has_subgroup_arithmetic)),
             ];
             let macros = [&shared[..], macros].concat();
-            Kernel::with_macros(device, compiler, name, fields, &[], &macros)
+            Kernel::with_macros(device, compiler, name, GatherPush::FIELDS, &[], &macros)
         };
         Ok(Gather([kernel(0)?, kernel(1)?]))
     }
 
     /// Records a round. The first one has a workgroup a block, every other one as many as the round
     /// before it has counted.
-    fn record<P: Pod>(
+    fn record(
         &self,
         rec: &mut Recorder<'_>,
         buffers: &GatherBuffers<'_>,
-        push: &P,
-        i_round: u32,
+        push: &GatherPush,
         (receivers, n_blocks): (Receivers, u32),
     ) -> Result<()> {
         let (kernel, all) = (&self.0[receivers as usize], buffers.by_binding());
-        match i_round {
+        match push.i_round {
             0 => rec.dispatch_groups(kernel, &all, push, n_blocks),
-            _ => rec.dispatch_indirect(kernel, &all, push, (buffers.rounds, 3 * i_round)),
+            i => rec.dispatch_indirect(kernel, &all, push, (buffers.rounds, 3 * i)),
         }
     }
 }
@@ -231,11 +242,10 @@ impl Second {
         let macros =
             [("TREE", u32::from(variant.has_tree)), ("SHINY", u32::from(variant.is_glossy))];
         let macros = [&macros[..], sums.list()].concat();
-        let gather = ("second.gather", GatherPush::FIELDS);
         Ok(Second {
-            sources: Kernel::new(device, compiler, "second.sources", SourcesPush::FIELDS, &[])?,
-            merge: Kernel::new(device, compiler, "second.merge", MergePush::FIELDS, &[])?,
-            gather: Gather::new(device, compiler, gather, variant, &macros)?,
+            sources: Kernel::new(device, compiler, "second.sources", SourcesPush::FIELDS)?,
+            merge: Kernel::new(device, compiler, "second.merge", MergePush::FIELDS)?,
+            gather: Gather::new(device, compiler, "second.gather", variant, &macros)?,
         })
     }
 
@@ -278,7 +288,7 @@ impl Second {
         push: &GatherPush,
         blocks: (Receivers, u32),
     ) -> Result<()> {
-        self.gather.record(rec, buffers, push, push.i_round, blocks)
+        self.gather.record(rec, buffers, push, blocks)
     }
 }
 
@@ -299,8 +309,9 @@ impl SecondTensor {
         variant: &GatherVariant,
         n_bases: u32,
     ) -> Result<SecondTensor> {
-        let (gather, macros) = (("second.tensor", TensorPush::FIELDS), [("N_BASES", n_bases)]);
-        Ok(SecondTensor { gather: Gather::new(device, compiler, gather, variant, &macros)? })
+        let macros = [("N_BASES", n_bases)];
+        let gather = Gather::new(device, compiler, "second.tensor", variant, &macros)?;
+        Ok(SecondTensor { gather })
     }
 
     /// Gathers the tensor on `blocks`: their kind and number.
@@ -314,10 +325,10 @@ impl SecondTensor {
         &self,
         rec: &mut Recorder<'_>,
         buffers: &GatherBuffers<'_>,
-        push: &TensorPush,
+        push: &GatherPush,
         blocks: (Receivers, u32),
     ) -> Result<()> {
-        self.gather.record(rec, buffers, push, push.i_round, blocks)
+        self.gather.record(rec, buffers, push, blocks)
     }
 }
 

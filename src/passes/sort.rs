@@ -6,25 +6,21 @@
 //! docs/explanation/model.md §9, §11. Error: none in the sort; a key holds the depth to an ulp (32
 //! bits) or to 2⁻¹⁶ of the scene (16 bits).
 
-use super::blobs::steps_per_depth;
+use super::blobs::{Depths, KeyPush};
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
+use crate::gpu::{Buffer, Compiler, Device, DeviceCount, Kernel, Recorder, buffers};
 use crate::layout::record;
 
 record! {
-    /// Push constants of `sort_key.comp`.
-    pub struct KeyPush {
-        forward: [f32; 3],
-        n_particles: u32,
-        depth_high: f32,
-        steps_per_depth: f32,
-        n_bits: u32,
-    }
-}
-
-record! {
     /// Push constants of `sort_count.comp`, `sort_scan.comp` and `sort_scatter.comp`.
-    pub struct DigitPush { n_entries: u32, i_count: u32, shift: u32 }
+    pub struct DigitPush {
+        /// Number of entries.
+        n_entries: u32,
+        /// Word that holds the number of entries, or [`NO_COUNT`].
+        i_count: u32,
+        /// First bit of the digit.
+        shift: u32,
+    }
 }
 
 /// The value of `i_count` where the host knows the number of entries; the shaders' NO_COUNT.
@@ -58,30 +54,8 @@ impl Scratch {
 pub enum Count<'a> {
     /// The host knows the number.
     Known(u32),
-    /// The device has written it.
+    /// The device has written it, and a workgroup for each tile.
     Counted(DeviceCount<'a>),
-}
-
-/// A number of entries that the device has written.
-#[derive(Clone, Copy)]
-pub struct DeviceCount<'a> {
-    /// `u32` words.
-    pub buffer: &'a Buffer,
-    /// Index of the word that holds the number of entries.
-    pub i_count: u32,
-    /// Index of the first of three words that hold the workgroups: (tiles, 1, 1).
-    pub i_groups: u32,
-}
-
-/// The depths that sort keys are made of.
-#[derive(Debug, Clone, Copy)]
-pub struct Depths {
-    /// The camera's forward axis.
-    pub forward: [f32; 3],
-    /// Bound of |view depth|; the range of 16-bit keys.
-    pub radius: f64,
-    /// Bits of a key: 16 or 32.
-    pub n_bits: u32,
 }
 
 /// The pipelines and scratch buffers of the pass.
@@ -136,7 +110,7 @@ impl Sort {
             Kernel::with_macros(device, compiler, name, DigitPush::FIELDS, &[], macros)
         };
         Ok(Sort {
-            key: Kernel::new(device, compiler, "sort.key", KeyPush::FIELDS, &[])?,
+            key: Kernel::new(device, compiler, "sort.key", KeyPush::FIELDS)?,
             count: kernel("sort.count", &macros)?,
             // The scan has an invocation a digit, in whatever subgroups that makes.
             scan: kernel("sort.scan", &macros[2..])?,
@@ -159,15 +133,8 @@ impl Sort {
         depths: &Depths,
         n_particles: u32,
     ) -> Result<()> {
-        let Depths { forward, radius, n_bits } = *depths;
-        let push = KeyPush {
-            forward,
-            n_particles,
-            depth_high: radius as f32,
-            steps_per_depth: steps_per_depth(radius),
-            n_bits,
-        };
-        rec.dispatch(&self.key, &[placed, i_group, drawn, entries], &push, n_particles)
+        let (buffers, push) = ([placed, i_group, drawn, entries], depths.push(n_particles));
+        rec.dispatch(&self.key, &buffers, &push, n_particles)
     }
 
     /// Sorts `entries` by the low `n_bits` of their keys and returns the buffer that holds the

@@ -7,9 +7,9 @@
 
 use super::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
 use crate::error::Result;
-use crate::gpu::TargetFormat;
 use crate::gpu::{
-    BlendMode, Compiler, Device, DrawPipeline, InstanceCount, LoadOp, RecordCount, Recorder, Target,
+    BlendMode, Compiler, Device, DrawPipeline, InstanceCount, LoadOp, RecordCount, Recorder,
+    Target, TargetFormat,
 };
 use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
@@ -18,11 +18,17 @@ use crate::layout::record;
 record! {
     /// Push constants of `sprites.vert` and `sprites.frag`.
     pub struct Push {
+        /// The camera.
         camera: CameraRecord,
+        /// Sides of a pixel, as slopes.
         pixel: [f32; 2],
+        /// Radius of a blob's footprint, in σ.
         cutoff: f32,
+        /// Facet of the first particle.
         i_first_facet: u32,
+        /// One over the optical depth at which a blob ends.
         inv_threshold: f32,
+        /// First entry.
         i_first: u32,
     }
 }

@@ -6,16 +6,23 @@
 //! distance over the cosine, the depth likewise, and the target's rounding.
 
 use crate::error::Result;
-use crate::gpu::TargetFormat;
 use crate::gpu::{
     BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, LoadOp, Recorder, Target,
+    TargetFormat,
 };
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
 record! {
     /// Push constants of `surfaces.vert` and `surfaces.frag`.
-    pub struct Push { camera: CameraRecord, pixel: [f32; 2], unused: [f32; 2] }
+    pub struct Push {
+        /// The camera.
+        camera: CameraRecord,
+        /// Sides of a pixel, as slopes.
+        pixel: [f32; 2],
+        /// Padding.
+        unused: [f32; 2],
+    }
 }
 
 /// The pipeline of the pass.

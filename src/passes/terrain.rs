@@ -7,16 +7,25 @@
 //! show another triangle within 1/16 of a pixel, Vulkan's guarantee for the position of vertices.
 
 use crate::error::Result;
-use crate::gpu::TargetFormat;
 use crate::gpu::{
     BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, LoadOp, Recorder, Target,
+    TargetFormat,
 };
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
 record! {
     /// Push constants of `terrain.vert` and `terrain.frag`.
-    pub struct Push { camera: CameraRecord, pixel: [f32; 2], i_region: u32, i_first_ground: u32 }
+    pub struct Push {
+        /// The camera.
+        camera: CameraRecord,
+        /// Sides of a pixel, as slopes.
+        pixel: [f32; 2],
+        /// Region of the terrain.
+        i_region: u32,
+        /// Facet of the first point of all terrains.
+        i_first_ground: u32,
+    }
 }
 
 /// The pipeline of the pass.

@@ -12,12 +12,20 @@ use crate::layout::record;
 
 record! {
     /// Push constants of `texture_transform.comp`.
-    pub struct TransformPush { seed: u32, along_columns: u32 }
+    pub struct TransformPush {
+        /// Seed of the pool.
+        seed: u32,
+        /// 0: along rows; 1: along columns.
+        along_columns: u32,
+    }
 }
 
 record! {
     /// Push constants of `texture_pack.comp`.
-    pub struct PackPush { n_texels: u32 }
+    pub struct PackPush {
+        /// Texels of the pool.
+        n_texels: u32,
+    }
 }
 
 /// Texels of all levels of a field; the shaders' FIELD_TEXELS.
@@ -55,7 +63,7 @@ impl Texture {
         let (name, fields) = ("texture.transform", TransformPush::FIELDS);
         Ok(Texture {
             transform: Kernel::with_macros(device, compiler, name, fields, &[], &macros)?,
-            pack: Kernel::new(device, compiler, "texture.pack", PackPush::FIELDS, &[])?,
+            pack: Kernel::new(device, compiler, "texture.pack", PackPush::FIELDS)?,
             scratch: Scratch::new(device)?,
         })
     }

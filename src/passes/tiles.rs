@@ -12,8 +12,10 @@ mod rounds;
 
 use super::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, RecordCount, Recorder, Target, buffers};
-use crate::gpu::{TargetFormat, has_depth24};
+use crate::gpu::{
+    Buffer, Compiler, Device, DeviceCount, Kernel, RecordCount, Recorder, Target, TargetFormat,
+    buffers, has_depth24,
+};
 use crate::layout::cull::KeptRecord;
 use crate::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 
@@ -102,18 +104,6 @@ pub struct Tiles {
     max_groups: u32,
     max_tiles: u32,
     scratch: Scratch,
-}
-
-/// The pairs of a round, for the sort.
-pub struct RoundPairs<'a> {
-    /// `[u32; 2]`: bin and splat.
-    pub entries: &'a Buffer,
-    /// `u32` words that hold their number and the workgroups that sort them.
-    pub round: &'a Buffer,
-    /// Index of the word that holds the number of pairs.
-    pub i_count: u32,
-    /// Index of the first of the three words that hold the workgroups.
-    pub i_groups: u32,
 }
 
 /// Returns the most tiles that a workgroup draws where they have few pairs. A CPU runs few
@@ -275,7 +265,8 @@ impl Tiles {
         rec.copy(colors, picture);
     }
 
-    /// Writes the pairs of round `i_round` and returns where they are.
+    /// Writes the pairs of round `i_round`. Returns them (`[u32; 2]`: bin and splat) and their
+    /// number, with the workgroups that sort them.
     ///
     /// # Errors
     /// Fails if a buffer does not fit the shader's binding.
@@ -285,7 +276,7 @@ impl Tiles {
         i_round: u32,
         n: RecordCount<'_>,
         view: &BlobView<'_>,
-    ) -> Result<RoundPairs<'_>> {
+    ) -> Result<(&Buffer, DeviceCount<'_>)> {
         let Division { n_bins_x, tile, .. } = self.division;
         let Scratch { splats, reaches, before, blocks, round, entries, .. } = &self.scratch;
         let pixel = self.pixel(view);
@@ -300,7 +291,7 @@ impl Tiles {
         let buffers = [reaches, before, blocks, round, entries, splats, self.kept(n)];
         let i_first = ROUND_WORDS * i_round;
         rec.dispatch_indirect(&self.pairs, &buffers, &push, (round, i_first + 4))?;
-        Ok(RoundPairs { entries, round, i_count: i_first + 3, i_groups: i_first })
+        Ok((entries, DeviceCount { buffer: round, i_count: i_first + 3, i_groups: i_first }))
     }
 
     /// Composes `sorted`, the pairs of round `i_round` by bin, into `picture`; `pool` holds the

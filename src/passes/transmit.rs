@@ -16,12 +16,19 @@ use crate::layout::sums::SumMacros;
 record! {
     /// Push constants of `transmit.comp`.
     pub struct Push {
+        /// The density grid.
         grid: GridRecord,
+        /// Number of facets.
         n_facets: u32,
+        /// Number of lights.
         n_lights: u32,
+        /// Number of surfaces.
         n_surfaces: u32,
+        /// Length of a step of the march.
         step_length: f32,
+        /// Share 1 − g of extinction that counts.
         backward: f32,
+        /// The most steps of a march.
         max_steps: u32,
     }
 }

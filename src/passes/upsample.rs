@@ -7,21 +7,29 @@
 //! roundings of the sum of the weights' magnitudes, and one rounding to the format.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
-use crate::gpu::{TargetFormat, has_depth24};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, TargetFormat, has_depth24};
 use crate::layout::record;
 
 record! {
     /// Push constants of `upsample.comp`.
     pub struct Push {
+        /// Columns of the picture.
         width: u32,
+        /// Rows of the picture.
         height: u32,
+        /// Columns of the smaller picture.
         small_width: u32,
+        /// Rows of the smaller picture.
         small_height: u32,
+        /// The x of `Extents::offsets`.
         offset_x: u32,
+        /// The y of `Extents::offsets`.
         offset_y: u32,
+        /// Runs of pixels in a row.
         n_runs: u32,
+        /// Pairs of rows between the same rows of the smaller picture.
         n_pairs: u32,
+        /// Last texel of the smaller picture.
         last_texel: u32,
     }
 }
@@ -39,15 +47,16 @@ pub struct Extents {
     pub n: u32,
 }
 
-/// The buffers of the surfaces beneath the blobs.
-#[derive(Clone, Copy)]
-pub struct SolidBuffers<'a> {
-    /// Pixels of the surfaces' full picture.
-    pub under: &'a Buffer,
-    /// `f32` by small pixel: near/z.
-    pub small_depths: &'a Buffer,
-    /// `f32` by full pixel: near/z.
-    pub depths: &'a Buffer,
+bindings! {
+    /// The buffers of the surfaces beneath the blobs.
+    pub struct SolidBuffers {
+        /// Pixels of the surfaces' full picture.
+        under,
+        /// `f32` by small pixel: near/z.
+        small_depths,
+        /// `f32` by full pixel: near/z.
+        depths,
+    }
 }
 
 /// The pipeline of the pass.
@@ -116,9 +125,8 @@ impl Upsample {
         [small, picture]: [&Buffer; 2],
         solids: Option<SolidBuffers<'_>>,
     ) -> Result<()> {
-        let solids = solids.map(|s| [s.under, s.small_depths, s.depths]);
-        let buffers: Vec<_> =
-            [small, picture].into_iter().chain(solids.into_iter().flatten()).collect();
+        let mut buffers = vec![small, picture];
+        buffers.extend(solids.iter().flat_map(SolidBuffers::by_binding));
         rec.dispatch(&self.kernel, &buffers, &self.push, self.n_invocations)
     }
 }

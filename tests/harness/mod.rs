@@ -107,8 +107,7 @@ impl Gpu {
         let texts = [&[(file.as_str(), text)], passes::SHADERS].concat();
         let compiler =
             Compiler::new(nimbus::gpu::Sources::embedded(&texts), None).expect("shaderc");
-        nimbus::gpu::Kernel::new(&self.device, &compiler, name, push, &[])
-            .expect("the test's kernel")
+        nimbus::gpu::Kernel::new(&self.device, &compiler, name, push).expect("the test's kernel")
     }
 
     /// Returns a compiler of nimbus's shaders with `from` replaced by `to` in `file`: a faulty

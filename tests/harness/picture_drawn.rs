@@ -92,8 +92,8 @@ impl Picture {
             .is_some()
             .then(|| Image::depth(&gpu.device, "test.depth", width, height).expect("depth"));
         let camera = self.camera_record();
-        let n_numbers = 4 * target.n_pixels() as usize;
-        let bytes = target.n_pixels() * format.bytes_per_pixel();
+        let n_pixels = u64::from(width) * u64::from(height);
+        let (n_numbers, bytes) = (4 * n_pixels as usize, n_pixels * format.bytes_per_pixel());
         let readback = Buffer::new::<u8>(&gpu.device, "test.pixels", bytes, MemoryUsage::Readback)
             .expect("readback");
         gpu.run(|rec| {
@@ -216,7 +216,19 @@ impl Picture {
         target: Target<'_>,
         camera: &CameraRecord,
     ) -> Result<()> {
-        let from = BlobBuffers::from_bindings(uploaded.of_sprites.each_ref());
+        let [entries, placed, particles, lit, i_facet, i_group, drawn, textured, pool] =
+            uploaded.of_sprites.each_ref();
+        let from = BlobBuffers {
+            entries,
+            placed,
+            particles,
+            lit,
+            i_facet,
+            i_group,
+            drawn,
+            textured,
+            pool,
+        };
         let i_first_facet = uploaded.n_surface_facets;
         let n = BlobCount { n: RecordCount::Known(uploaded.n_entries), i_first_facet };
         let (cutoff, threshold) = (self.view.cutoff, self.view.threshold);

@@ -6,7 +6,7 @@ use nimbus::layout::facet::{FacetRecord, RunRecord};
 use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::grid::GridSpec;
-use nimbus::passes::facets::{Facets, ParticleBuffers, RunBuffers};
+use nimbus::passes::facets::{Facets, ParticleBuffers};
 use nimbus::passes::grid::Grid;
 use nimbus::reference::Blob;
 use nimbus::reference::facets::{
@@ -145,17 +145,21 @@ impl Scene {
             (gpu.upload(order), gpu.upload(&records), gpu.buffer::<u32>(n));
         gpu.run(|rec| {
             grid.record(rec, [&placed, &particles, &density], &self.record, n as u32, heaviest)?;
+            let buffers = ParticleBuffers {
+                placed: &placed,
+                particles: &particles,
+                i_group: &i_group,
+                groups: &groups,
+                density: &density,
+                facets: &made,
+            };
             if runs.is_empty() {
-                let buffers = [&placed, &particles, &i_group, &groups, &density, &made];
-                let buffers = ParticleBuffers::from_bindings(buffers);
                 return pass.record(rec, &buffers, &self.record, n as u32, N_SURFACE_FACETS as u32);
             }
-            let buffers = [
-                &placed, &particles, &i_group, &groups, &density, &order, &records, &made, &i_facet,
-            ];
             pass.record_runs(
                 rec,
-                &RunBuffers::from_bindings(buffers),
+                &buffers,
+                [&order, &records, &i_facet],
                 &self.record,
                 runs.len() as u32,
                 N_SURFACE_FACETS as u32,

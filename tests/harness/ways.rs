@@ -167,8 +167,14 @@ impl Case {
         let n_total = self.facets.len() * self.lights.len();
         let out = gpu.buffer::<f32>(n_total);
         let grid = GridRecord::from(&self.spec);
-        let buffers = [&facets, &lights, &regions, &density, &out, through];
-        let buffers = TransmitBuffers::from_bindings(buffers);
+        let buffers = TransmitBuffers {
+            facets: &facets,
+            lights: &lights,
+            regions: &regions,
+            density: &density,
+            transmittance: &out,
+            through,
+        };
         let [n_facets, n_lights, n_surfaces] = n;
         let march = MarchParams { n_facets, n_lights, n_surfaces, step_cells: step, forward };
         gpu.run(|rec| pass.record(rec, &buffers, &grid, &march));

@@ -11,8 +11,8 @@ use nimbus::layout::particle::{
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 use nimbus::passes::{
-    chunks, contract, cull, facets, first, generate, grid, impostors, live, morton, place, present,
-    second, sort, sprites, surfaces, terrain, texture, tiles, transmit, upsample,
+    blobs, chunks, contract, cull, facets, first, generate, grid, impostors, live, morton, place,
+    present, second, sort, sprites, surfaces, terrain, texture, tiles, transmit, upsample,
 };
 
 /// A host record: GLSL's name of it, its fields, its size.
@@ -58,13 +58,13 @@ pub const INTERFACES: [(&str, &[Field], &str); 49] = [
     ("contract.comp", contract::Push::FIELDS, "Facet Light T T F F 8 Lit"),
     ("cull_scan.comp", cull::ScanPush::FIELDS, "4 Kept"),
     ("cull_test.comp", cull::TestPush::FIELDS, "Placed Particle 4 Drawn 8 4"),
-    ("cull_write.comp", cull::WritePush::FIELDS, "Placed 8 4 8"),
+    ("cull_write.comp", blobs::KeyPush::FIELDS, "Placed 8 4 8"),
     ("facets.comp", facets::Push::FIELDS, "Placed Particle 4 Group F Facet"),
-    ("facets_groups.comp", facets::GroupsPush::FIELDS, "Placed Particle 4 Group F 4 Run Facet 4"),
+    ("facets_groups.comp", facets::Push::FIELDS, "Placed Particle 4 Group F Facet 4 Run 4"),
     ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, "T 4 Facet"),
     ("facets_terrain.comp", facets::TerrainPush::FIELDS, "T Facet Facet"),
     ("first.comp", first::Push::FIELDS, "Facet Light 4 T F Lit"),
-    ("first_tensor.comp", first::TensorPush::FIELDS, "Facet Light 4 T F 4 Lit"),
+    ("first_tensor.comp", first::TensorPush::FIELDS, "Facet Light 4 T F Lit 4"),
     ("generate.comp", generate::Push::FIELDS, "Box 4 Particle 4"),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, "Placed Particle 4"),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, "8 4"),
@@ -86,11 +86,11 @@ pub const INTERFACES: [(&str, &[Field], &str); 49] = [
     ("second_sources.comp", second::SourcesPush::FIELDS, "Facet Light 4 4 T 4 4 Source 16 Packed"),
     (
         "second_tensor.comp",
-        second::TensorPush::FIELDS,
+        second::GatherPush::FIELDS,
         "Block Pairing 4 4 Facet T Light T T F F Lit 4 4 T 4",
     ),
     ("sort_count.comp", sort::DigitPush::FIELDS, "4 8 4"),
-    ("sort_key.comp", sort::KeyPush::FIELDS, "Placed 4 Drawn 8"),
+    ("sort_key.comp", blobs::KeyPush::FIELDS, "Placed 4 Drawn 8"),
     ("sort_scan.comp", sort::DigitPush::FIELDS, "4 4"),
     ("sort_scatter.comp", sort::DigitPush::FIELDS, "4 8 4 8"),
     ("sprites.frag", sprites::Push::FIELDS, "- - - - - - - - T"),

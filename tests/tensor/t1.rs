@@ -54,8 +54,17 @@ fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
         n_rows,
         i_vectors: 0,
     };
-    let named = FirstTensorBuffers::from_bindings(buffers.each_ref());
-    gpu.run(|rec| pass.record(rec, &named, &push));
+    let [facet_records, light_records, transmittance, region_records, table, t1, lit] =
+        buffers.each_ref();
+    let named = FirstBuffers {
+        facets: facet_records,
+        lights: light_records,
+        transmittance,
+        regions: region_records,
+        table,
+        lit,
+    };
+    gpu.run(|rec| pass.record(rec, &named, t1, &push));
     let values =
         gpu.download::<f32>(&buffers[5], 2 * n_rows as usize).into_iter().map(f64::from).collect();
     let (mut truths, mut bounds) = (vec![0.0; 2 * n_rows as usize], vec![0.0; 2 * n_rows as usize]);

@@ -58,8 +58,6 @@ pub struct DeviceFrame {
     pub placed: Vec<PlacedRecord>,
     /// Particles relative to their groups' origins.
     pub particles: Vec<ParticleRecord>,
-    /// Attempts of every particle; bit 31 is set if the particle was folded back.
-    pub status: Vec<u32>,
     /// Facets; empty if the lighting mode is "none".
     pub facets: Vec<FacetRecord>,
     /// Light of the facets.
@@ -144,22 +142,23 @@ impl StressContext {
         Kernel::with_macros(self.device(), &compiler, name, push, &[], macros)
     }
 
-    /// Evaluates `vec4 probe(vec4 x) { body }` for every input. `body` may use the shader file
-    /// `include` and, unless `table` is empty, its elements as `samplerBuffer table`.
+    /// Evaluates `vec4 probe(vec4 x) { body }` for every input, and returns the inputs with their
+    /// values. `body` may use the shader file `include` and, unless `table` is empty, its elements
+    /// as `samplerBuffer table`.
     pub(super) fn probe(
         &mut self,
         include: &str,
         table: &[f32],
         body: &str,
-        inputs: &[[f32; 4]],
-    ) -> Result<Vec<[f32; 4]>> {
+        inputs: Vec<[f32; 4]>,
+    ) -> Result<impl Iterator<Item = ([f32; 4], [f32; 4])> + use<>> {
         let mut above = format!("#include \"each.glsl\"\n#include \"{include}\"\n");
         if !table.is_empty() {
             above.insert_str(0, "layout(binding = 2) uniform samplerBuffer table;\n");
         }
         let text = PROBE.replace("ABOVE", &above).replace("BODY", body);
         let kernel = self.kernel("probe", &text, ProbePush::FIELDS, &[])?;
-        let (x, y) = (self.upload(inputs)?, self.buffer::<[f32; 4]>(inputs.len())?);
+        let (x, y) = (self.upload(&inputs)?, self.buffer::<[f32; 4]>(inputs.len())?);
         let push = ProbePush { n: inputs.len() as u32 };
         if table.is_empty() {
             self.run(|rec| rec.dispatch(&kernel, &[&x, &y], &push, push.n))?;
@@ -167,7 +166,8 @@ impl StressContext {
             let table = self.upload(table)?;
             self.run(|rec| rec.dispatch(&kernel, &[&x, &y, &table], &push, push.n))?;
         }
-        self.download(&y, inputs.len())
+        let values = self.download(&y, inputs.len())?;
+        Ok(inputs.into_iter().zip(values))
     }
 
     /// Uploads `data` to a new device buffer.
@@ -229,7 +229,7 @@ impl StressContext {
         };
         let (rgba, bytes) = (renderer.image()?, renderer.image_bytes()?);
         let placed = renderer.placed(device)?;
-        let (particles, status) = renderer.generate_now(device)?;
-        Ok(DeviceFrame { rgba, bytes, placed, particles, status, facets, lit })
+        let (particles, _) = renderer.generate_now(device)?;
+        Ok(DeviceFrame { rgba, bytes, placed, particles, facets, lit })
     }
 }

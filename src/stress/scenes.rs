@@ -52,6 +52,11 @@ pub const LAW: BoxLaw = BoxLaw { optical_depth: OPTICAL_DEPTH, ..BoxLaw::new(For
 /// A sun in the zenith.
 pub const SUN_ABOVE: &str =
     "[[light]]\nkind = 'directional'\ndirection = [0, -1, 0]\nirradiance = [1, 1, 1]\n";
+/// Returns a sun that shines in `direction`.
+pub fn sun(direction: &str) -> String {
+    format!("[[light]]\nkind = 'directional'\ndirection = {direction}\nirradiance = [1, 1, 1]\n")
+}
+
 /// Keys of a diffuse grey material.
 pub const GREY: &str = "kd = [0.5, 0.5, 0.5]\n";
 

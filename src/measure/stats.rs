@@ -98,6 +98,12 @@ pub(super) fn percentile_of_sorted(sorted: &[f64], p: f64) -> f64 {
     sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
 }
 
+/// Returns the least and the greatest value; None for no value.
+pub fn extremes(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    let ends = values.into_iter().map(|value| (value, value));
+    ends.reduce(|(least, greatest), (value, _)| (least.min(value), greatest.max(value)))
+}
+
 /// Returns the mean; NaN for no value.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64

@@ -102,6 +102,16 @@ pub struct ReferenceRecord {
 }
 
 impl ReferenceRecord {
+    /// Returns the number of pixels of the picture.
+    pub fn n_all_pixels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
+    /// Returns whether the reference is known at every pixel.
+    pub fn is_everywhere(&self) -> bool {
+        self.n_pixels as u64 == self.n_all_pixels()
+    }
+
     /// Describes a reference at `pixels` of a frame.
     pub fn of(
         cached: &CachedReference,

@@ -12,6 +12,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::axis::{Axis, Tick};
 use super::medium::{GRID, INK, MUTED, Medium, PAPER};
 use super::number::number;
+use crate::studies::figure::Figure;
 
 /// The drawing area of a chart, between `top` and `bottom` pixels from the edges of `root`.
 pub struct Canvas<'a, DB: DrawingBackend> {
@@ -134,14 +135,17 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
         self.root.draw(&PathElement::new(self.pixels(points), style))
     }
 
-    /// Draws an interval along x or along y, with a cap at the ends that lie within the axis.
+    /// Draws the interval of a figure along `axis`, with a cap at the ends that lie within the axis.
+    /// `at` returns the place of a position on the axis.
     pub fn interval(
         &self,
-        ends: [(f64, f64); 2],
-        has_cap: [bool; 2],
+        axis: &Axis,
+        figure: Figure,
+        at: impl Fn(f64) -> (f64, f64),
         style: impl Into<ShapeStyle>,
     ) -> DrawResult<(), DB> {
-        let [a, b] = ends.map(|(x, y)| self.pixel(x, y));
+        let (Some(low), Some(high)) = (figure.low, figure.high) else { return Ok(()) };
+        let [a, b] = [low, high].map(|v| at(axis.clamped(v))).map(|(x, y)| self.pixel(x, y));
         let style = style.into();
         if a == b {
             return Ok(());
@@ -151,7 +155,7 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
             return Ok(());
         }
         let (dx, dy) = if a.1 == b.1 { (0, CAP_PX) } else { (CAP_PX, 0) };
-        for ((x, y), _) in [a, b].into_iter().zip(has_cap).filter(|(_, has_cap)| *has_cap) {
+        for ((x, y), _) in [(a, low), (b, high)].into_iter().filter(|(_, v)| axis.contains(*v)) {
             self.root.draw(&PathElement::new(vec![(x - dx, y - dy), (x + dx, y + dy)], style))?;
         }
         Ok(())

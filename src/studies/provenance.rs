@@ -9,8 +9,7 @@ use super::picture_error::magnitude;
 use super::reference_cache::CachedReference;
 use crate::gpu::DeviceInfo;
 use crate::io::scene_file::LoadedScene;
-use crate::reference::picture::Pixels;
-use crate::reference::picture::ReferenceKind;
+use crate::reference::picture::{Pixels, ReferenceKind};
 use crate::timing::machine::{self, Clocks, Cpu, Device};
 
 /// The conditions that a study was made under.

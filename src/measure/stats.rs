@@ -84,6 +84,7 @@ pub(super) fn finite(values: &[f64]) -> Vec<f64> {
     values.iter().copied().filter(|value| value.is_finite()).collect()
 }
 
+/// Returns the finite values in ascending order.
 pub(super) fn sorted_finite(values: &[f64]) -> Vec<f64> {
     let mut sorted = finite(values);
     sorted.sort_by(f64::total_cmp);

@@ -92,6 +92,9 @@ impl StressContext {
 
     /// Opens the device again with workgroups of `n` in the shaders that treat single records.
     /// Other workgroup sizes follow from subgroups or shared memory.
+    ///
+    /// # Errors
+    /// Fails if a shader declares no such workgroups, or the device cannot be opened.
     pub(super) fn with_workgroup_size(&self, n: u32) -> Result<StressContext> {
         let mut sources = self.sources.clone();
         for name in PER_RECORD {
@@ -104,6 +107,9 @@ impl StressContext {
     }
 
     /// Opens the device again with buffers that are filled with NaN at allocation.
+    ///
+    /// # Errors
+    /// Fails if the device cannot be opened.
     pub(super) fn with_poison(&self) -> Result<StressContext> {
         let choice = DeviceChoice { poison: true, ..self.choice.clone() };
         StressContext::with_sources(&choice, self.sources.clone())
@@ -130,6 +136,9 @@ impl StressContext {
     }
 
     /// Compiles a shader text, which may include nimbus's own files.
+    ///
+    /// # Errors
+    /// Fails if the text does not compile.
     pub(super) fn kernel(
         &self,
         name: &str,
@@ -145,6 +154,9 @@ impl StressContext {
     /// Evaluates `vec4 probe(vec4 x) { body }` for every input, and returns the inputs with their
     /// values. `body` may use the shader file `include` and, unless `table` is empty, its elements
     /// as `samplerBuffer table`.
+    ///
+    /// # Errors
+    /// Fails if `body` does not compile, or a Vulkan call fails.
     pub(super) fn probe(
         &mut self,
         include: &str,
@@ -171,6 +183,9 @@ impl StressContext {
     }
 
     /// Uploads `data` to a new device buffer.
+    ///
+    /// # Errors
+    /// Fails if memory runs out or the device is lost.
     pub(super) fn upload<T: Pod>(&mut self, data: &[T]) -> Result<Buffer> {
         let n = data.len() as u64;
         let mut staging =
@@ -182,11 +197,17 @@ impl StressContext {
     }
 
     /// Allocates a device buffer of `n` records of undefined content.
+    ///
+    /// # Errors
+    /// Fails if memory runs out.
     pub(super) fn buffer<T: Pod>(&self, n: usize) -> Result<Buffer> {
         Buffer::new::<T>(self.device(), "stress.buffer", n as u64, MemoryUsage::Device)
     }
 
     /// Reads the first `n` records of a device buffer.
+    ///
+    /// # Errors
+    /// Fails if memory runs out or the device is lost.
     pub(super) fn download<T: Pod>(&mut self, buffer: &Buffer, n: usize) -> Result<Vec<T>> {
         let readback =
             Buffer::new::<T>(self.device(), "stress.readback", n as u64, MemoryUsage::Readback)?;
@@ -202,6 +223,9 @@ impl StressContext {
     }
 
     /// Records commands, submits them and waits until they have run.
+    ///
+    /// # Errors
+    /// Fails if recording fails or the device is lost.
     pub(super) fn run(&mut self, f: impl FnOnce(&mut Recorder<'_>) -> Result<()>) -> Result<()> {
         self.commands.run(f).map(|_| ())
     }

@@ -14,6 +14,7 @@ use crate::model::cloud::CloudSource;
 use crate::model::gust::Gust;
 use crate::model::scene::{Scene, Threading};
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "determinism/runs",

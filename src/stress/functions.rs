@@ -11,6 +11,7 @@ use crate::model::basis::{N_NODES, evaluate, node};
 use crate::model::material::Brdf;
 use crate::reference::rounding::{DIVISION_ERROR, SINE_ERROR, U_F32, erf_bound};
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "functions/rounding",
@@ -179,7 +180,7 @@ fn neighbours(x: f32) -> [f32; 3] {
     [x.next_down(), x, x.next_up()]
 }
 
-/// Evaluates a GLSL expression of the float `x.x` for every input, and returns the inputs with their
+/// Evaluates a GLSL expression of the float `x.x` for every input. Returns the inputs with their
 /// values.
 fn evaluate_on_device(
     ctx: &mut StressContext,

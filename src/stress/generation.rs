@@ -16,6 +16,7 @@ use crate::reference::generate::{Generated, generate_particle, uniforms};
 use crate::reference::place::placed_bound;
 use crate::reference::rounding::{ParticleBound, U_F32, particle_bound, radius_bound};
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "generation/unit",

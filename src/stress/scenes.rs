@@ -61,6 +61,9 @@ pub fn sun(direction: &str) -> String {
 pub const GREY: &str = "kd = [0.5, 0.5, 0.5]\n";
 
 /// Parses the text of a scene that names no files.
+///
+/// # Errors
+/// Fails if the text is no scene.
 pub fn parse_scene(text: &str) -> Result<Scene> {
     Ok(parse(text.to_owned(), Path::new("stress.toml"), &[], None)?.scene)
 }
@@ -81,6 +84,9 @@ pub fn cloud_of(source: CloudSource) -> Cloud {
 }
 
 /// Parses a scene text and adds a cloud of boxes.
+///
+/// # Errors
+/// Fails if the text is no scene.
 pub fn box_scene(text: &str, boxes: Vec<CloudBox>) -> Result<Scene> {
     let mut scene = parse_scene(text)?;
     scene.clouds.push(cloud_of(CloudSource::Boxes { boxes, law: LAW }));
@@ -88,6 +94,9 @@ pub fn box_scene(text: &str, boxes: Vec<CloudBox>) -> Result<Scene> {
 }
 
 /// Parses a scene text with the keys `draw` of `[draw]` and adds a cloud of particles.
+///
+/// # Errors
+/// Fails if the text is no scene.
 pub fn blob_scene(text: &str, draw: &str, particles: Vec<Particle>) -> Result<Scene> {
     let mut scene = parse_scene(&format!("{text}[draw]\n{draw}\n"))?;
     scene.clouds.push(cloud_of(CloudSource::Particles(particles)));
@@ -95,6 +104,9 @@ pub fn blob_scene(text: &str, draw: &str, particles: Vec<Particle>) -> Result<Sc
 }
 
 /// Renders frame 0 of [`blob_scene`].
+///
+/// # Errors
+/// Fails if the text is no scene, or drawing it fails.
 pub fn render_blobs(
     ctx: &mut StressContext,
     text: &str,
@@ -158,6 +170,9 @@ pub fn corner(n: u32) -> [Surface; 3] {
 
 /// Returns a two-reflection scene of rectangles of one material; `lighting` holds more keys of
 /// `[lighting]`.
+///
+/// # Errors
+/// Fails if the text is no scene.
 pub fn surface_scene(
     lighting: &str,
     lights: &str,

@@ -8,6 +8,7 @@ use crate::model::philox::philox4x32_10;
 use crate::passes::sort::{Count, Sort};
 use crate::reference::sort::{key16, key32, order};
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "sorting/random",

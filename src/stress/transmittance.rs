@@ -11,6 +11,7 @@ use crate::model::cloud::{CloudSource, Particle};
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::rounding::U_F32;
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "transmittance/thin",

@@ -18,6 +18,7 @@ use crate::model::surface::Surface;
 use crate::reference::picture::FrameReference;
 use crate::reference::rounding::U_F32;
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "transport/coincident",

@@ -67,6 +67,9 @@ impl Attachments {
     }
 
     /// Writes all files into `folder`.
+    ///
+    /// # Errors
+    /// Fails if a file cannot be read or written.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         for CasePicture { i_case, width, height, rgb } in &self.pictures {
             write_bytes(&folder.join(picture_file(*i_case)), *width, *height, rgb)?;

@@ -128,6 +128,10 @@ pub fn parse_results(run: Run, text: &str, path: &Path) -> Result<BenchResults> 
     join(run, &parse_frames(text, path)?, path)
 }
 
+/// Joins a run with its frames; errors name `path`, the file of the frames.
+///
+/// # Errors
+/// Fails if the frames are not those of the run.
 pub(super) fn join(run: Run, table: &FrameTable, path: &Path) -> Result<BenchResults> {
     let mut by_name = timed_modes(table);
     let mut modes = Vec::new();

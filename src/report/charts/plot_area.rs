@@ -69,6 +69,9 @@ const CAP_PX: i32 = 3;
 
 impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     /// Draws two axes.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn new(
         canvas: &Canvas<'a, DB>,
         x: &Axis,
@@ -131,12 +134,18 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     }
 
     /// Draws a line through positions on the axes.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn line(&self, points: &[(f64, f64)], style: impl Into<ShapeStyle>) -> DrawResult<(), DB> {
         self.root.draw(&PathElement::new(self.pixels(points), style))
     }
 
-    /// Draws the interval of a figure along `axis`, with a cap at the ends that lie within the axis.
-    /// `at` returns the place of a position on the axis.
+    /// Draws the interval of a figure along `axis`, with a cap at the ends that lie within the
+    /// axis. `at` returns the place of a position on the axis.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn interval(
         &self,
         axis: &Axis,
@@ -162,6 +171,9 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     }
 
     /// Fills a polygon.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn polygon(
         &self,
         corners: &[(f64, f64)],
@@ -171,6 +183,9 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     }
 
     /// Draws a rectangle between two corners, px.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn rectangle(
         &self,
         [x0, y0, x1, y1]: [i32; 4],
@@ -180,6 +195,9 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     }
 
     /// Draws a marker of `radius` px at a pixel; in a terminal a character.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn marker(
         &self,
         at: (i32, i32),
@@ -199,11 +217,17 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     }
 
     /// Draws a character of a terminal.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn glyph(&self, glyph: char, at: (i32, i32), color: RGBColor) -> DrawResult<(), DB> {
         self.write(&glyph.to_string(), at, color, HPos::Left)
     }
 
     /// Draws text whose middle line goes through a pixel.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn write(
         &self,
         text: &str,
@@ -217,6 +241,9 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
 }
 
 /// Draws a marker of a picture.
+///
+/// # Errors
+/// Fails if the backend fails.
 pub fn draw_marker<DB: DrawingBackend>(
     root: &DrawingArea<DB, Shift>,
     at: (i32, i32),

@@ -21,6 +21,9 @@ pub fn case_name(case: &Case) -> String {
 }
 
 /// Returns the section of a bench.
+///
+/// # Errors
+/// Fails if a chart cannot be drawn or a picture cannot be read.
 pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
     let run = &results.run;
     let mut charts = Vec::new();

@@ -16,6 +16,9 @@ use crate::timing::difference::Difference;
 use crate::timing::results::BenchResults;
 
 /// Returns the comparison of two results. Results of different kinds have none.
+///
+/// # Errors
+/// Fails if a picture cannot be read.
 pub fn section(a: &Source, b: &Source) -> Result<Markup> {
     let folders = [a.folder.as_path(), &b.folder];
     let inner = match (&a.results, &b.results) {

@@ -21,6 +21,9 @@ use crate::studies::picture_error::PictureError;
 const REFERENCE_FILE: &str = "reference.png";
 
 /// Returns the section of a study.
+///
+/// # Errors
+/// Fails if the chart cannot be drawn or a picture cannot be read.
 pub fn section(study: &Study, folder: &Path) -> Result<Markup> {
     let caption = "Lower is more accurate, left is faster. Bars are 95 % intervals. The line joins \
         the configurations that no other configuration beats in both time and error. Point at a \
@@ -190,6 +193,9 @@ fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
 }
 
 /// Compares the configurations that two studies have in common.
+///
+/// # Errors
+/// Fails if a picture cannot be read.
 pub fn comparison(a: &Study, b: &Study, [folder_a, folder_b]: [&Path; 2]) -> Result<Markup> {
     let remarks: Vec<String> = [
         ("scenes", a.made.scene_hash != b.made.scene_hash),

@@ -11,6 +11,9 @@ use crate::report::charts::{number, with_interval};
 use crate::studies::ledger::records::{Ledger, Row};
 
 /// Returns the section of a ledger.
+///
+/// # Errors
+/// Fails if the chart cannot be drawn.
 pub fn section(ledger: &Ledger) -> Result<Markup> {
     let total = with_interval(ledger.total.value, ledger.total.low, ledger.total.high);
     let caption = "RMSE of two pictures that differ in that approximation alone, with 95 % \

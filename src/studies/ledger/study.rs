@@ -245,7 +245,8 @@ impl LedgerStudy<'_> {
 }
 
 /// Returns the time of configuration `i` divided by that of configuration `i + 1`, which has one
-/// approximation less. In every round the two are neighbours. None if the device does not draw both.
+/// approximation less. In every round the two are neighbours. None if the device does not draw
+/// both.
 fn time_ratio(rounds: &[Vec<TimedBlock>], i: usize) -> Option<Figure> {
     let ms = |block: &TimedBlock| median(&block.gpu_ms).or_else(|| median(&block.frame_ms));
     let of = |round: &Vec<TimedBlock>| {

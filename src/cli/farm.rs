@@ -150,7 +150,7 @@ fn table(plan: &Plan, status: &Status) -> String {
         notes.extend((s.n_differing > 0).then(|| format!("{} that differ", s.n_differing)));
         notes.extend(s.engine.clone());
         notes.extend(s.what.clone());
-        let (index, name, notes) = (s.index, s.state.name(), notes.join("; "));
+        let (index, name, notes) = (s.index, s.state, notes.join("; "));
         let (noun, items) = (plan.work.noun(), plan.shards[index].items());
         text += &format!("{index:>6}  {name:9}  {noun} {items:?}  {notes}\n");
     }

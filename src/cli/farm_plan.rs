@@ -9,12 +9,13 @@ use super::progress::progress;
 use super::scene::warnings;
 use crate::error::Result;
 use crate::farm::{
-    AnyWork, Cut, CutOptions, Estimate, FileModel, Frames, PictureFormat, Plan, PlanRequest, Rate,
+    AnyWork, Cut, CutOptions, Estimate, FileModel, Frames, Plan, PlanRequest, Rate,
     ReferenceDivision, RunOptions, ShardSize, calibrate, calibrate_by_farms, frames_workload,
     n_frames,
 };
 use crate::frame::DeviceChoice;
 use crate::io::atomic;
+use crate::io::image::ImageKind;
 use crate::io::scene_file::{self, LoadedScene};
 
 /// Frames of a shard without a cost model.
@@ -44,8 +45,9 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
         price_per_quantum,
         retry_share: args.retries.unwrap_or(USUAL_RETRIES),
     });
-    let estimate = |seconds: &Vec<f64>| Estimate::new(seconds, args.n_nodes(), rate);
-    let estimate = cut.predicted_s.as_ref().map(estimate).transpose()?;
+    let seconds: Option<Vec<f64>> = cut.parts.iter().map(|part| part.predicted_s).collect();
+    let estimate = |seconds: Vec<f64>| Estimate::new(&seconds, args.n_nodes(), rate);
+    let estimate = seconds.map(estimate).transpose()?;
     let plan = Plan::new(PlanRequest {
         scene: args.scene.clone(),
         set,
@@ -79,8 +81,8 @@ fn cut(args: &PlanArgs, set: &[String], loaded: &LoadedScene) -> Result<Cut> {
         n_nodes: args.n_nodes(),
     };
     let format = |usual| match args.format {
-        Some(FormatArg::Png) => PictureFormat::Png,
-        Some(FormatArg::Exr) => PictureFormat::Exr,
+        Some(FormatArg::Png) => ImageKind::Png,
+        Some(FormatArg::Exr) => ImageKind::Exr,
         None => usual,
     };
     if let Some(of) = args.reference {
@@ -90,7 +92,7 @@ fn cut(args: &PlanArgs, set: &[String], loaded: &LoadedScene) -> Result<Cut> {
             n_samples: args.samples,
             tile: args.tile,
             range: args.shard_samples,
-            format: format(PictureFormat::Exr),
+            format: format(ImageKind::Exr),
         };
         return request.cut(loaded, &options);
     }
@@ -100,7 +102,7 @@ fn cut(args: &PlanArgs, set: &[String], loaded: &LoadedScene) -> Result<Cut> {
         (farm_told::sweep(args, set)?, args.shard_cases, USUAL_CONFIGURATIONS)
     } else {
         let Span { first, end } = args.frames.unwrap_or_else(|| all_frames(loaded));
-        let format = format(PictureFormat::Png);
+        let format = format(ImageKind::Png);
         let work = AnyWork::Frames(Frames { first, n: end - first, format });
         ((work, frames_workload(loaded, first..end)?), args.shard_frames, USUAL_FRAMES)
     };

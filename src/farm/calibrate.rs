@@ -3,15 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::calibration::{Calibration, Machine, Row};
+use super::calibration::{Calibration, Row};
 use super::cost::{TimedRun, frames_workload};
 use super::cut::Cut;
 use super::manifest::Manifest;
 use super::plan::{Plan, PlanRequest};
 use super::run::{self, RunOptions};
 use super::store::{ResultState, Store};
-use super::work::{AnyWork, Frames, PictureFormat};
+use super::work::{AnyWork, Frames};
 use crate::error::{Error, Result};
+use crate::io::image::ImageKind;
 use crate::io::scene_file;
 
 /// Sizes of the pictures, relative to the scene's own along each side. They distinguish what grows
@@ -49,26 +50,26 @@ pub fn calibrate(
             }
         }
     }
-    let Some((of, machine)) = first else {
+    let Some((of, made)) = first else {
         return Err(Error::usage("expected a scene to calibrate by"));
     };
-    Calibration::new(of, rows, machine)
+    Calibration::new(of, rows, made)
 }
 
 /// Runs a shard of `n` frames in a temporary folder. Returns its duration, the kind of work and the
-/// machine.
+/// shard's manifest.
 fn timed(
     scene: &Path,
     set: &[String],
     [width, height]: [u32; 2],
     n: u32,
     options: &RunOptions<'_>,
-) -> Result<(Row, (String, Machine))> {
+) -> Result<(Row, (String, Manifest))> {
     let folder = tempfile::Builder::new().prefix("nimbus-calibrate-").tempdir();
     let folder = folder.map_err(|cause| Error::io(&std::env::temp_dir(), cause))?;
     let mut set = set.to_vec();
     set.extend([format!("film.width={width}"), format!("film.height={height}")]);
-    let work = AnyWork::Frames(Frames { first: 0, n, format: PictureFormat::Png });
+    let work = AnyWork::Frames(Frames { first: 0, n, format: ImageKind::Png });
     let plan = Plan::new(PlanRequest {
         scene: scene.to_owned(),
         set,
@@ -83,21 +84,14 @@ fn timed(
     run::run(folder.path(), 0, options)?;
     let seconds = begin.elapsed().as_secs_f64();
     let work = frames_workload(&loaded, 0..n)?.total();
-    let machine = match Store::new(folder.path(), &plan).state(plan.shard(0)?) {
-        ResultState::Verified(manifest) => machine_of(*manifest),
-        other => {
-            let what = format!("the shard of a calibration is not there: {other:?}");
-            return Err(Error::Fault { what });
-        }
+    let state = Store::new(folder.path(), &plan).state(plan.shard(0)?);
+    let ResultState::Verified(made) = state else {
+        let what = format!("the shard of a calibration is not there: {state:?}");
+        return Err(Error::Fault { what });
     };
     let what = format!("{}, {width}x{height}, {n} frames", scene.display());
     let row = Row { what, timed: TimedRun { setups: 1.0, work, seconds } };
-    Ok((row, (plan.work.kind(), machine)))
-}
-
-fn machine_of(manifest: Manifest) -> Machine {
-    let Manifest { device, cpu, environment, .. } = manifest;
-    Machine { device, cpu, environment }
+    Ok((row, (plan.work.kind(), *made)))
 }
 
 /// Fits a model to the shards of finished farms, as far as their amounts were counted and a single
@@ -106,7 +100,7 @@ fn machine_of(manifest: Manifest) -> Machine {
 /// # Errors
 /// When the farms were run by different builds or machines, or the shards do not determine a model.
 pub fn calibrate_by_farms(folders: &[PathBuf]) -> Result<Calibration> {
-    let (mut rows, mut first): (_, Option<(String, String, Machine)>) = (Vec::new(), None);
+    let (mut rows, mut first): (_, Option<(String, String, Manifest)>) = (Vec::new(), None);
     for folder in folders {
         let plan = Plan::read(folder)?;
         let (store, scene) = (Store::new(folder, &plan), plan.scene.file.display());
@@ -118,13 +112,12 @@ pub fn calibrate_by_farms(folders: &[PathBuf]) -> Result<Calibration> {
             };
             let (seconds, n_resumed) = (manifest.seconds, manifest.n_resumed);
             let class = manifest.class();
-            let machine = machine_of(*manifest);
             let words = format!(
                 "{kind}, build {}, {}, {}, environment {:?}",
-                plan.code, class.device, class.cpu, machine.environment
+                plan.code, class.device, class.cpu, manifest.environment
             );
             let (expected, ..) =
-                first.get_or_insert_with(|| (words.clone(), kind.clone(), machine));
+                first.get_or_insert_with(|| (words.clone(), kind.clone(), *manifest));
             if *expected != words {
                 return Err(Error::usage(format!(
                     "{}: shard {} was done by {words}; expected what did the first, {expected}",
@@ -138,8 +131,8 @@ pub fn calibrate_by_farms(folders: &[PathBuf]) -> Result<Calibration> {
             }
         }
     }
-    let Some((_, of, machine)) = first else {
+    let Some((_, of, made)) = first else {
         return Err(Error::usage("no shard of these farms is done and has its amounts counted"));
     };
-    Calibration::new(of, rows, machine)
+    Calibration::new(of, rows, made)
 }

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::cost::{Amounts, Fit, TimedRun, fit};
-use super::manifest::Class;
+use super::journal;
+use super::manifest::{Class, Manifest};
 use super::work::Work;
 use crate::error::{Error, Result};
-use crate::io::atomic;
 use crate::timing::json::{self, ResultFile};
 use crate::timing::machine::{self, Cpu, Device};
 
@@ -50,30 +50,19 @@ pub struct Row {
     pub timed: TimedRun,
 }
 
-/// The machine that runs were made on.
-#[derive(Debug, Clone)]
-pub struct Machine {
-    /// Its device.
-    pub device: Device,
-    /// Its processor.
-    pub cpu: Cpu,
-    /// The environment variables that affect times.
-    pub environment: BTreeMap<String, String>,
-}
-
 impl ResultFile for Calibration {
     const FILE: &'static str = "calibration";
     const SCHEMA: u32 = 1;
 }
 
 impl Calibration {
-    /// Fits a model to runs of one kind of work.
+    /// Fits a model to runs of one kind of work on the machine that `made` one of them.
     ///
     /// # Errors
     /// When the runs do not determine a model.
-    pub fn new(of: String, rows: Vec<Row>, machine: Machine) -> Result<Calibration> {
+    pub fn new(of: String, rows: Vec<Row>, made: Manifest) -> Result<Calibration> {
         let runs: Vec<TimedRun> = rows.iter().map(|row| row.timed).collect();
-        let Machine { device, cpu, environment } = machine;
+        let Manifest { device, cpu, environment, .. } = made;
         Ok(Calibration {
             schema: Calibration::SCHEMA,
             nimbus: env!("CARGO_PKG_VERSION").into(),
@@ -93,8 +82,7 @@ impl Calibration {
     /// # Errors
     /// When the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let text = serde_json::to_string_pretty(self).map_err(|cause| Error::io(path, cause))?;
-        atomic::write_synced(path, format!("{text}\n").as_bytes())
+        journal::write(path, self)
     }
 }
 

@@ -31,22 +31,30 @@ pub struct ShardSize {
 pub struct Cut {
     /// The work.
     pub work: AnyWork,
-    /// The number of items of each shard.
-    pub sizes: Vec<u32>,
-    /// The amounts of each shard; empty where they were not counted.
-    pub counted: Vec<Amounts>,
-    /// The predicted duration of each shard, where there is a model, s.
-    pub predicted_s: Option<Vec<f64>>,
+    /// The shards.
+    pub parts: Vec<Part>,
     /// The hardware that the durations are predicted for.
     pub predicted_for: Option<Class>,
+}
+
+/// A shard of some work.
+#[derive(Debug, Clone, Copy)]
+pub struct Part {
+    /// The number of its items.
+    pub n: u32,
+    /// Its amounts, where they were counted.
+    pub counted: Option<Amounts>,
+    /// Its predicted duration, where there is a model, s.
+    pub predicted_s: Option<f64>,
 }
 
 impl Cut {
     /// Makes all of the work one shard.
     pub fn single(work: AnyWork) -> Cut {
         let items = work.items();
-        let sizes = vec![(items.end - items.start) as u32];
-        Cut { work, sizes, counted: Vec::new(), predicted_s: None, predicted_for: None }
+        let n = (items.end - items.start) as u32;
+        let whole = Part { n, counted: None, predicted_s: None };
+        Cut { work, parts: vec![whole], predicted_for: None }
     }
 
     /// Divides work by the number of items asked for, else by the model, else by the usual number.
@@ -77,19 +85,14 @@ impl Cut {
             }
         };
         let mut rest = &items[..];
-        let counted: Vec<Amounts> = sizes
-            .iter()
-            .map(|n| {
-                let (part, after) = rest.split_at(*n as usize);
-                rest = after;
-                part.iter().copied().sum::<Amounts>() + *per_shard
-            })
-            .collect();
-        let predict = |model: &FileModel| {
-            counted.iter().map(|work| model.seconds(1.0, work)).collect::<Result<Vec<f64>>>()
+        let part = |n: u32| {
+            let (own, after) = rest.split_at(n as usize);
+            rest = after;
+            let amounts = own.iter().copied().sum::<Amounts>() + *per_shard;
+            let predicted_s = model.map(|model| model.seconds(1.0, &amounts)).transpose()?;
+            Ok(Part { n, counted: Some(amounts), predicted_s })
         };
-        let predicted_s = model.map(predict).transpose()?;
-        let predicted_for = model.map(FileModel::class);
-        Ok(Cut { work, sizes, counted, predicted_s, predicted_for })
+        let parts = sizes.into_iter().map(part).collect::<Result<_>>()?;
+        Ok(Cut { work, parts, predicted_for: model.map(FileModel::class) })
     }
 }

@@ -3,8 +3,9 @@
 use super::calibration::FileModel;
 use super::cost::{Amounts, PieceAmounts, Workload};
 use super::cut::{Cut, CutOptions, ShardSize};
-use super::work::{AnyWork, PictureFormat, ReferenceWork, Work};
+use super::work::{AnyWork, ReferenceWork, Work};
 use crate::error::Result;
+use crate::io::image::ImageKind;
 use crate::io::scene_file::LoadedScene;
 use crate::reference::picture::ReferenceKind;
 
@@ -32,7 +33,7 @@ pub struct ReferenceDivision {
     /// The samples of a range, where they were asked for: a power of two.
     pub range: Option<u32>,
     /// The format of the merged picture.
-    pub format: PictureFormat,
+    pub format: ImageKind,
 }
 
 impl ReferenceDivision {

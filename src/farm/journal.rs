@@ -1,4 +1,4 @@
-//! Append-only files of JSON lines that several processes share.
+//! Records as JSON: append-only files of lines that several processes share, and whole files.
 
 use std::fs;
 use std::io;
@@ -9,6 +9,7 @@ use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
 use crate::io::atomic;
+use crate::timing::json;
 
 /// Appends `record` as a line and syncs the file. The line is written by a single call, so that
 /// lines of two processes never mix.
@@ -18,6 +19,14 @@ use crate::io::atomic;
 pub fn append<T: Serialize>(path: &Path, record: &T) -> Result<()> {
     let line = serde_json::to_string(record).map_err(|cause| Error::io(path, cause))?;
     atomic::append_synced(path, &line)
+}
+
+/// Writes `record` to a file of its own and syncs it.
+///
+/// # Errors
+/// When the file cannot be written; transient where another try may succeed.
+pub fn write<T: Serialize>(path: &Path, record: &T) -> Result<()> {
+    atomic::write_synced(path, json::text(path, record)?.as_bytes())
 }
 
 /// Returns the records of a journal in their order. Lines that were cut off when their writer was

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use super::cost::Amounts;
-use super::cut::Cut;
+use super::cut::{Cut, Part};
 use super::manifest::Class;
 use super::scene_source::SceneSource;
 use super::work::AnyWork;
@@ -127,9 +127,7 @@ impl Plan {
             shards: Vec::new(),
         };
         let mut first = plan.work.items().start as u32;
-        for (index, n) in cut.sizes.into_iter().enumerate() {
-            let predicted_s = cut.predicted_s.as_ref().and_then(|all| all.get(index).copied());
-            let counted = cut.counted.get(index).copied();
+        for (index, Part { n, counted, predicted_s }) in cut.parts.into_iter().enumerate() {
             let key = plan.key(first, n);
             plan.shards.push(Shard { index, key, first, n, counted, predicted_s });
             first += n;
@@ -239,8 +237,8 @@ impl Plan {
     /// cannot be written.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let path = folder.join(Plan::FILE);
-        let text = serde_json::to_string_pretty(self).map_err(|cause| Error::io(&path, cause))?;
-        if text.len() as u64 >= RECORD_LIMIT {
+        let text = json::text(&path, self)?;
+        if text.len() as u64 > RECORD_LIMIT {
             let n = self.shards.len();
             return Err(Error::limit(format!(
                 "a plan of {n} shards is too large to be read again: expected fewer, longer ones"
@@ -251,7 +249,7 @@ impl Plan {
             return Err(Error::io(&path, what));
         }
         atomic::make_folder(folder)?;
-        atomic::write_new_synced(&path, format!("{text}\n").as_bytes())
+        atomic::write_new_synced(&path, text.as_bytes())
     }
 }
 

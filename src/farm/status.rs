@@ -1,6 +1,7 @@
 //! The state of every shard of a farm.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
 
 use serde::Serialize;
@@ -78,18 +79,10 @@ pub enum State {
     Open,
 }
 
-impl State {
-    /// Returns the name of the state.
-    pub fn name(self) -> &'static str {
-        match self {
-            State::Done => "done",
-            State::Broken => "broken",
-            State::Unreadable => "unreadable",
-            State::Transient => "transient",
-            State::Failed => "failed",
-            State::Begun => "begun",
-            State::Open => "open",
-        }
+/// The state's name, as in JSON.
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
     }
 }
 

@@ -147,10 +147,7 @@ impl Workplace {
     /// When the manifest cannot be written.
     pub fn finish(&self, manifest: Manifest) -> Result<()> {
         let manifest = Manifest { files: self.records(), ..manifest };
-        let path = self.path.join(MANIFEST_FILE);
-        let text =
-            serde_json::to_string_pretty(&manifest).map_err(|cause| Error::io(&path, cause))?;
-        atomic::write_synced(&path, format!("{text}\n").as_bytes())
+        journal::write(&self.path.join(MANIFEST_FILE), &manifest)
     }
 
     /// Removes the files that only attempts need, from a result in its final place.

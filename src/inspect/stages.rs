@@ -90,6 +90,18 @@ pub struct FacetRow {
     pub l2_b: f64,
 }
 
+impl FacetRow {
+    /// Returns I_d, I_i, L1 and L2.
+    fn lit(&self) -> [DVec3; 4] {
+        [
+            DVec3::new(self.id_r, self.id_g, self.id_b),
+            DVec3::new(self.ii_r, self.ii_g, self.ii_b),
+            DVec3::new(self.l1_r, self.l1_g, self.l1_b),
+            DVec3::new(self.l2_r, self.l2_g, self.l2_b),
+        ]
+    }
+}
+
 /// The generation of a box's particles.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BoxRow {
@@ -125,24 +137,15 @@ pub struct PlanRow {
 /// # Errors
 /// Fails if drawing the frame fails.
 pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
-    let packet = stage.game.step(i_frame)?;
-    let time_s = packet.time_s;
-    stage.renderer.step(packet)?;
+    let origin = draw(stage, i_frame)?.light_origin;
     let placed = stage.renderer.placed(&stage.device)?;
     let records = stage.renderer.generate_now(&stage.device)?.0;
     let groups = stage.scene.groups();
-    let origin = FrameState::at(&stage.scene, &groups, time_s)?.light_origin;
     let rows = placed.iter().zip(&records).enumerate().map(|(i, (p, r))| {
         let position = Vec3::from(p.position).as_dvec3() + origin;
         let color = Vec3::from(r.color).as_dvec3();
-        particle_row(
-            i,
-            cloud_of(&groups, i),
-            position,
-            f64::from(p.sigma),
-            f64::from(r.kappa),
-            color,
-        )
+        let [sigma, kappa] = [p.sigma, r.kappa].map(f64::from);
+        particle_row(i, cloud_of(&groups, i), position, sigma, kappa, color)
     });
     Ok(rows.collect())
 }
@@ -152,9 +155,7 @@ pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
 /// # Errors
 /// Fails if the scene has no such reference.
 pub fn particles_reference(scene: &Scene, i_frame: u32) -> Result<Vec<ParticleRow>> {
-    let mut unlit = scene.clone();
-    unlit.lighting.mode = LightingMode::None;
-    let truth = FrameReference::new(&unlit, scene.time.at(i_frame))?;
+    let truth = FrameReference::unlit(scene, scene.time.at(i_frame))?;
     let colors = colors(scene);
     let rows = truth.blobs.iter().zip(&colors).enumerate().map(|(i, (b, color))| {
         let position = b.position + truth.state.light_origin;
@@ -169,18 +170,14 @@ pub fn particles_reference(scene: &Scene, i_frame: u32) -> Result<Vec<ParticleRo
 /// Fails if the scene is not lit or drawing the frame fails.
 pub fn facets(stage: &mut Stage, i_frame: u32) -> Result<Vec<FacetRow>> {
     check_lit(&stage.scene)?;
-    let packet = stage.game.step(i_frame)?;
-    let time_s = packet.time_s;
-    stage.renderer.step(packet)?;
+    let FrameState { light_origin: origin, pose, .. } = draw(stage, i_frame)?;
     let (facets, lit) = stage.renderer.facets(&stage.device)?;
-    let setting = FrameState::at(&stage.scene, &stage.scene.groups(), time_s)?;
-    let (origin, eye) = (setting.light_origin, setting.pose.position);
     let rgb = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let rows = facets.iter().zip(&lit).enumerate().map(|(i, (f, l))| {
         let place = Vec3::from(f.position).as_dvec3() + origin;
         let normal = Vec3::from(f.normal).as_dvec3();
         let lit = [rgb(l.direct), rgb(l.indirect), rgb(l.first), rgb(l.second)];
-        let lit = toward_camera(&stage.scene, f.i_region, eye - place, normal, lit);
+        let lit = toward_camera(&stage.scene, f.i_region, pose.position - place, normal, lit);
         facet_row(i, f.i_region, [place, normal], f64::from(f.area), lit)
     });
     Ok(rows.collect())
@@ -222,18 +219,8 @@ pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
     let mean = |(i, place): (usize, [DVec3; 2])| {
         let own: Vec<&FacetRow> = rows.iter().filter(|r| r.region as usize == i).collect();
         let area: f64 = own.iter().map(|r| r.area).sum();
-        let of =
-            |value: fn(&FacetRow) -> f64| own.iter().map(|r| r.area * value(r)).sum::<f64>() / area;
-        let rgb = |r: fn(&FacetRow) -> f64, g: fn(&FacetRow) -> f64, b: fn(&FacetRow) -> f64| {
-            DVec3::new(of(r), of(g), of(b))
-        };
-        let lit = [
-            rgb(|r| r.id_r, |r| r.id_g, |r| r.id_b),
-            rgb(|r| r.ii_r, |r| r.ii_g, |r| r.ii_b),
-            rgb(|r| r.l1_r, |r| r.l1_g, |r| r.l1_b),
-            rgb(|r| r.l2_r, |r| r.l2_g, |r| r.l2_b),
-        ];
-        facet_row(i, i as u32, place, area, lit)
+        let mean = |k: usize| own.iter().map(|r| r.area * r.lit()[k]).sum::<DVec3>() / area;
+        facet_row(i, i as u32, place, area, [0, 1, 2, 3].map(mean))
     };
     surfaces.chain(scene.terrains.iter().map(of_ground)).enumerate().map(mean).collect()
 }
@@ -244,9 +231,8 @@ pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
 /// Fails if generating the particles fails.
 pub fn boxes(stage: &mut Stage) -> Result<Vec<BoxRow>> {
     let status = stage.renderer.generate_now(&stage.device)?.1;
-    let tries =
-        status.iter().map(|s| (u64::from(s & !FOLDED), s & FOLDED != 0)).collect::<Vec<_>>();
-    Ok(box_rows(&stage.scene, &tries))
+    let tries = status.iter().map(|s| (u64::from(s & !FOLDED), s & FOLDED != 0));
+    Ok(box_rows(&stage.scene, &tries.collect::<Vec<_>>()))
 }
 
 /// Returns the attempts and folded particles of every box from the reference.
@@ -311,6 +297,14 @@ pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
     let mode = stage.scene.threads.mode;
     stage.run(mode, 0..n_frames, on_frame)?;
     Ok(rows)
+}
+
+/// Draws a frame and returns its state.
+fn draw(stage: &mut Stage, i_frame: u32) -> Result<FrameState> {
+    let packet = stage.game.step(i_frame)?;
+    let time_s = packet.time_s;
+    stage.renderer.step(packet)?;
+    FrameState::at(&stage.scene, &stage.scene.groups(), time_s)
 }
 
 fn check_lit(scene: &Scene) -> Result<()> {

@@ -28,6 +28,12 @@ pub fn replace_files(
     if exchanged(folder, files, &write)? { Ok(()) } else { one_by_one(folder, files, &write) }
 }
 
+/// Returns the names of all entries of `folder`; none if it cannot be read.
+pub fn names(folder: &Path) -> impl Iterator<Item = String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.filter_map(|entry| entry.file_name().into_string().ok())
+}
+
 /// Checks that files can be made in `folder`.
 ///
 /// # Errors

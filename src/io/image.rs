@@ -8,6 +8,7 @@ use glam::DVec3;
 use image::codecs::openexr::OpenExrEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageFormat};
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::atomic::write_atomic;
@@ -15,7 +16,8 @@ use crate::error::{Error, Result};
 use crate::model::film::{Film, dither};
 
 /// Format of an image file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum ImageKind {
     /// 8-bit sRGB, tone-mapped, over the scene's background.
     Png,
@@ -37,6 +39,14 @@ impl ImageKind {
                 "{}: expected a file name that ends in .png or .exr",
                 path.display()
             ))),
+        }
+    }
+
+    /// Returns the extension of file names.
+    pub fn extension(self) -> &'static str {
+        match self {
+            ImageKind::Png => "png",
+            ImageKind::Exr => "exr",
         }
     }
 }

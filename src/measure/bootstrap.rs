@@ -1,10 +1,12 @@
 //! Confidence intervals of a median, a ratio of medians, or any statistic of lists of frames.
 
+use serde::Serialize;
+
 use super::random::SplitMix64;
 use super::stats::{finite, median_by_selection, percentile};
 
 /// An estimate and its 95 % interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Interval {
     /// The statistic of the lists themselves.
     pub estimate: f64,

@@ -84,6 +84,7 @@ pub(super) fn finite(values: &[f64]) -> Vec<f64> {
     values.iter().copied().filter(|value| value.is_finite()).collect()
 }
 
+/// Returns the finite values in ascending order.
 pub(super) fn sorted_finite(values: &[f64]) -> Vec<f64> {
     let mut sorted = finite(values);
     sorted.sort_by(f64::total_cmp);
@@ -96,6 +97,12 @@ pub(super) fn percentile_of_sorted(sorted: &[f64], p: f64) -> f64 {
     let below = position.floor() as usize;
     let above = (below + 1).min(sorted.len() - 1);
     sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
+}
+
+/// Returns the least and the greatest value; None for no value.
+pub fn extremes(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    let ends = values.into_iter().map(|value| (value, value));
+    ends.reduce(|(least, greatest), (value, _)| (least.min(value), greatest.max(value)))
 }
 
 /// Returns the mean; NaN for no value.

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::case::{Case, Comparison};
 use super::context::StressContext;
-use super::functions::half_vector_gap;
+use super::functions::{half_vector_gap, largest_bend, largest_step, lobe_table};
 use super::scenes::{rectangle, surface_scene};
 use crate::error::Result;
 use crate::model::basis::{Basis, N_NODES, Sampling, evaluate, node};
@@ -16,6 +16,7 @@ use crate::model::scene::{LightingMode, Scene};
 use crate::reference::area::reflectance;
 use crate::reference::rounding::U_F32;
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "brdf/opposite",
@@ -144,11 +145,10 @@ fn gaps(
     directions: impl Iterator<Item = [f32; 4]>,
     mut check: impl FnMut([f32; 4], [f32; 4]),
 ) -> Result<()> {
-    let inputs: Vec<[f32; 4]> = directions.collect();
     let body = "vec3 a = vec3(x.x, 0.0, x.y), b = vec3(x.z, 0.0, x.w), n = vec3(0.0, 0.0, 1.0); \
         return vec4(half_vector_gap(n, a, b), half_vector_gap(n, b, a), lobe_at(0u, 0.0), 0.0);";
-    let found = ctx.probe("lobe.glsl", &[0.0; 2], body, &inputs)?;
-    inputs.into_iter().zip(found).for_each(|(x, y)| check(x, y));
+    let found = ctx.probe("lobe.glsl", &[0.0; 2], body, directions.collect())?;
+    found.for_each(|(x, y)| check(x, y));
     Ok(())
 }
 
@@ -179,8 +179,7 @@ fn black(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
 fn first(ctx: &mut StressContext, c: &mut Comparison, material: [f64; 3]) -> Result<()> {
     let mut scene = floor(material)?;
     scene.lighting.mode = LightingMode::First;
-    let lobe: Vec<f64> = (0..N_NODES).map(|i| Brdf::lobe(material[2], node(i))).collect();
-    first_with(ctx, c, &scene, material, &lobe)
+    first_with(ctx, c, &scene, material, &lobe_table(material[2]))
 }
 
 /// Compares L1 of a scene's floor with that of the lobe whose values at the nodes are `lobe`.
@@ -193,11 +192,9 @@ fn first_with(
 ) -> Result<()> {
     let frame = ctx.render(scene, 0)?;
     let table = device_lobe(scene, ns);
-    let is_exact = (0..N_NODES).all(|i| lobe[i] == Brdf::lobe(ns, node(i)));
+    let is_exact = lobe == lobe_table(ns);
     let (surface, light) = (&scene.surfaces[0], &scene.lights[0]);
     let eye = scene.camera.keys[0].position;
-    let max_step =
-        |values: &[f64]| values.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
     for (i, lit) in (0u32..).zip(&frame.lit) {
         let (p, n) = (surface.facet_center(i), surface.normal());
         let (arrival, toward) = (light.arrival(p), (eye - p).normalize());
@@ -211,16 +208,13 @@ fn first_with(
         let t = w.sqrt().sqrt() * (N_NODES - 1) as f64;
         let here = (t as usize).saturating_sub(1)..((t as usize) + 3).min(N_NODES);
         let entry = here.clone().map(|k| (table[k] - lobe[k]).abs()).fold(0.0, f64::max);
-        let bend = lobe[here.clone()]
-            .windows(3)
-            .map(|w| (w[2] - 2.0 * w[1] + w[0]).abs())
-            .fold(0.0, f64::max);
+        let bend = largest_bend(&lobe[here.clone()]);
         // The gap is off by 15.6 u |chord|, and by as much again by the directions' own 9 u. In
         // total 31 u |chord|, which moves t by 16 u/|chord| of itself. Its roots add 16 u.
         let chord = (n - h).length();
         let off = (16.0 + 16.0 / chord.max(1e-3)) * U_F32 * t.max(1.0);
         let rounding = 8.0 * U_F32 * table.iter().map(|v| v.abs()).fold(0.0, f64::max);
-        let of_lobe = entry + 1.5 * bend / 8.0 + off * max_step(&table[here]) + rounding;
+        let of_lobe = entry + 1.5 * bend / 8.0 + off * largest_step(&table[here]) + rounding;
         let bound = irradiance * ks * of_lobe + 32.0 * U_F32 * truth.abs();
         c.add(lit.first[0], truth, bound, format_args!("L1 of facet {i}"));
     }

@@ -3,6 +3,7 @@
 use std::fmt::Display;
 use std::time::Instant;
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::context::StressContext;
@@ -107,10 +108,10 @@ impl Comparison {
         // An infinite error exceeds every bound, even an infinite one.
         let is_within = error <= bound && error.is_finite();
         self.n_beyond += usize::from(!is_within);
-        let share = if error == 0.0 { 0.0 } else { error / bound };
+        let found = Worst { at: String::new(), value, truth, error, bound };
         // If every value is exact, the first one is reported.
-        if self.worst.as_ref().is_none_or(|worst| share > worst.share()) {
-            self.worst = Some(Worst { at: at.to_string(), value, truth, error, bound });
+        if self.worst.as_ref().is_none_or(|worst| found.share() > worst.share()) {
+            self.worst = Some(Worst { at: at.to_string(), ..found });
         }
     }
 
@@ -130,6 +131,13 @@ impl Comparison {
         for (i, (value, truth)) in values.into_iter().zip(truths).enumerate() {
             let truth = truth.into();
             self.add(value, truth, bound(truth), format_args!("{at}, number {i}"));
+        }
+    }
+
+    /// Adds the components of a vector.
+    pub fn vector(&mut self, value: [f32; 3], truth: DVec3, bound: DVec3, at: impl Display) {
+        for axis in 0..3 {
+            self.add(value[axis], truth[axis], bound[axis], format_args!("{at}, axis {axis}"));
         }
     }
 

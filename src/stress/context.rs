@@ -58,8 +58,6 @@ pub struct DeviceFrame {
     pub placed: Vec<PlacedRecord>,
     /// Particles relative to their groups' origins.
     pub particles: Vec<ParticleRecord>,
-    /// Attempts of every particle; bit 31 is set if the particle was folded back.
-    pub status: Vec<u32>,
     /// Facets; empty if the lighting mode is "none".
     pub facets: Vec<FacetRecord>,
     /// Light of the facets.
@@ -94,6 +92,9 @@ impl StressContext {
 
     /// Opens the device again with workgroups of `n` in the shaders that treat single records.
     /// Other workgroup sizes follow from subgroups or shared memory.
+    ///
+    /// # Errors
+    /// Fails if a shader declares no such workgroups, or the device cannot be opened.
     pub(super) fn with_workgroup_size(&self, n: u32) -> Result<StressContext> {
         let mut sources = self.sources.clone();
         for name in PER_RECORD {
@@ -106,6 +107,9 @@ impl StressContext {
     }
 
     /// Opens the device again with buffers that are filled with NaN at allocation.
+    ///
+    /// # Errors
+    /// Fails if the device cannot be opened.
     pub(super) fn with_poison(&self) -> Result<StressContext> {
         let choice = DeviceChoice { poison: true, ..self.choice.clone() };
         StressContext::with_sources(&choice, self.sources.clone())
@@ -132,6 +136,9 @@ impl StressContext {
     }
 
     /// Compiles a shader text, which may include nimbus's own files.
+    ///
+    /// # Errors
+    /// Fails if the text does not compile.
     pub(super) fn kernel(
         &self,
         name: &str,
@@ -144,22 +151,26 @@ impl StressContext {
         Kernel::with_macros(self.device(), &compiler, name, push, &[], macros)
     }
 
-    /// Evaluates `vec4 probe(vec4 x) { body }` for every input. `body` may use the shader file
-    /// `include` and, unless `table` is empty, its elements as `samplerBuffer table`.
+    /// Evaluates `vec4 probe(vec4 x) { body }` for every input, and returns the inputs with their
+    /// values. `body` may use the shader file `include` and, unless `table` is empty, its elements
+    /// as `samplerBuffer table`.
+    ///
+    /// # Errors
+    /// Fails if `body` does not compile, or a Vulkan call fails.
     pub(super) fn probe(
         &mut self,
         include: &str,
         table: &[f32],
         body: &str,
-        inputs: &[[f32; 4]],
-    ) -> Result<Vec<[f32; 4]>> {
+        inputs: Vec<[f32; 4]>,
+    ) -> Result<impl Iterator<Item = ([f32; 4], [f32; 4])> + use<>> {
         let mut above = format!("#include \"each.glsl\"\n#include \"{include}\"\n");
         if !table.is_empty() {
             above.insert_str(0, "layout(binding = 2) uniform samplerBuffer table;\n");
         }
         let text = PROBE.replace("ABOVE", &above).replace("BODY", body);
         let kernel = self.kernel("probe", &text, ProbePush::FIELDS, &[])?;
-        let (x, y) = (self.upload(inputs)?, self.buffer::<[f32; 4]>(inputs.len())?);
+        let (x, y) = (self.upload(&inputs)?, self.buffer::<[f32; 4]>(inputs.len())?);
         let push = ProbePush { n: inputs.len() as u32 };
         if table.is_empty() {
             self.run(|rec| rec.dispatch(&kernel, &[&x, &y], &push, push.n))?;
@@ -167,10 +178,14 @@ impl StressContext {
             let table = self.upload(table)?;
             self.run(|rec| rec.dispatch(&kernel, &[&x, &y, &table], &push, push.n))?;
         }
-        self.download(&y, inputs.len())
+        let values = self.download(&y, inputs.len())?;
+        Ok(inputs.into_iter().zip(values))
     }
 
     /// Uploads `data` to a new device buffer.
+    ///
+    /// # Errors
+    /// Fails if memory runs out or the device is lost.
     pub(super) fn upload<T: Pod>(&mut self, data: &[T]) -> Result<Buffer> {
         let n = data.len() as u64;
         let mut staging =
@@ -182,11 +197,17 @@ impl StressContext {
     }
 
     /// Allocates a device buffer of `n` records of undefined content.
+    ///
+    /// # Errors
+    /// Fails if memory runs out.
     pub(super) fn buffer<T: Pod>(&self, n: usize) -> Result<Buffer> {
         Buffer::new::<T>(self.device(), "stress.buffer", n as u64, MemoryUsage::Device)
     }
 
     /// Reads the first `n` records of a device buffer.
+    ///
+    /// # Errors
+    /// Fails if memory runs out or the device is lost.
     pub(super) fn download<T: Pod>(&mut self, buffer: &Buffer, n: usize) -> Result<Vec<T>> {
         let readback =
             Buffer::new::<T>(self.device(), "stress.readback", n as u64, MemoryUsage::Readback)?;
@@ -202,6 +223,9 @@ impl StressContext {
     }
 
     /// Records commands, submits them and waits until they have run.
+    ///
+    /// # Errors
+    /// Fails if recording fails or the device is lost.
     pub(super) fn run(&mut self, f: impl FnOnce(&mut Recorder<'_>) -> Result<()>) -> Result<()> {
         self.commands.run(f).map(|_| ())
     }
@@ -229,7 +253,7 @@ impl StressContext {
         };
         let (rgba, bytes) = (renderer.image()?, renderer.image_bytes()?);
         let placed = renderer.placed(device)?;
-        let (particles, status) = renderer.generate_now(device)?;
-        Ok(DeviceFrame { rgba, bytes, placed, particles, status, facets, lit })
+        let (particles, _) = renderer.generate_now(device)?;
+        Ok(DeviceFrame { rgba, bytes, placed, particles, facets, lit })
     }
 }

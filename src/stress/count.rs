@@ -15,6 +15,7 @@ use crate::model::count::{Count, DrawnCount, MIN_DRAWN};
 use crate::reference::count::weights;
 use crate::reference::rounding::U_F32;
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "count/at-the-eye",

@@ -9,12 +9,12 @@ use super::case::{Case, Comparison};
 use super::context::StressContext;
 use super::scenes::{LIT, PATHS, blob_cluster, box_scene, centred_box, cloud_of};
 use crate::error::Result;
-use crate::frame::Renderer;
-use crate::frame::{FrameTimes, parallel, serial};
+use crate::frame::{FrameTimes, Renderer, parallel, serial};
 use crate::model::cloud::CloudSource;
 use crate::model::gust::Gust;
 use crate::model::scene::{Scene, Threading};
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "determinism/runs",

@@ -11,6 +11,7 @@ use crate::model::basis::{N_NODES, evaluate, node};
 use crate::model::material::Brdf;
 use crate::reference::rounding::{DIVISION_ERROR, SINE_ERROR, U_F32, erf_bound};
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "functions/rounding",
@@ -87,7 +88,7 @@ pub const CASES: &[Case] = &[
         bound: "|value| <= 1 + 4 u",
         check: |ctx, c| {
             let x = [sweep(1e5, 3.3e38, N / 2), vec![f32::MAX, f32::MIN]].concat();
-            for (x, y) in x.iter().zip(evaluate_on_device(ctx, "sine(x.x)", &x)?) {
+            for (x, y) in evaluate_on_device(ctx, "sine(x.x)", &x)? {
                 c.add(y.clamp(-1.0, 1.0), y, SINE_ERROR, format_args!("x = {x:e}"));
             }
             Ok(())
@@ -179,11 +180,16 @@ fn neighbours(x: f32) -> [f32; 3] {
     [x.next_down(), x, x.next_up()]
 }
 
-/// Evaluates a GLSL expression of the float `x.x` for every input.
-fn evaluate_on_device(ctx: &mut StressContext, glsl: &str, inputs: &[f32]) -> Result<Vec<f64>> {
-    let inputs: Vec<[f32; 4]> = inputs.iter().map(|x| [*x, 0.0, 0.0, 0.0]).collect();
-    let values = ctx.probe("functions.glsl", &[], &format!("return vec4({glsl});"), &inputs)?;
-    Ok(values.into_iter().map(|y| f64::from(y[0])).collect())
+/// Evaluates a GLSL expression of the float `x.x` for every input. Returns the inputs with their
+/// values.
+fn evaluate_on_device(
+    ctx: &mut StressContext,
+    glsl: &str,
+    inputs: &[f32],
+) -> Result<impl Iterator<Item = (f32, f64)> + use<>> {
+    let inputs = inputs.iter().map(|x| [*x, 0.0, 0.0, 0.0]).collect();
+    let found = ctx.probe("functions.glsl", &[], &format!("return vec4({glsl});"), inputs)?;
+    Ok(found.map(|(x, y)| (x[0], f64::from(y[0]))))
 }
 
 /// Compares a GLSL expression of the float `x.x` with `truth(x)`; `bound(x, truth(x))`.
@@ -195,8 +201,8 @@ fn compare(
     truth: impl Fn(f64) -> f64,
     bound: impl Fn(f64, f64) -> f64,
 ) -> Result<()> {
-    for (x, value) in inputs.iter().zip(evaluate_on_device(ctx, glsl, inputs)?) {
-        let x = f64::from(*x);
+    for (x, value) in evaluate_on_device(ctx, glsl, inputs)? {
+        let x = f64::from(x);
         let truth = truth(x);
         c.add(value, truth, bound(x, truth), format_args!("x = {x:e}"));
     }
@@ -216,11 +222,10 @@ fn pairs() -> Vec<[f32; 4]> {
 }
 
 fn rounding(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
-    let pairs = pairs();
     let body =
         "precise float s = x.x + x.y, d = x.x - x.y, p = x.x * x.y; return vec4(s, d, p, 0.0);";
-    for ([a, b, ..], y) in pairs.iter().zip(ctx.probe("functions.glsl", &[], body, &pairs)?) {
-        let (a, b) = (f64::from(*a), f64::from(*b));
+    for ([a, b, ..], y) in ctx.probe("functions.glsl", &[], body, pairs())? {
+        let (a, b) = (f64::from(a), f64::from(b));
         for (y, (sign, exact)) in y.into_iter().zip([("+", a + b), ("-", a - b), ("*", a * b)]) {
             // Rounding to f64 first is harmless: f64 has more than 2·24 + 2 digits.
             c.exact(y, exact as f32, format_args!("{a:e} {sign} {b:e}"));
@@ -230,10 +235,8 @@ fn rounding(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
 }
 
 fn division(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
-    let pairs = pairs();
-    let found = ctx.probe("functions.glsl", &[], "return vec4(x.x / x.y);", &pairs)?;
-    for ([a, b, ..], y) in pairs.iter().zip(found) {
-        let truth = f64::from(*a) / f64::from(*b);
+    for ([a, b, ..], y) in ctx.probe("functions.glsl", &[], "return vec4(x.x / x.y);", pairs())? {
+        let truth = f64::from(a) / f64::from(b);
         c.add(y[0], truth, 2.5 * ulp(truth), format_args!("{a:e} / {b:e}"));
     }
     Ok(())
@@ -252,12 +255,12 @@ fn sine(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
 }
 
 fn unit_vectors(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
-    let turns: Vec<[f32; 4]> = (-(1 << 19)..=1 << 19)
+    let turns = (-(1 << 19)..=1 << 19)
         .map(|i| [(f64::from(i) / f64::from(1 << 20)) as f32, 0.0, 0.0, 0.0])
         .collect();
     let body = "return vec4(unit_at(x.x), 0.0, 0.0);";
-    for ([turn, ..], y) in turns.iter().zip(ctx.probe("functions.glsl", &[], body, &turns)?) {
-        let (sin, cos) = (TAU * f64::from(*turn)).sin_cos();
+    for ([turn, ..], y) in ctx.probe("functions.glsl", &[], body, turns)? {
+        let (sin, cos) = (TAU * f64::from(turn)).sin_cos();
         c.add(y[0], cos, 10.0 * U_F32, format_args!("cos of {turn} turns"));
         c.add(y[1], sin, 10.0 * U_F32, format_args!("sin of {turn} turns"));
     }
@@ -281,7 +284,7 @@ pub(super) fn half_vector_gap(directions: [f32; 4]) -> (f64, f64) {
 fn half_vector(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     // Two directions in the xz plane on either side of one at an angle to the normal. Every fourth
     // pair is nearly opposite, so that the length of its sum goes down to 1e-6.
-    let inputs: Vec<[f32; 4]> = (0..100_000)
+    let inputs = (0..100_000)
         .map(|i| {
             let share = f64::from(i) / 100_000.0;
             let angle = 1e-6 * (PI / 2.0 * 1e6f64).powf(share);
@@ -297,11 +300,26 @@ fn half_vector(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     // lobe_at keeps the table bound.
     let body = "float gap = half_vector_gap(vec3(0.0, 0.0, 1.0), vec3(x.x, 0.0, x.y), \
         vec3(x.z, 0.0, x.w)); return vec4(gap, lobe_at(0u, 0.0), 0.0, 0.0);";
-    for (x, y) in inputs.iter().zip(ctx.probe("lobe.glsl", &[0.0; 2], body, &inputs)?) {
-        let (truth, bound) = half_vector_gap(*x);
+    for (x, y) in ctx.probe("lobe.glsl", &[0.0; 2], body, inputs)? {
+        let (truth, bound) = half_vector_gap(x);
         c.add(y[0], truth, bound, format_args!("half of the squared chord, {truth:e}"));
     }
     Ok(())
+}
+
+/// Returns the lobe of exponent `ns` at the nodes of the device's table.
+pub(super) fn lobe_table(ns: f64) -> Vec<f64> {
+    (0..N_NODES).map(|i| Brdf::lobe(ns, node(i))).collect()
+}
+
+/// Returns the greatest difference of neighbours.
+pub(super) fn largest_step(values: &[f64]) -> f64 {
+    values.windows(2).map(|v| (v[1] - v[0]).abs()).fold(0.0, f64::max)
+}
+
+/// Returns the greatest second difference.
+pub(super) fn largest_bend(values: &[f64]) -> f64 {
+    values.windows(3).map(|v| (v[2] - 2.0 * v[1] + v[0]).abs()).fold(0.0, f64::max)
 }
 
 fn lobe(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
@@ -310,11 +328,11 @@ fn lobe(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
         .map(|i| [((f64::from(i) + 0.37) / 20_000.0).powi(4) as f32, 0.0, 0.0, 0.0])
         .collect();
     for ns in [0.0, 1.0, 12.0, 300.0, 1e4, 1e6] {
-        let table: Vec<f64> = (0..N_NODES).map(|i| Brdf::lobe(ns, node(i))).collect();
+        let table = lobe_table(ns);
         let rounded: Vec<f32> = table.iter().map(|v| *v as f32).collect();
-        let found = ctx.probe("lobe.glsl", &rounded, "return vec4(lobe_at(0u, x.x));", &inputs)?;
-        for ([w, ..], y) in inputs.iter().zip(found) {
-            let w = f64::from(*w);
+        let body = "return vec4(lobe_at(0u, x.x));";
+        for ([w, ..], y) in ctx.probe("lobe.glsl", &rounded, body, inputs.clone())? {
+            let w = f64::from(w);
             let t = w.sqrt().sqrt() * (N_NODES - 1) as f64;
             // Two roots of 9.1 u each, the first halved by the second, and two products: 16 u of
             // t, which is measured in nodes.
@@ -322,15 +340,13 @@ fn lobe(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
             let i = (t as usize).clamp(1, N_NODES - 2);
             // The steepest of the three intervals around t; rounding of entries and interpolation.
             let around = &table[i - 1..(i + 3).min(N_NODES)];
-            let steep = around.windows(2).map(|p| (p[1] - p[0]).abs()).fold(0.0, f64::max);
             let largest = table[i - 1].abs().max(table[i].abs());
-            let rounding = off * steep + 4.0 * U_F32 * largest + f64::from(f32::MIN_POSITIVE);
+            let rounding =
+                off * largest_step(around) + 4.0 * U_F32 * largest + f64::from(f32::MIN_POSITIVE);
             let truth = evaluate(&table, w);
             c.add(y[0], truth, rounding, format_args!("table of n = {ns:e} at w = {w:e}"));
             // The second difference is h² |f''| but for the next order, at most half of it here.
-            let bend =
-                around.windows(3).map(|p| (p[2] - 2.0 * p[1] + p[0]).abs()).fold(0.0, f64::max);
-            let bound = rounding + 1.5 * bend / 8.0;
+            let bound = rounding + 1.5 * largest_bend(around) / 8.0;
             c.add(y[0], Brdf::lobe(ns, w), bound, format_args!("cos^n of n = {ns:e} at w = {w:e}"));
         }
     }
@@ -351,9 +367,8 @@ fn vectors(low: f64, high: f64) -> Vec<[f32; 4]> {
 const UNIT: &str = "return vec4(unit(x.xyz), 0.0);";
 
 fn normalize(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
-    let inputs = vectors(1e-14, 1e18);
-    for (x, y) in inputs.iter().zip(ctx.probe("functions.glsl", &[], UNIT, &inputs)?) {
-        let v = Vec3::from_slice(x).as_dvec3();
+    for (x, y) in ctx.probe("functions.glsl", &[], UNIT, vectors(1e-14, 1e18))? {
+        let v = Vec3::from_slice(&x).as_dvec3();
         // The square rounds three products and two sums, halved by the root; the root 4 u, the
         // last product u.
         let bound = |truth: f64| 9.0 * U_F32 * truth.abs() + 1e-37;
@@ -364,7 +379,7 @@ fn normalize(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
 
 fn normalize_ends(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     let inputs = [vectors(1e-38, 1e-15), vec![[0.0; 4]]].concat();
-    for (x, y) in inputs.iter().zip(ctx.probe("functions.glsl", &[], UNIT, &inputs)?) {
+    for (x, y) in ctx.probe("functions.glsl", &[], UNIT, inputs)? {
         let length = y[..3].iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
         c.add((length - 1.0).max(0.0), 0.0, 18.0 * U_F32, format_args!("{x:?}"));
         c.holds(length.is_finite(), format_args!("finite vector of {x:?}"));

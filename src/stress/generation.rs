@@ -16,6 +16,7 @@ use crate::reference::generate::{Generated, generate_particle, uniforms};
 use crate::reference::place::placed_bound;
 use crate::reference::rounding::{ParticleBound, U_F32, particle_bound, radius_bound};
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "generation/unit",
@@ -161,16 +162,9 @@ fn particles(ctx: &mut StressContext, c: &mut Comparison, b: CloudBox) -> Result
         }
         c.holds(n_attempts == truth.n_attempts, format_args!("attempts of particle {i}"));
         c.holds(is_folded == truth.folded, format_args!("fold of particle {i}"));
-        for axis in 0..3 {
-            // Products below the smallest normal number may be flushed to 0.
-            let bound = bound.position[axis] + f64::from(f32::MIN_POSITIVE);
-            c.add(
-                record.position[axis],
-                truth.position[axis],
-                bound,
-                format_args!("position of particle {i}, axis {axis}"),
-            );
-        }
+        // Products below the smallest normal number may be flushed to 0.
+        let off = bound.position + f64::from(f32::MIN_POSITIVE);
+        c.vector(record.position, truth.position, off, format_args!("position of particle {i}"));
         let bound = bound.radius * SIGMA_PER_RADIUS;
         c.add(record.sigma, truth.sigma, bound, format_args!("sigma of particle {i}"));
     })?;
@@ -189,13 +183,10 @@ fn spread(ctx: &mut StressContext, c: &mut Comparison, b: CloudBox) -> Result<()
             return;
         }
         let u = uniforms(SEED, 0, i, n_attempts.saturating_sub(1));
-        for (axis, u) in u[..3].iter().enumerate() {
-            // P (6): |P_x| is at most pi/2 and, by P (5), pi; half of the sum is added.
-            let truth = 0.5 * (2.0 * u - 1.0) * b.extent[axis];
-            let bound = 0.75 * PI * 1.001 + 4.0 * U_F32 * b.extent[axis];
-            let at = format_args!("position of particle {i}, axis {axis}");
-            c.add(record.position[axis], truth, bound, at);
-        }
+        // P (6): |P_x| is at most pi/2 and, by P (5), pi; half of the sum is added.
+        let truth = 0.5 * (2.0 * DVec3::from_slice(&u) - 1.0) * b.extent;
+        let bound = 0.75 * PI * 1.001 + 4.0 * U_F32 * b.extent;
+        c.vector(record.position, truth, bound, format_args!("position of particle {i}"));
     })?;
     c.remark(format!("{n_folded} of {} folded", b.n_particles));
     Ok(())
@@ -264,14 +255,7 @@ fn far(ctx: &mut StressContext, c: &mut Comparison, at: f64) -> Result<()> {
         // The scene's origin is the box's centre but for the rounding of 1e7 in f64.
         let bound = placed_bound(bound.position, DVec3::ZERO, truth, U_F32)
             + DVec3::splat(2f64.powi(-52) * at.abs());
-        for axis in 0..3 {
-            c.add(
-                placed.position[axis],
-                truth[axis],
-                bound[axis],
-                format_args!("position of particle {i}, axis {axis}"),
-            );
-        }
+        c.vector(placed.position, truth, bound, format_args!("position of particle {i}"));
     }
     c.finite(&frame.rgba, "picture");
     c.holds(frame.rgba.iter().any(|v| *v > 0.1), "the picture is not empty");

@@ -10,6 +10,7 @@ use crate::model::scene::Scene;
 use crate::reference::live;
 use crate::reference::rounding::U_F32;
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "live/late",

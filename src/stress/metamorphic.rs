@@ -16,6 +16,7 @@ use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::reference::rounding::U_F32;
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "metamorphic/double-light",

@@ -8,6 +8,7 @@ use crate::model::moisture::{
     Vapour,
 };
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "moisture/saturation",

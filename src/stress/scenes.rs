@@ -52,10 +52,18 @@ pub const LAW: BoxLaw = BoxLaw { optical_depth: OPTICAL_DEPTH, ..BoxLaw::new(For
 /// A sun in the zenith.
 pub const SUN_ABOVE: &str =
     "[[light]]\nkind = 'directional'\ndirection = [0, -1, 0]\nirradiance = [1, 1, 1]\n";
+/// Returns a sun that shines in `direction`.
+pub fn sun(direction: &str) -> String {
+    format!("[[light]]\nkind = 'directional'\ndirection = {direction}\nirradiance = [1, 1, 1]\n")
+}
+
 /// Keys of a diffuse grey material.
 pub const GREY: &str = "kd = [0.5, 0.5, 0.5]\n";
 
 /// Parses the text of a scene that names no files.
+///
+/// # Errors
+/// Fails if the text is no scene.
 pub fn parse_scene(text: &str) -> Result<Scene> {
     Ok(parse(text.to_owned(), Path::new("stress.toml"), &[], None)?.scene)
 }
@@ -76,6 +84,9 @@ pub fn cloud_of(source: CloudSource) -> Cloud {
 }
 
 /// Parses a scene text and adds a cloud of boxes.
+///
+/// # Errors
+/// Fails if the text is no scene.
 pub fn box_scene(text: &str, boxes: Vec<CloudBox>) -> Result<Scene> {
     let mut scene = parse_scene(text)?;
     scene.clouds.push(cloud_of(CloudSource::Boxes { boxes, law: LAW }));
@@ -83,6 +94,9 @@ pub fn box_scene(text: &str, boxes: Vec<CloudBox>) -> Result<Scene> {
 }
 
 /// Parses a scene text with the keys `draw` of `[draw]` and adds a cloud of particles.
+///
+/// # Errors
+/// Fails if the text is no scene.
 pub fn blob_scene(text: &str, draw: &str, particles: Vec<Particle>) -> Result<Scene> {
     let mut scene = parse_scene(&format!("{text}[draw]\n{draw}\n"))?;
     scene.clouds.push(cloud_of(CloudSource::Particles(particles)));
@@ -90,6 +104,9 @@ pub fn blob_scene(text: &str, draw: &str, particles: Vec<Particle>) -> Result<Sc
 }
 
 /// Renders frame 0 of [`blob_scene`].
+///
+/// # Errors
+/// Fails if the text is no scene, or drawing it fails.
 pub fn render_blobs(
     ctx: &mut StressContext,
     text: &str,
@@ -153,6 +170,9 @@ pub fn corner(n: u32) -> [Surface; 3] {
 
 /// Returns a two-reflection scene of rectangles of one material; `lighting` holds more keys of
 /// `[lighting]`.
+///
+/// # Errors
+/// Fails if the text is no scene.
 pub fn surface_scene(
     lighting: &str,
     lights: &str,

@@ -8,6 +8,7 @@ use crate::model::philox::philox4x32_10;
 use crate::passes::sort::{Count, Sort};
 use crate::reference::sort::{key16, key32, order};
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "sorting/random",
@@ -69,9 +70,9 @@ fn keys(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
         .chain((-300..300).map(|i| i as f32 * 0.01))
         .collect();
     depths.sort_by(|a, b| b.total_cmp(a));
-    let inputs: Vec<[f32; 4]> = depths
-        .iter()
-        .map(|z| [*z, RADIUS as f32, (65536.0 / (2.0 * RADIUS)) as f32, 0.0])
+    let inputs = depths
+        .into_iter()
+        .map(|z| [z, RADIUS as f32, (65536.0 / (2.0 * RADIUS)) as f32, 0.0])
         .collect();
     // The upper 23 and the lower 9 bits of the key as mantissas of numbers from 1 to 2. The key's
     // own bits may form a NaN, whose bits may change.
@@ -79,13 +80,13 @@ fn keys(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
         return vec4(uintBitsToFloat(0x3f800000u | key >> 9), \
         uintBitsToFloat(0x3f800000u | key & 0x1ffu), float(key_of(x.x, 16u, x.y, x.z)), 0.0);";
     let mut last = 0;
-    for (z, y) in depths.iter().zip(ctx.probe("key.glsl", &[], body, &inputs)?) {
+    for ([z, ..], y) in ctx.probe("key.glsl", &[], body, inputs)? {
         let key = y[0].to_bits() << 9 | (y[1].to_bits() & 0x1ff);
-        c.exact(key, key32(*z), format_args!("key of depth {z:e}"));
+        c.exact(key, key32(z), format_args!("key of depth {z:e}"));
         c.holds(key >= last, format_args!("key of depth {z:e} in order"));
         last = key;
         // At the boundary of two 16-bit keys rounding decides.
-        let [low, high] = [1e-6, -1e-6].map(|d| f64::from(key16(f64::from(*z) + d, RADIUS)));
+        let [low, high] = [1e-6, -1e-6].map(|d| f64::from(key16(f64::from(z) + d, RADIUS)));
         let is_key = (low..=high).contains(&f64::from(y[2]));
         c.holds(is_key, format_args!("16-bit key of depth {z:e}: {}", y[2]));
     }

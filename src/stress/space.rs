@@ -16,6 +16,7 @@ use crate::model::scene::Scene;
 use crate::reference::picture::FrameReference;
 use crate::reference::rounding::{SINE_ERROR, U_F32};
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "space/far-exactly",

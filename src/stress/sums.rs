@@ -7,6 +7,7 @@ use crate::layout::sums::SumMacros;
 use crate::model::sums::{Precision, Summation, Sums};
 use crate::reference::rounding::sum_error;
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "transport/sum-plain",

@@ -5,12 +5,13 @@ use glam::DVec3;
 
 use super::case::{Case, Comparison};
 use super::context::{DeviceFrame, StressContext};
-use super::scenes::{SUN_ABOVE, blob, blob_cluster, cloud_of, rectangle, surface_scene};
+use super::scenes::{GREY, SUN_ABOVE, blob, blob_cluster, cloud_of, rectangle, sun, surface_scene};
 use crate::error::Result;
 use crate::model::cloud::{CloudSource, Particle};
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::rounding::U_F32;
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "transmittance/thin",
@@ -79,7 +80,7 @@ const NO_FORWARD: &str = "forward = 0.0";
 fn floor_under(lighting: &str, lights: &str, particles: Vec<Particle>) -> Result<Scene> {
     let floor = rectangle([0.0, -3.0, 0.0], [0.0, 0.0, 5e-4], [5e-4, 0.0, 0.0], 1);
     let lighting = format!("grid = 48\n{lighting}");
-    let mut scene = surface_scene(&lighting, lights, "kd = [0.5, 0.5, 0.5]\n", [floor])?;
+    let mut scene = surface_scene(&lighting, lights, GREY, [floor])?;
     scene.lighting.mode = LightingMode::First;
     scene.clouds.push(cloud_of(CloudSource::Particles(particles)));
     Ok(scene)
@@ -169,9 +170,7 @@ fn along_faces(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
         "[1, 1, 0]",
         "[-1, -1, -1]",
     ] {
-        let lights = format!(
-            "[[light]]\nkind = 'directional'\ndirection = {direction}\nirradiance = [1, 1, 1]\n"
-        );
+        let lights = sun(direction);
         for offset in [0.0, 0.125, 0.0625, 3.0] {
             let mut scene = floor_under(NO_FORWARD, &lights, particles.clone())?;
             let (at, y, z) = ([offset, -offset, 0.0], [0.0, 0.0, 0.5], [0.5, 0.0, 0.0]);

@@ -8,7 +8,8 @@ use glam::DVec3;
 use super::case::{Case, Comparison};
 use super::context::{DeviceFrame, StressContext};
 use super::scenes::{
-    GREY, LIT, SUN_ABOVE, blob, blob_scene, change_camera, corner, floor, rectangle, surface_scene,
+    GREY, LIT, SUN_ABOVE, blob, blob_scene, change_camera, corner, floor, rectangle, sun,
+    surface_scene,
 };
 use crate::error::Result;
 use crate::layout::facet::LitRecord;
@@ -17,6 +18,7 @@ use crate::model::surface::Surface;
 use crate::reference::picture::FrameReference;
 use crate::reference::rounding::U_F32;
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "transport/coincident",
@@ -99,11 +101,6 @@ const EXACT: &str = "gather = 'exact'";
 /// Returns a square of side 2 that faces down.
 fn ceiling(center: [f64; 3], n: u32) -> Surface {
     rectangle(center, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], n)
-}
-
-/// Returns a sun that shines in `direction`.
-fn sun(direction: &str) -> String {
-    format!("[[light]]\nkind = 'directional'\ndirection = {direction}\nirradiance = [1, 1, 1]\n")
 }
 
 /// Checks that the facets' light is finite and not negative, and returns the greatest channel of

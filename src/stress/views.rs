@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::model::cloud::Particle;
 use crate::reference::rounding::U_F32;
 
+/// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[
     Case {
         name: "space/narrow",

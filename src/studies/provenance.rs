@@ -9,8 +9,7 @@ use super::picture_error::magnitude;
 use super::reference_cache::CachedReference;
 use crate::gpu::DeviceInfo;
 use crate::io::scene_file::LoadedScene;
-use crate::reference::picture::Pixels;
-use crate::reference::picture::ReferenceKind;
+use crate::reference::picture::{Pixels, ReferenceKind};
 use crate::timing::machine::{self, Clocks, Cpu, Device};
 
 /// The conditions that a study was made under.
@@ -102,6 +101,16 @@ pub struct ReferenceRecord {
 }
 
 impl ReferenceRecord {
+    /// Returns the number of pixels of the picture.
+    pub fn n_all_pixels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+
+    /// Returns whether the reference is known at every pixel.
+    pub fn is_everywhere(&self) -> bool {
+        self.n_pixels as u64 == self.n_all_pixels()
+    }
+
     /// Describes a reference at `pixels` of a frame.
     pub fn of(
         cached: &CachedReference,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
+use crate::io::folder;
 use crate::io::image::write_bytes;
 
 /// File name of the chart of the passes' times.
@@ -66,6 +67,9 @@ impl Attachments {
     }
 
     /// Writes all files into `folder`.
+    ///
+    /// # Errors
+    /// Fails if a file cannot be read or written.
     pub(super) fn write(&self, folder: &Path) -> Result<()> {
         for CasePicture { i_case, width, height, rgb } in &self.pictures {
             write_bytes(&folder.join(picture_file(*i_case)), *width, *height, rgb)?;
@@ -83,9 +87,7 @@ impl Attachments {
 
 /// Returns the names of the files in `folder` that are named as attachments.
 pub(super) fn names_in(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-    names.filter(|name| is_attachment(name)).collect()
+    folder::names(folder).filter(|name| is_attachment(name)).collect()
 }
 
 fn is_attachment(name: &str) -> bool {

@@ -16,7 +16,7 @@ use serde::Serialize;
 use super::difference::{Difference, differences, remarks};
 use super::intervals::{N_FRAMES_NEEDED, ratio_interval, spread_of_blocks};
 use super::results::{BenchResults, TimedMode};
-use crate::measure::bootstrap::Bootstrap;
+use crate::measure::bootstrap::{Bootstrap, Interval};
 use crate::measure::stats::median;
 
 /// The measure that decides.
@@ -57,17 +57,6 @@ impl Verdict {
     }
 }
 
-/// median(B) / median(A) and its 95 % interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct MedianRatio {
-    /// The ratio.
-    pub estimate: f64,
-    /// Lower end of the interval.
-    pub low: f64,
-    /// Upper end of the interval.
-    pub high: f64,
-}
-
 /// One measure of one loop, in A and B.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeasureComparison {
@@ -81,8 +70,8 @@ pub struct MeasureComparison {
     pub a_ms: Option<f64>,
     /// Median of B in ms.
     pub b_ms: Option<f64>,
-    /// Ratio of the medians.
-    pub b_by_a: Option<MedianRatio>,
+    /// median(B) / median(A) and its 95 % interval.
+    pub b_by_a: Option<Interval>,
     /// Neighbouring frames that a resample draws together.
     pub block_len: usize,
     /// The answer.
@@ -146,7 +135,7 @@ fn compare(measure: &str, a: &[f64], b: &[f64]) -> MeasureComparison {
         n_b: b.len(),
         a_ms: median(a),
         b_ms: median(b),
-        b_by_a: interval.map(|i| MedianRatio { estimate: i.estimate, low: i.low, high: i.high }),
+        b_by_a: interval,
         block_len: Bootstrap::of_neighbours(n_least).block_len,
         verdict,
     }

@@ -125,7 +125,7 @@ fn map_differences(kind: Condition, maps: [&BTreeMap<String, String>; 2]) -> Vec
 }
 
 /// Returns the beginning of a hash, enough to tell two apart by eye.
-fn short(hash: &str) -> String {
+pub fn short(hash: &str) -> String {
     hash.chars().take(12).collect()
 }
 

@@ -1,7 +1,7 @@
 //! Confidence intervals of frame times, which neighbouring frames share their noise in.
 
 use crate::measure::bootstrap::{Bootstrap, Interval};
-use crate::measure::stats::median;
+use crate::measure::stats::{extremes, median};
 
 /// Timed frames that a list needs for an interval.
 ///
@@ -28,7 +28,12 @@ pub fn ratio_interval(b: &[f64], a: &[f64]) -> Option<Interval> {
 /// or if the least is 0.
 pub fn spread_of_blocks<'a>(blocks: impl Iterator<Item = &'a [f64]>) -> Option<f64> {
     let medians: Vec<f64> = blocks.filter_map(median).collect();
-    let (least, greatest) =
-        medians.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), m| (l.min(*m), g.max(*m)));
-    (medians.len() > 1 && least > 0.0).then(|| greatest / least)
+    spread(&medians)
+}
+
+/// Returns the greatest value divided by the least, or none for fewer than two values or if the
+/// least is 0.
+pub fn spread(values: &[f64]) -> Option<f64> {
+    let (least, greatest) = extremes(values.iter().copied())?;
+    (values.len() > 1 && least > 0.0).then(|| greatest / least)
 }

@@ -54,12 +54,20 @@ pub fn parse<T: ResultFile>(text: &str, path: &Path) -> Result<T> {
         .map_err(|cause| Error::io(path, format!("not a {file} of nimbus: {cause}")))
 }
 
+/// Returns a record as the text of a file; errors name `path`.
+///
+/// # Errors
+/// Fails if the record has no form in JSON.
+pub fn text(path: &Path, record: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_string_pretty(record).map_err(|cause| Error::io(path, cause))?;
+    Ok(text + "\n")
+}
+
 /// Writes a record to `path`, under a temporary name until it is complete.
 ///
 /// # Errors
 /// Fails if the file cannot be written.
 pub fn write(path: &Path, record: &impl Serialize) -> Result<()> {
-    let mut text = serde_json::to_string_pretty(record).map_err(|cause| Error::io(path, cause))?;
-    text.push('\n');
+    let text = text(path, record)?;
     write_atomic(path, |file| file.write_all(text.as_bytes()))
 }

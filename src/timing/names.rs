@@ -21,6 +21,12 @@ pub fn case_name(phase: &str, sweep: &str) -> String {
     [phase, sweep].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
 }
 
+/// Returns "case: loop"; the loop alone for a case without a name.
+pub fn mode_name(case: &str, threading: &str, skip: bool) -> String {
+    let of = loop_name(threading, skip);
+    if case.is_empty() { of } else { format!("{case}: {of}") }
+}
+
 /// Returns the name of a loop: its threading, followed by "no-skip" if every pass ran in every
 /// frame.
 pub fn loop_name(threading: &str, skip: bool) -> String {

@@ -5,8 +5,9 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::attachments::{PictureCopy, names_in, picture_file};
-use super::difference::{Facts, fact_differences};
+use super::difference::{Facts, fact_differences, short};
 use super::frame_rows::{FRAMES_FILE, FrameRow, FrameTable, parse_frames};
+use super::intervals::spread;
 use super::json;
 use super::names::sweep_text;
 use super::records::{BaseTime, Block, Case, Mode, PartRecord, Run};
@@ -105,9 +106,7 @@ impl Part {
         let loops = |m: &Mode| {
             format!("{}, particles by the {}, {} frames", m.name(), m.simulate, m.frames)
         };
-        let last_frame = |m: &Mode| {
-            m.image_hash.as_deref().map_or("unknown".to_owned(), |h| h.chars().take(12).collect())
-        };
+        let last_frame = |m: &Mode| m.image_hash.as_deref().map_or("unknown".to_owned(), short);
         vec![
             ("version", nimbus.clone()),
             ("build", revision.clone()),
@@ -220,9 +219,7 @@ pub fn base_spread(parts: &[PartRecord]) -> Vec<(String, f64)> {
     let of = |base: &BaseTime| {
         let find = |part: &PartRecord| part.base.iter().find(|b| b.name() == base.name())?.p50_ms;
         let all: Vec<f64> = parts.iter().filter_map(find).filter(|ms| *ms > 0.0).collect();
-        let (least, greatest) =
-            all.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), ms| (l.min(*ms), g.max(*ms)));
-        (all.len() > 1).then(|| (base.name(), greatest / least))
+        Some((base.name(), spread(&all)?))
     };
     first.base.iter().filter_map(of).collect()
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::json::ResultFile;
 use super::machine::{Clocks, Cpu, Device};
-use super::names::{Setting, case_name, loop_name, sweep_text};
+use super::names::{Setting, case_name, loop_name, mode_name, sweep_text};
 use super::overlap::Overlap;
 use crate::frame::Counts;
 use crate::measure::lows::Lows;
@@ -51,6 +51,13 @@ pub struct Run {
     pub parts: Vec<PartRecord>,
     /// Whether Ctrl-C or an error came before the end; the record then holds what was finished.
     pub interrupted: bool,
+}
+
+impl Run {
+    /// Returns every loop with its case, in order.
+    pub fn modes(&self) -> impl Iterator<Item = (&Case, &Mode)> {
+        self.cases.iter().flat_map(|case| case.modes.iter().map(move |mode| (case, mode)))
+    }
 }
 
 impl ResultFile for Run {
@@ -180,6 +187,11 @@ impl Mode {
     /// Returns the name of the loop.
     pub fn name(&self) -> String {
         loop_name(&self.threading, self.skip)
+    }
+
+    /// Returns "case: loop"; the loop alone for a case without a name.
+    pub fn name_in(&self, case: &Case) -> String {
+        mode_name(&case.name(), &self.threading, self.skip)
     }
 }
 

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::attachments::{self, Attachments};
 use super::frame_rows::{FRAMES_FILE, FrameRow, FrameTable, parse_frames, write_frames};
 use super::json::{self, ResultFile};
-use super::names::{case_name, loop_name};
+use super::names::{case_name, mode_name};
 use super::records::Run;
 use crate::error::{Error, Result};
 use crate::io::folder::{check_writable, replace_files};
@@ -128,11 +128,15 @@ pub fn parse_results(run: Run, text: &str, path: &Path) -> Result<BenchResults> 
     join(run, &parse_frames(text, path)?, path)
 }
 
+/// Joins a run with its frames; errors name `path`, the file of the frames.
+///
+/// # Errors
+/// Fails if the frames are not those of the run.
 pub(super) fn join(run: Run, table: &FrameTable, path: &Path) -> Result<BenchResults> {
     let mut by_name = timed_modes(table);
     let mut modes = Vec::new();
-    for (case, mode) in run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| (c, m))) {
-        let name = mode_name(&case.name(), &mode.threading, mode.skip);
+    for (case, mode) in run.modes() {
+        let name = mode.name_in(case);
         let timed = by_name.remove(&name);
         let (n, n_expected) = (timed.as_ref().map_or(0, |m| m.frames.len()), mode.frames);
         if n != n_expected {
@@ -158,11 +162,6 @@ fn expected_in(folder: &Path) -> String {
         let first = first.display();
         format!("it has folders of results in it: name one of those, such as {first}")
     })
-}
-
-fn mode_name(case: &str, threading: &str, skip: bool) -> String {
-    let of = loop_name(threading, skip);
-    if case.is_empty() { of } else { format!("{case}: {of}") }
 }
 
 /// Groups the timed frames by case and loop.

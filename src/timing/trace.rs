@@ -108,9 +108,11 @@ fn emit_frames(
 
 /// Emits the name of a track and its place among the tracks.
 fn emit_track(tid: usize, name: &str, emit: &mut Emit<'_>) -> std::io::Result<()> {
-    let about = |what: &str, args: Value| json!({ "ph": "M", "pid": 1, "tid": tid, "name": what, "args": args });
-    emit(about("thread_name", json!({ "name": name })))?;
-    emit(about("thread_sort_index", json!({ "sort_index": tid })))
+    let (name, place) = (json!({ "name": name }), json!({ "sort_index": tid }));
+    for (what, args) in [("thread_name", name), ("thread_sort_index", place)] {
+        emit(json!({ "ph": "M", "pid": 1, "tid": tid, "name": what, "args": args }))?;
+    }
+    Ok(())
 }
 
 /// Emits one track a thread, without the zones before the first game step, which prepare the scene.

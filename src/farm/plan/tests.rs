@@ -1,22 +1,24 @@
 use super::*;
-use crate::farm::work::{Frames, PictureFormat};
+use crate::farm::work::Frames;
+use crate::io::image::ImageKind;
 
 /// Frames 3 and following of hello.toml, in shards of these sizes.
-fn request(sizes: &[u32], format: PictureFormat) -> PlanRequest {
+fn request(sizes: &[u32], format: ImageKind) -> PlanRequest {
     let n = sizes.iter().sum();
     let cut = Cut::single(AnyWork::Frames(Frames { first: 3, n, format }));
+    let parts = sizes.iter().map(|n| Part { n: *n, ..cut.parts[0] }).collect();
     PlanRequest {
         scene: Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml"),
         set: vec![],
         seed: None,
         shaders: None,
         device: None,
-        cut: Cut { sizes: sizes.to_vec(), ..cut },
+        cut: Cut { parts, ..cut },
     }
 }
 
 fn png(sizes: &[u32]) -> PlanRequest {
-    request(sizes, PictureFormat::Png)
+    request(sizes, ImageKind::Png)
 }
 
 #[test]
@@ -35,7 +37,7 @@ fn keys_change_with_everything_that_results_depend_on() {
         key(png(&[3, 5])),
         key(PlanRequest { seed: Some(9), ..png(&[4, 4]) }),
         key(PlanRequest { set: vec!["film.width=64".into()], ..png(&[4, 4]) }),
-        key(request(&[4, 4], PictureFormat::Exr)),
+        key(request(&[4, 4], ImageKind::Exr)),
         built.key(3, 4),
         shaded.key(3, 4),
     ];

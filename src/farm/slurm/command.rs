@@ -5,8 +5,7 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// The interval at which a command that has closed its output is polled.
-const POLL: Duration = Duration::from_millis(5);
+use crate::farm::process::POLL;
 
 /// The failure of a command.
 #[derive(Debug, Clone, PartialEq, Eq)]

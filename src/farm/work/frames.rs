@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::farm::transient::io_error;
 use crate::frame::{GpuContext, Player};
 use crate::io::atomic;
-use crate::io::folder::replace_files;
+use crate::io::folder::{self, replace_files};
 use crate::io::image::{ImageKind, encoded};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{Impostors, Scene};
@@ -29,35 +29,7 @@ pub struct Frames {
     /// The number of frames.
     pub n: u32,
     /// The format of the pictures.
-    pub format: PictureFormat,
-}
-
-/// A format of picture files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum PictureFormat {
-    /// 8-bit sRGB, tone-mapped, over the background.
-    Png,
-    /// Linear premultiplied RGBA in f32.
-    Exr,
-}
-
-impl PictureFormat {
-    /// Returns the extension of file names.
-    pub fn extension(self) -> &'static str {
-        match self {
-            PictureFormat::Png => "png",
-            PictureFormat::Exr => "exr",
-        }
-    }
-
-    /// Returns the encoder's name of the format.
-    pub fn kind(self) -> ImageKind {
-        match self {
-            PictureFormat::Png => ImageKind::Png,
-            PictureFormat::Exr => ImageKind::Exr,
-        }
-    }
+    pub format: ImageKind,
 }
 
 impl Work for Frames {
@@ -80,10 +52,6 @@ impl Work for Frames {
 
     fn outputs(&self, items: Range<u32>) -> Vec<String> {
         items.map(|i_frame| file_name(i_frame, self.format)).collect()
-    }
-
-    fn is_exact(&self) -> bool {
-        true
     }
 
     /// Refuses scenes in which a frame does not follow from its number alone.
@@ -132,7 +100,7 @@ impl Work for Frames {
                 let packet = player.game.step(i_frame)?;
                 player.renderer.step(packet)?;
                 let (rgba, film) = (player.renderer.image()?, scene.film);
-                encoded(self.format.kind(), &film, film.width, film.height, &rgba)
+                encoded(self.format, &film, film.width, film.height, &rgba)
             },
         )?;
         drop(playing);
@@ -146,7 +114,8 @@ impl Work for Frames {
         let files = merge.results.iter().flat_map(|result| &result.manifest.files);
         let names: Vec<&str> = files.map(|file| file.name.as_str()).collect();
         let kept: HashSet<&str> = names.iter().copied().collect();
-        let earlier = frames_in(merge.out);
+        let earlier: Vec<String> =
+            folder::names(merge.out).filter(|name| is_file_name(name)).collect();
         let removed = earlier.iter().map(String::as_str).filter(|name| !kept.contains(name));
         let replaced: Vec<&str> = removed.chain(names.iter().copied()).collect();
         replace_files(merge.out, &replaced, |staged| copy_all(merge.results, staged))?;
@@ -161,7 +130,7 @@ fn scene_at(loaded: &LoadedScene, i_frame: u32) -> Scene {
 }
 
 /// Returns a frame's file name. Names sort as the frames do.
-fn file_name(i_frame: u32, format: PictureFormat) -> String {
+fn file_name(i_frame: u32, format: ImageKind) -> String {
     format!("frame-{i_frame:08}.{}", format.extension())
 }
 
@@ -169,13 +138,6 @@ fn is_file_name(name: &str) -> bool {
     let stem = name.strip_suffix(".png").or(name.strip_suffix(".exr"));
     let number = stem.and_then(|stem| stem.strip_prefix("frame-"));
     number.is_some_and(|digits| digits.len() >= 8 && digits.bytes().all(|b| b.is_ascii_digit()))
-}
-
-/// Returns the names of all frames in a folder.
-fn frames_in(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-    names.filter(|name| is_file_name(name)).collect()
 }
 
 /// Copies all files to a folder and verifies each copy.

@@ -12,7 +12,7 @@ use std::ops::Deref;
 
 use serde::{Deserialize, Serialize};
 
-pub use frames::{Frames, PictureFormat};
+pub use frames::Frames;
 pub use reference::ReferenceWork;
 pub use study::Study;
 pub use sweep::Sweep;

@@ -8,13 +8,12 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::frames::PictureFormat;
 use super::task::{Merge, ShardResult, Task, Work};
 use crate::error::{Error, Result};
 use crate::farm::transient::io_error;
 use crate::io::atomic;
 use crate::io::folder::replace_files;
-use crate::io::image::{encoded, image_hash};
+use crate::io::image::{ImageKind, encoded, image_hash};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::Scene;
 use crate::reference::picture::{
@@ -49,7 +48,7 @@ pub struct ReferenceWork {
     /// machine's sum ([`PairwiseSum`]).
     pub range: u32,
     /// The format of the merged picture.
-    pub format: PictureFormat,
+    pub format: ImageKind,
 }
 
 impl ReferenceWork {
@@ -150,10 +149,6 @@ impl Work for ReferenceWork {
         items.map(sums_file).collect()
     }
 
-    fn is_exact(&self) -> bool {
-        true
-    }
-
     fn needs_device(&self) -> bool {
         false
     }
@@ -214,7 +209,7 @@ impl Work for ReferenceWork {
         let scene = self.scene(&(merge.load)()?);
         let mean = self.total(merge.results)?.mean();
         let rgba = picture::to_f32(&mean.rgba);
-        let picture = encoded(self.format.kind(), &scene.film, self.width, self.height, &rgba)?;
+        let picture = encoded(self.format, &scene.film, self.width, self.height, &rgba)?;
         let file = format!("reference.{}", self.format.extension());
         let manifests = || merge.results.iter().map(|result| &result.manifest);
         let nodes: BTreeSet<&str> = manifests().map(|m| m.node.as_str()).collect();
@@ -266,7 +261,7 @@ mod tests {
             tile: [4, 3],
             n_samples: 11,
             range: 4,
-            format: PictureFormat::Exr,
+            format: ImageKind::Exr,
         };
         work.check().unwrap();
         // 3 by 3 tiles, 3 ranges each.
@@ -292,7 +287,7 @@ mod tests {
             tile: [4, 3],
             n_samples: 11,
             range: 4,
-            format: PictureFormat::Exr,
+            format: ImageKind::Exr,
         };
         for (work, message) in [
             (ReferenceWork { range: 3, ..good.clone() }, "power of two"),

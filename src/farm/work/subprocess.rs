@@ -10,6 +10,9 @@ use crate::farm::process::{self, EXCLUSIVE};
 
 /// Runs `nimbus NAME SCENE ARGUMENTS` for the items of a shard, and returns what `read` finds in
 /// the folder of its results. The shard's files are then taken over from there.
+///
+/// # Errors
+/// Fails if the process cannot be started or fails, or its results cannot be read.
 pub fn run<T>(
     name: &str,
     arguments: &[String],
@@ -53,6 +56,9 @@ fn ended(name: &str, mut child: Child, stop: &AtomicBool) -> Result<()> {
 
 /// Refuses results whose times cannot be compared: those with `differences`, and those of runs that
 /// shared their node.
+///
+/// # Errors
+/// Fails if there is such a difference or such a run; the error lists them.
 pub fn check_comparable(mut differences: Vec<String>, results: &[ShardResult]) -> Result<()> {
     let manifests = results.iter().map(|result| &result.manifest);
     let shared = manifests.filter(|manifest| !manifest.exclusive).map(|m| m.index.to_string());

@@ -33,7 +33,9 @@ pub trait Work {
     fn outputs(&self, items: Range<u32>) -> Vec<String>;
 
     /// Returns whether two runs make the same bytes. Pictures are the same, times are not.
-    fn is_exact(&self) -> bool;
+    fn is_exact(&self) -> bool {
+        true
+    }
 
     /// Returns whether runs open a Vulkan device.
     fn needs_device(&self) -> bool {

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::number::number;
+use crate::measure::stats::extremes;
 
 /// A labelled position on an axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,11 +43,7 @@ impl Axis {
         n_ticks: usize,
     ) -> Axis {
         let of_log = values.filter(|v| v.is_finite() && *v > 0.0).map(f64::log10);
-        let (mut low, mut high) =
-            of_log.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-        if low > high {
-            (low, high) = (-1.0, 1.0);
-        }
+        let (low, high) = extremes(of_log).unwrap_or((-1.0, 1.0));
         let margin = (MARGIN * (high - low)).max(MIN_MARGIN);
         let mut ticks: Vec<Tick> = log_ticks(low - margin..high + margin, n_ticks);
         let zero = with_zero.then_some(low - 3.0 * margin);

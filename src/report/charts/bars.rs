@@ -17,6 +17,9 @@ pub fn bar_ends<DB: DrawingBackend>(area: &PlotArea<'_, DB>, i: usize, n: usize)
 
 /// Draws a bar in row `i` of `n` between two positions of the x axis; in a terminal a row of
 /// `glyph`.
+///
+/// # Errors
+/// Fails if the backend fails.
 pub fn draw_bar<DB: DrawingBackend>(
     area: &PlotArea<'_, DB>,
     (i, n): (usize, usize),

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::measure::stats::median;
+use crate::measure::stats::{extremes, median};
 
 /// The summary of the times of frames `first` to `last`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,12 +42,13 @@ pub fn bins(samples: &[(u32, f64)], range: RangeInclusive<u32>, n_most: usize) -
     let of = |(i, times): (usize, Vec<f64>)| {
         let first = u64::from(*range.start()) + i as u64 * width;
         let last = (first + width - 1).min(u64::from(*range.end()));
+        let (min, max) = extremes(times.iter().copied())?;
         Some(Bin {
             first: first as u32,
             last: last as u32,
-            min: times.iter().copied().fold(f64::INFINITY, f64::min),
+            min,
             median: median(&times)?,
-            max: times.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            max,
             n: times.len(),
         })
     };

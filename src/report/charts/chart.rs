@@ -1,13 +1,12 @@
 //! The parts that all charts share: title, legend, notes and tooltips, as SVG and as characters.
 
-use std::convert::Infallible;
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 
 use plotters::prelude::*;
 
 use super::medium::{CELL, INK, MUTED, Medium, PAPER};
 use super::plot_area::{Canvas, MarkerFill, draw_marker};
-use super::text_canvas::{TextBackend, TextCanvas, sgr_of};
+use super::text_canvas::{TextCanvas, sgr_of};
 use crate::error::{Error, Result};
 
 /// A rectangle of a chart that shows a text when it is pointed at or focused.
@@ -102,8 +101,7 @@ pub trait Chart {
                 root.present()?;
                 Ok(tooltips)
             };
-            draw()
-                .map_err(|cause| Error::Fault { what: format!("cannot draw a chart: {cause}") })?
+            draw().map_err(fault)?
         };
         // XML has no representation of control characters.
         text.retain(|c| !c.is_control() || c == '\n');
@@ -119,12 +117,10 @@ pub trait Chart {
         let medium = Medium::Terminal;
         let mut characters = TextCanvas::new(columns, rows);
         {
-            let root = TextBackend(&mut characters).into_drawing_area();
+            let root = (&mut characters).into_drawing_area();
             let canvas = Canvas { root: &root, medium, top: 0, bottom: 0 };
-            let drawn: DrawResult<Vec<Tooltip>, TextBackend<'_>> = self.draw(&canvas);
-            drawn.map_err(|cause: DrawingAreaErrorKind<Infallible>| Error::Fault {
-                what: format!("cannot draw a chart: {cause}"),
-            })?;
+            let drawn: DrawResult<Vec<Tooltip>, &mut TextCanvas> = self.draw(&canvas);
+            drawn.map_err(fault)?;
         }
         // Text of a file must not send commands to the terminal.
         let plain = |text: &str| text.replace(char::is_control, "");
@@ -155,6 +151,10 @@ pub trait Chart {
         }
         Ok(out)
     }
+}
+
+fn fault(cause: impl Display) -> Error {
+    Error::Fault { what: format!("cannot draw a chart: {cause}") }
 }
 
 /// Distance of text from the edges of a picture, px.

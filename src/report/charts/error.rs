@@ -12,6 +12,7 @@ use super::medium::{INK, MUTED, Medium, series};
 use super::number::{number, with_interval};
 use super::overlap::place_labels;
 use super::plot_area::{Canvas, GridLines, MarkerFill, PlotArea};
+use crate::measure::stats::extremes;
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::front::{Front, Metric};
 use crate::studies::error::records::{Configuration, Study};
@@ -143,8 +144,7 @@ impl ErrorChart {
     fn axes(&self, medium: Medium, (width, height): (i32, i32)) -> (Axis, Axis) {
         let axis = |name: &str, figure: fn(&Point) -> Figure, with_zero: bool, n_ticks: i32| {
             let figures = || self.points.iter().map(figure).filter(|f| f.value > 0.0);
-            let (least, most) = figures()
-                .fold((f64::INFINITY, 0.0f64), |(l, m), f| (l.min(f.value), m.max(f.value)));
+            let (least, most) = extremes(figures().map(|f| f.value)).unwrap_or((0.0, 0.0));
             let ends = figures()
                 .flat_map(|f| [f.low, f.high])
                 .flatten()
@@ -229,14 +229,8 @@ impl Chart for ErrorChart {
                 continue;
             }
             let style = point.marker().1.mix(if is_behind(point) { FAINT } else { 1.0 });
-            if let (Some(low), Some(high)) = (point.time.low, point.time.high) {
-                let ends = [low, high].map(|v| (x.clamped(v), *py));
-                area.interval(ends, [low, high].map(|v| x.contains(v)), style)?;
-            }
-            if let (Some(low), Some(high)) = (point.error.low, point.error.high) {
-                let ends = [low, high].map(|v| (*px, y.clamped(v)));
-                area.interval(ends, [low, high].map(|v| y.contains(v)), style)?;
-            }
+            area.interval(&x, point.time, |at| (at, *py), style)?;
+            area.interval(&y, point.error, |at| (*px, at), style)?;
         }
         let (mut tooltips, mut markers, mut labels) = (Vec::new(), Vec::new(), Vec::new());
         for (point, (px, py)) in &drawn {

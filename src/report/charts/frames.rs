@@ -11,7 +11,7 @@ use super::number::number;
 use super::plot_area::{Canvas, GridLines, PlotArea};
 use crate::measure::stats::percentile;
 use crate::timing::frame_rows::FrameRow;
-use crate::timing::names::sweep_text;
+use crate::timing::names::{loop_name, sweep_text};
 use crate::timing::results::BenchResults;
 
 /// If a frame takes longer than this multiple of the 99th percentile, the axis is cut.
@@ -51,21 +51,15 @@ pub fn charts_of_rows(rows: &[FrameRow]) -> Vec<FrameChart> {
 pub fn charts_of(results: &BenchResults) -> Vec<FrameChart> {
     let mut charts = Vec::new();
     // `results.modes` holds the loops that have timed frames.
-    let cases = results.run.cases.iter();
-    let timed = cases.flat_map(|c| c.modes.iter().filter(|m| m.frames > 0).map(move |m| (c, m)));
+    let timed = results.run.modes().filter(|(_, mode)| mode.frames > 0);
     for ((case, mode), times) in timed.zip(&results.modes) {
-        let (sweep, name) = (sweep_text(&case.sweep), loop_name(&mode.threading, mode.skip));
+        let (sweep, name) = (sweep_text(&case.sweep), mode.name());
         let phase = case.phase.as_deref().unwrap_or_default();
         for (frame, ms) in times.frames.iter().zip(times.blocks.iter().flatten()) {
             add(&mut charts, [&sweep, phase, &name], *frame, *ms);
         }
     }
     charts
-}
-
-/// Returns the name of a loop: its threading, and whether it skips no pass.
-pub(super) fn loop_name(threading: &str, skip: bool) -> String {
-    if skip { threading.to_owned() } else { format!("{threading} no-skip") }
 }
 
 fn add(charts: &mut Vec<FrameChart>, [sweep, phase, name]: [&str; 3], frame: u32, ms: f64) {

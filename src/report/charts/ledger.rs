@@ -113,12 +113,11 @@ impl Chart for LedgerChart {
             let (color, glyph) = if row.is_resolved { (series(0), '█') } else { (MUTED, '░') };
             draw_bar(&area, (i, n), (x.range.start, end), color, glyph)?;
             let mut last = end;
-            if let (false, Some(low), Some(high)) =
+            if let (false, Some(_), Some(high)) =
                 (medium.is_terminal(), row.error.low, row.error.high)
             {
-                let ends = [low, high].map(|v| (x.clamped(v), y));
-                last = end.max(ends[1].0);
-                area.interval(ends, [low, high].map(|v| x.contains(v)), INK)?;
+                last = end.max(x.clamped(high));
+                area.interval(&x, row.error, |at| (at, y), INK)?;
             }
             let at = area.pixel(last, y).0 + medium.across(7, 2);
             let line = total.map(|t| area.pixel(t, y).0);

@@ -6,7 +6,6 @@ use plotters::style::text_anchor::HPos;
 use super::axis::Axis;
 use super::bars::{bar_ends, draw_bar};
 use super::chart::{Chart, LegendEntry, Tooltip, shortened};
-use super::frames::loop_name;
 use super::medium::{INK, MUTED, SERIES_COLORS, series};
 use super::number::number;
 use super::plot_area::{Canvas, GridLines, PlotArea};
@@ -42,8 +41,7 @@ pub fn ms_of_frame(pass: &Pass) -> Option<f64> {
 
 /// Returns the chart of a run, or None if no pass was timed.
 pub fn chart(run: &Run) -> Option<PassChart> {
-    let modes = || run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| (c, m)));
-    let all = || modes().flat_map(|(_, mode)| &mode.passes);
+    let all = || run.modes().flat_map(|(_, mode)| &mode.passes);
     let mut sums: Vec<(&str, f64)> = Vec::new();
     for (pass, ms) in all().filter_map(|p| Some((p, ms_of_frame(p)?))) {
         match sums.iter_mut().find(|(name, _)| *name == pass.name) {
@@ -61,19 +59,14 @@ pub fn chart(run: &Run) -> Option<PassChart> {
             passes.push(name.clone());
         }
     }
-    let timed = modes().filter(|(_, mode)| mode.passes.iter().any(|p| ms_of_frame(p).is_some()));
+    let timed =
+        run.modes().filter(|(_, mode)| mode.passes.iter().any(|p| ms_of_frame(p).is_some()));
     let bar = |(case, mode): (&Case, &Mode)| {
-        let name = row_name(&case.name(), mode);
+        let name = mode.name_in(case);
         Bar { parts: parts(mode, &passes), tooltip: tooltip(&name, mode), name }
     };
     let bars = timed.map(bar).collect();
     (!passes.is_empty()).then_some(PassChart { passes, bars })
-}
-
-/// Returns the name of a case's loop.
-pub fn row_name(case: &str, mode: &Mode) -> String {
-    let name = loop_name(&mode.threading, mode.skip);
-    if case.is_empty() { name } else { format!("{case}: {name}") }
 }
 
 fn parts(mode: &Mode, passes: &[String]) -> Vec<f64> {

@@ -12,6 +12,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::axis::{Axis, Tick};
 use super::medium::{GRID, INK, MUTED, Medium, PAPER};
 use super::number::number;
+use crate::studies::figure::Figure;
 
 /// The drawing area of a chart, between `top` and `bottom` pixels from the edges of `root`.
 pub struct Canvas<'a, DB: DrawingBackend> {
@@ -68,6 +69,9 @@ const CAP_PX: i32 = 3;
 
 impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     /// Draws two axes.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn new(
         canvas: &Canvas<'a, DB>,
         x: &Axis,
@@ -130,18 +134,27 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     }
 
     /// Draws a line through positions on the axes.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn line(&self, points: &[(f64, f64)], style: impl Into<ShapeStyle>) -> DrawResult<(), DB> {
         self.root.draw(&PathElement::new(self.pixels(points), style))
     }
 
-    /// Draws an interval along x or along y, with a cap at the ends that lie within the axis.
+    /// Draws the interval of a figure along `axis`, with a cap at the ends that lie within the
+    /// axis. `at` returns the place of a position on the axis.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn interval(
         &self,
-        ends: [(f64, f64); 2],
-        has_cap: [bool; 2],
+        axis: &Axis,
+        figure: Figure,
+        at: impl Fn(f64) -> (f64, f64),
         style: impl Into<ShapeStyle>,
     ) -> DrawResult<(), DB> {
-        let [a, b] = ends.map(|(x, y)| self.pixel(x, y));
+        let (Some(low), Some(high)) = (figure.low, figure.high) else { return Ok(()) };
+        let [a, b] = [low, high].map(|v| at(axis.clamped(v))).map(|(x, y)| self.pixel(x, y));
         let style = style.into();
         if a == b {
             return Ok(());
@@ -151,13 +164,16 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
             return Ok(());
         }
         let (dx, dy) = if a.1 == b.1 { (0, CAP_PX) } else { (CAP_PX, 0) };
-        for ((x, y), _) in [a, b].into_iter().zip(has_cap).filter(|(_, has_cap)| *has_cap) {
+        for ((x, y), _) in [(a, low), (b, high)].into_iter().filter(|(_, v)| axis.contains(*v)) {
             self.root.draw(&PathElement::new(vec![(x - dx, y - dy), (x + dx, y + dy)], style))?;
         }
         Ok(())
     }
 
     /// Fills a polygon.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn polygon(
         &self,
         corners: &[(f64, f64)],
@@ -167,6 +183,9 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     }
 
     /// Draws a rectangle between two corners, px.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn rectangle(
         &self,
         [x0, y0, x1, y1]: [i32; 4],
@@ -176,6 +195,9 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     }
 
     /// Draws a marker of `radius` px at a pixel; in a terminal a character.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn marker(
         &self,
         at: (i32, i32),
@@ -195,11 +217,17 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
     }
 
     /// Draws a character of a terminal.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn glyph(&self, glyph: char, at: (i32, i32), color: RGBColor) -> DrawResult<(), DB> {
         self.write(&glyph.to_string(), at, color, HPos::Left)
     }
 
     /// Draws text whose middle line goes through a pixel.
+    ///
+    /// # Errors
+    /// Fails if the backend fails.
     pub fn write(
         &self,
         text: &str,
@@ -213,6 +241,9 @@ impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {
 }
 
 /// Draws a marker of a picture.
+///
+/// # Errors
+/// Fails if the backend fails.
 pub fn draw_marker<DB: DrawingBackend>(
     root: &DrawingArea<DB, Shift>,
     at: (i32, i32),

@@ -95,14 +95,11 @@ pub fn sgr_of(rgb: (u8, u8, u8)) -> u8 {
     all.find(|s| (s.light.0, s.light.1, s.light.2) == rgb).map_or(39, |shade| shade.sgr)
 }
 
-/// A drawing backend that borrows its canvas.
-pub struct TextBackend<'a>(pub &'a mut TextCanvas);
-
-impl DrawingBackend for TextBackend<'_> {
+impl DrawingBackend for &mut TextCanvas {
     type ErrorType = Infallible;
 
     fn get_size(&self) -> (u32, u32) {
-        let (columns, n) = (self.0.n_columns, self.0.cells.len());
+        let (columns, n) = (self.n_columns, self.cells.len());
         (columns as u32 * CELL.0 as u32, (n / columns.max(1)) as u32 * CELL.1 as u32)
     }
 
@@ -117,7 +114,7 @@ impl DrawingBackend for TextBackend<'_> {
     fn draw_pixel(&mut self, point: BackendCoord, color: BackendColor) -> Drawn {
         // Transparent areas would hide the lines below them.
         if color.alpha > 0.5 {
-            self.0.dot(point, color);
+            self.dot(point, color);
         }
         Ok(())
     }
@@ -162,7 +159,7 @@ impl DrawingBackend for TextBackend<'_> {
         };
         for (i, glyph) in (0..).zip(text.chars()) {
             // Text that would start left of the edge is moved inside.
-            self.0.glyph((column.max(0) + i, row), glyph, style.color());
+            self.glyph((column.max(0) + i, row), glyph, style.color());
         }
         Ok(())
     }
@@ -185,7 +182,7 @@ mod tests {
     #[test]
     fn draws_dots_markers_and_text_in_their_cells() {
         let mut characters = TextCanvas::new(6, 2);
-        let area = TextBackend(&mut characters).into_drawing_area();
+        let area = (&mut characters).into_drawing_area();
         // The top dots of the first row; the bottom right dot of the second row's last cell.
         area.draw(&PathElement::new(vec![(0, 0), (11, 0)], INK)).unwrap();
         area.draw(&Pixel::new((11, 7), INK)).unwrap();
@@ -199,7 +196,7 @@ mod tests {
     #[test]
     fn ignores_drawing_outside_of_the_canvas() {
         let mut characters = TextCanvas::new(2, 1);
-        let area = TextBackend(&mut characters).into_drawing_area();
+        let area = (&mut characters).into_drawing_area();
         area.draw(&PathElement::new(vec![(-5, 1), (40, 1)], INK)).unwrap();
         area.draw_text("long text", &Medium::Terminal.text_style(INK), (2, 40)).unwrap();
         drop(area);

@@ -21,6 +21,9 @@ pub fn case_name(case: &Case) -> String {
 }
 
 /// Returns the section of a bench.
+///
+/// # Errors
+/// Fails if a chart cannot be drawn or a picture cannot be read.
 pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
     let run = &results.run;
     let mut charts = Vec::new();
@@ -62,10 +65,10 @@ pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
 }
 
 fn loops(run: &Run) -> Markup {
-    let row = |(case, mode): (&Case, &Mode)| -> Vec<Cell> {
+    let row = |(case, mode): (&Case, &Mode)| {
         let of = |m: Option<Measured>| m.map(|m| m.of);
         vec![
-            text(&passes::row_name(&case.name(), mode)),
+            text(&mode.name_in(case)),
             count(mode.frames),
             median(mode.frame_ms),
             ms(of(mode.frame_ms).map(|s| s.p95)),
@@ -78,8 +81,6 @@ fn loops(run: &Run) -> Markup {
             value(mode.frame_lows.map(|l| l.slowest_mean_fps)),
         ]
     };
-    let rows: Vec<Vec<Cell>> =
-        run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| row((c, m)))).collect();
     let header = [
         "case and loop",
         "frames",
@@ -95,7 +96,7 @@ fn loops(run: &Run) -> Markup {
     ];
     let caption =
         "Every loop: medians with their 95 % intervals; \"1 % low\" is the mean of the slowest 1 %";
-    table(caption, &header, &rows)
+    table(caption, &header, run.modes().map(row))
 }
 
 /// Returns the nodes of a distributed sweep, with the times of the first case on each.
@@ -115,17 +116,14 @@ fn parts(run: &Run) -> Markup {
         .collect();
     let header: Vec<&str> =
         ["cases", "node", "begun"].into_iter().chain(loops.iter().map(String::as_str)).collect();
-    let rows: Vec<Vec<Cell>> = run.parts.iter().map(row).collect();
-    table(
-        "The nodes that timed the cases, with the median frame time of the first case on each",
-        &header,
-        &rows,
-    )
+    let caption =
+        "The nodes that timed the cases, with the median frame time of the first case on each";
+    table(caption, &header, run.parts.iter().map(row))
 }
 
 /// Returns the cases, with the gain from overlap and from skipping.
 fn cases(run: &Run) -> Markup {
-    let row = |case: &Case| -> Vec<Cell> {
+    let row = |case: &Case| {
         let ratio = case.ratio.map(|r| with_interval(r.parallel_by_serial, r.low, r.high));
         let skipping = case.skipping;
         vec![
@@ -153,19 +151,16 @@ fn cases(run: &Run) -> Markup {
         "without skipping, ms",
         "same picture, to the byte",
     ];
-    table(
-        "The cases, with the gain from overlap and from skipping",
-        &header,
-        &run.cases.iter().map(row).collect::<Vec<_>>(),
-    )
+    let caption = "The cases, with the gain from overlap and from skipping";
+    table(caption, &header, run.cases.iter().map(row))
 }
 
 fn pass_table(run: &Run) -> Markup {
-    let row = |case: &Case, mode: &Mode, pass: &Pass| -> Vec<Cell> {
+    let row = |case: &Case, mode: &Mode, pass: &Pass| {
         let reasons = pass.reasons.iter().map(|r| format!("{} ({})", r.reason, number(r.n as f64)));
         vec![
             text(&pass.name),
-            text(&passes::row_name(&case.name(), mode)),
+            text(&mode.name_in(case)),
             ms(pass.p50_ms),
             ms(passes::ms_of_frame(pass)),
             percent(pass.share),
@@ -175,13 +170,10 @@ fn pass_table(run: &Run) -> Markup {
             text(&reasons.collect::<Vec<_>>().join("; ")),
         ]
     };
-    let mut rows = Vec::new();
-    for case in &run.cases {
-        for mode in &case.modes {
-            let ran = mode.passes.iter().filter(|p| p.n_run > 0);
-            rows.extend(ran.map(|pass| row(case, mode, pass)));
-        }
-    }
+    let rows = run.modes().flat_map(|(case, mode)| {
+        let ran = mode.passes.iter().filter(|p| p.n_run > 0);
+        ran.map(move |pass| row(case, mode, pass))
+    });
     let header = [
         "pass",
         "case and loop",
@@ -193,9 +185,5 @@ fn pass_table(run: &Run) -> Markup {
         "saved, ms",
         "why skipped (frames)",
     ];
-    if rows.is_empty() {
-        html! {}
-    } else {
-        table("Passes that ran", &header, &rows)
-    }
+    table("Passes that ran", &header, rows)
 }

@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::bench::case_name;
 use super::source::{Results, Source};
-use super::table::{Cell, count, ms, remark_list, table, text, value};
+use super::table::{count, ms, remark_list, table, text, value};
 use super::{error, pictures};
 use crate::error::Result;
 use crate::report::charts::with_interval;
@@ -16,6 +16,9 @@ use crate::timing::difference::Difference;
 use crate::timing::results::BenchResults;
 
 /// Returns the comparison of two results. Results of different kinds have none.
+///
+/// # Errors
+/// Fails if a picture cannot be read.
 pub fn section(a: &Source, b: &Source) -> Result<Markup> {
     let folders = [a.folder.as_path(), &b.folder];
     let inner = match (&a.results, &b.results) {
@@ -51,10 +54,10 @@ fn benches(a: &BenchResults, b: &BenchResults, folders: [&Path; 2]) -> Result<Ma
 
 fn differing(found: &[Difference]) -> Markup {
     let row = |d: &Difference| vec![text(d.kind.name()), text(&d.what), text(&d.a), text(&d.b)];
-    let rows: Vec<Vec<Cell>> = found.iter().map(row).collect();
+    let header = ["kind", "what", "A", "B"];
     html! {
-        @if rows.is_empty() { p { "Device, build and scene are the same." } }
-        @else { (table("What differs between A and B", &["kind", "what", "A", "B"], &rows)) }
+        @if found.is_empty() { p { "Device, build and scene are the same." } }
+        (table("What differs between A and B", &header, found.iter().map(row)))
     }
 }
 
@@ -73,7 +76,7 @@ fn headline(mode: &ModeComparison) -> Markup {
 }
 
 fn ratios(modes: &[ModeComparison]) -> Markup {
-    let row = |mode: &ModeComparison, m: &MeasureComparison| -> Vec<Cell> {
+    let row = |mode: &ModeComparison, m: &MeasureComparison| {
         vec![
             text(&m.measure),
             text(&mode.name),
@@ -87,8 +90,7 @@ fn ratios(modes: &[ModeComparison]) -> Markup {
             text(m.verdict.text()),
         ]
     };
-    let rows: Vec<Vec<Cell>> =
-        modes.iter().flat_map(|mode| mode.measures.iter().map(move |m| row(mode, m))).collect();
+    let rows = modes.iter().flat_map(|mode| mode.measures.iter().map(move |m| row(mode, m)));
     let header = [
         "measure",
         "loop",
@@ -101,7 +103,7 @@ fn ratios(modes: &[ModeComparison]) -> Markup {
         "n of B",
         "B is",
     ];
-    table("Medians, their ratios and 95 % intervals", &header, &rows)
+    table("Medians, their ratios and 95 % intervals", &header, rows)
 }
 
 /// Compares the pictures of cases with equal names.

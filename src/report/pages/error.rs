@@ -7,7 +7,7 @@ use maud::{Markup, html};
 use super::figure::figure as chart_figure;
 use super::pictures::{self, Png};
 use super::provenance;
-use super::table::{Cell, count, figure, remark_list, table, text, value};
+use super::table::{count, figure, remark_list, table, text, value};
 use crate::error::Result;
 use crate::report::charts::error::{chart, error_of, front_numbers, metric_name, time_of};
 use crate::report::charts::number;
@@ -21,6 +21,9 @@ use crate::studies::picture_error::PictureError;
 const REFERENCE_FILE: &str = "reference.png";
 
 /// Returns the section of a study.
+///
+/// # Errors
+/// Fails if the chart cannot be drawn or a picture cannot be read.
 pub fn section(study: &Study, folder: &Path) -> Result<Markup> {
     let caption = "Lower is more accurate, left is faster. Bars are 95 % intervals. The line joins \
         the configurations that no other configuration beats in both time and error. Point at a \
@@ -38,7 +41,6 @@ pub fn section(study: &Study, folder: &Path) -> Result<Markup> {
 
 fn reference(study: &Study) -> Markup {
     let r = &study.reference;
-    let all = u64::from(r.width) * u64::from(r.height);
     html! {
         h3 { "Reference" }
         dl class="made" {
@@ -47,8 +49,8 @@ fn reference(study: &Study) -> Markup {
                 (r.height) " pixels"
             }
             dt { "Known at" } dd {
-                @if r.n_pixels as u64 == all { "every pixel" }
-                @else { (r.n_pixels) " of " (all) " pixels" }
+                @if r.is_everywhere() { "every pixel" }
+                @else { (r.n_pixels) " of " (r.n_all_pixels()) " pixels" }
             }
             dt { "Its own error" } dd {
                 @if let Some(rmse) = r.own_error { (number(rmse)) " RMSE: " }
@@ -67,8 +69,7 @@ fn reference(study: &Study) -> Markup {
 }
 
 fn configurations(study: &Study) -> Markup {
-    let numbers = front_numbers(study);
-    let row = |(c, number): (&Configuration, &Option<usize>)| -> Vec<Cell> {
+    let row = |(c, number): (&Configuration, Option<usize>)| {
         vec![
             text(&c.name),
             number.map_or_else(|| text(""), count),
@@ -82,7 +83,7 @@ fn configurations(study: &Study) -> Markup {
             text(&c.failure.clone().unwrap_or_else(|| remark(c.error).to_owned())),
         ]
     };
-    let rows: Vec<Vec<Cell>> = study.configurations.iter().zip(&numbers).map(row).collect();
+    let rows = study.configurations.iter().zip(front_numbers(study)).map(row);
     let header = [
         "configuration",
         "№",
@@ -101,7 +102,7 @@ fn configurations(study: &Study) -> Markup {
          number in the chart",
         metric_name(study.metric)
     );
-    table(&caption, &header, &rows)
+    table(&caption, &header, rows)
 }
 
 fn front_name(front: Front) -> &'static str {
@@ -121,7 +122,7 @@ fn remark(error: Option<PictureError>) -> &'static str {
 }
 
 fn best(study: &Study) -> Markup {
-    let row = |b: &Best| -> Vec<Cell> {
+    let row = |b: &Best| {
         let found = b.configuration.and_then(|i| study.configurations.get(i));
         let unit = match b.budget {
             Budget::Ms => " ms".to_owned(),
@@ -134,25 +135,8 @@ fn best(study: &Study) -> Markup {
             figure(found.and_then(|c| error_of(study, c))),
         ]
     };
-    let rows: Vec<Vec<Cell>> = study.best.iter().map(row).collect();
-    if rows.is_empty() {
-        html! {}
-    } else {
-        table(
-            "The best configuration for every budget",
-            &["budget", "best", "time, ms", "error"],
-            &rows,
-        )
-    }
-}
-
-fn reference_caption(study: &Study) -> &'static str {
-    let r = &study.reference;
-    if r.n_pixels as u64 == u64::from(r.width) * u64::from(r.height) {
-        "the reference"
-    } else {
-        "the reference: every cell has the colour of its computed pixel"
-    }
+    let header = ["budget", "best", "time, ms", "error"];
+    table("The best configuration for every budget", &header, study.best.iter().map(row))
 }
 
 fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
@@ -161,6 +145,11 @@ fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
         None => Ok(None),
     };
     let reference = Png::read(folder, REFERENCE_FILE)?;
+    let reference_caption = if study.reference.is_everywhere() {
+        "the reference"
+    } else {
+        "the reference: every cell has the colour of its computed pixel"
+    };
     let mut shown = Vec::new();
     for c in &study.configurations {
         let (picture, map) = (read(&c.picture)?, read(&c.error_map)?);
@@ -197,15 +186,16 @@ fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
     Ok(html! {
         @if reference.is_some() || !shown.is_empty() { h3 { "Pictures" } }
         @if let Some(reference) = &reference {
-            div class="reference" {
-                (reference.figure("The reference", reference_caption(study)))
-            }
+            div class="reference" { (reference.figure("The reference", reference_caption)) }
         }
         @for pair in &shown { (pair) }
     })
 }
 
 /// Compares the configurations that two studies have in common.
+///
+/// # Errors
+/// Fails if a picture cannot be read.
 pub fn comparison(a: &Study, b: &Study, [folder_a, folder_b]: [&Path; 2]) -> Result<Markup> {
     let remarks: Vec<String> = [
         ("scenes", a.made.scene_hash != b.made.scene_hash),
@@ -223,7 +213,7 @@ pub fn comparison(a: &Study, b: &Study, [folder_a, folder_b]: [&Path; 2]) -> Res
             .iter()
             .filter_map(|of_a| Some((of_a, b.configurations.iter().find(|c| c.name == of_a.name)?)))
     };
-    let row = |(of_a, of_b): (&Configuration, &Configuration)| -> Vec<Cell> {
+    let row = |(of_a, of_b): (&Configuration, &Configuration)| {
         let times = time_of(a, of_a).zip(time_of(b, of_b));
         vec![
             text(&of_a.name),
@@ -235,7 +225,6 @@ pub fn comparison(a: &Study, b: &Study, [folder_a, folder_b]: [&Path; 2]) -> Res
             text(&format!("{} / {}", front_name(of_a.front), front_name(of_b.front))),
         ]
     };
-    let rows: Vec<Vec<Cell>> = both().map(row).collect();
     let mut shown = Vec::new();
     for (of_a, of_b) in both() {
         if let (Some(name_a), Some(name_b)) = (&of_a.picture, &of_b.picture) {
@@ -249,8 +238,8 @@ pub fn comparison(a: &Study, b: &Study, [folder_a, folder_b]: [&Path; 2]) -> Res
         ["configuration", "A, ms", "B, ms", "B / A", "A, error", "B, error", "front in A / B"];
     Ok(html! {
         (remark_list(&remarks))
-        @if rows.is_empty() { p { "A and B have no configuration in common." } }
-        @else { (table("Configurations in common", &header, &rows)) }
+        @if both().next().is_none() { p { "A and B have no configuration in common." } }
+        (table("Configurations in common", &header, both().map(row)))
         @for pair in &shown { (pair) }
     })
 }

@@ -8,6 +8,9 @@ use crate::error::Result;
 use crate::report::charts::{Chart, NEUTRAL_COLORS, SERIES_COLORS, ThemeColor};
 
 /// Returns a chart with a caption.
+///
+/// # Errors
+/// Fails if plotters cannot draw the chart.
 pub fn figure(chart: &impl Chart, caption: &str) -> Result<Markup> {
     let svg = chart.svg(chart.size())?;
     Ok(html! { figure class="chart" { (PreEscaped(svg)) figcaption { (caption) } } })

@@ -4,13 +4,16 @@ use maud::{Markup, html};
 
 use super::figure::figure as chart_figure;
 use super::provenance;
-use super::table::{Cell, figure, percent, table, text, value};
+use super::table::{figure, percent, table, text, value};
 use crate::error::Result;
 use crate::report::charts::ledger::chart;
 use crate::report::charts::{number, with_interval};
 use crate::studies::ledger::records::{Ledger, Row};
 
 /// Returns the section of a ledger.
+///
+/// # Errors
+/// Fails if the chart cannot be drawn.
 pub fn section(ledger: &Ledger) -> Result<Markup> {
     let total = with_interval(ledger.total.value, ledger.total.low, ledger.total.high);
     let caption = "RMSE of two pictures that differ in that approximation alone, with 95 % \
@@ -37,7 +40,7 @@ pub fn section(ledger: &Ledger) -> Result<Markup> {
 }
 
 fn rows(ledger: &Ledger) -> Markup {
-    let row = |r: &Row| -> Vec<Cell> {
+    let row = |r: &Row| {
         let resolved =
             if r.is_resolved { "" } else { "not resolved: below the references' own error" };
         vec![
@@ -63,9 +66,6 @@ fn rows(ledger: &Ledger) -> Markup {
         "time, by without",
         "remark",
     ];
-    table(
-        "Every approximation, each against the one below it",
-        &header,
-        &ledger.rows.iter().map(row).collect::<Vec<_>>(),
-    )
+    let caption = "Every approximation, each against the one below it";
+    table(caption, &header, ledger.rows.iter().map(row))
 }

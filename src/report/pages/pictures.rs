@@ -26,6 +26,9 @@ pub struct Png {
 impl Png {
     /// Reads a file of `folder`; None if there is no such file. Names of other folders are refused,
     /// because they could put any file of the machine into the page.
+    ///
+    /// # Errors
+    /// Fails if the name is that of another folder, or the file is no PNG or cannot be read.
     pub fn read(folder: &Path, name: &str) -> Result<Option<Png>> {
         let path = folder.join(name);
         if Path::new(name).file_name() != Some(name.as_ref()) {
@@ -63,6 +66,9 @@ impl Png {
 
 /// Returns two pictures, given by folder and name, and the map of their difference. With scripts,
 /// a slider shows one above the other. None if a picture is missing.
+///
+/// # Errors
+/// Fails if a picture cannot be read.
 pub fn comparison(
     label: &str,
     [(folder_a, a), (folder_b, b)]: [(&Path, &str); 2],

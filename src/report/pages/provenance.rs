@@ -28,6 +28,9 @@ struct Origin {
 }
 
 /// Returns the list of what produced a record.
+///
+/// # Errors
+/// Fails if the record lacks one of the keys.
 pub fn section(record: &impl Serialize) -> Result<Markup> {
     let origin: Origin = serde_json::to_value(record)
         .and_then(serde_json::from_value)

@@ -68,8 +68,12 @@ pub fn remark_list(remarks: &[String]) -> Markup {
     }
 }
 
-/// Returns a table whose first column holds the rows' names.
-pub fn table(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
+/// Returns a table whose first column holds the rows' names; nothing without rows.
+pub fn table(caption: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<Cell>>) -> Markup {
+    let rows: Vec<Vec<Cell>> = rows.into_iter().collect();
+    if rows.is_empty() {
+        return html! {};
+    }
     let is_number = |i: usize| rows.iter().any(|row| row.get(i).is_some_and(|cell| cell.is_number));
     html! {
         div class="wide" tabindex="0" role="region" aria-label=(caption) {
@@ -79,7 +83,7 @@ pub fn table(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
                     th scope="col" class=[is_number(i).then_some("number")] { (name) }
                 } } }
                 tbody {
-                    @for row in rows {
+                    @for row in &rows {
                         tr {
                             @for (i, Cell { content, value, is_number }) in row.iter().enumerate() {
                                 @if i == 0 {

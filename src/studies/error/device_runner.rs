@@ -6,8 +6,7 @@ use std::time::Instant;
 use super::blocks::TimedBlock;
 use super::study::Runner;
 use crate::error::{Error, Result};
-use crate::frame::limits;
-use crate::frame::{GpuContext, Player};
+use crate::frame::{GpuContext, Player, limits};
 use crate::layout::facet::LitRecord;
 use crate::model::scene::Scene;
 

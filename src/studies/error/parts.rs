@@ -4,7 +4,7 @@ use super::blocks::TimedBlock;
 use super::records::{Configuration, Study};
 use super::study::StudyResults;
 use crate::timing::attachments::PictureCopy;
-use crate::timing::difference::{Facts, fact_differences};
+use crate::timing::difference::{Facts, fact_differences, short};
 
 /// A part as it was read.
 #[derive(Debug, Clone)]
@@ -40,7 +40,7 @@ impl Part {
             ("device", made.device.class()),
             ("processor", made.cpu.class()),
             ("environment", format!("{:?}", made.environment)),
-            ("reference", reference.hash.chars().take(12).collect()),
+            ("reference", short(&reference.hash)),
             ("time that decides", time.name().to_owned()),
             ("error that decides", metric.name().to_owned()),
             ("frames of a turn", frames.to_string()),

@@ -53,14 +53,12 @@ struct Link {
     name: String,
     from: String,
     to: String,
-    /// Whether the device draws both pictures, configurations `i` and `i + 1`.
-    is_on_device: bool,
 }
 
 impl Link {
-    fn computed(name: &str, from: &str, to: &str) -> Link {
+    fn new(name: &str, from: &str, to: &str) -> Link {
         let [name, from, to] = [name, from, to].map(str::to_owned);
-        Link { name, from, to, is_on_device: false }
+        Link { name, from, to }
     }
 }
 
@@ -95,12 +93,7 @@ impl LedgerStudy<'_> {
             let rgba = sampled(self.pixels, &runner.picture(i)?);
             chain.pictures.push(ChainPicture { rgba, own_error: 0.0 });
         }
-        chain.links.extend(approximations.iter().map(|a| Link {
-            name: a.name.to_owned(),
-            from: a.from.clone(),
-            to: a.to.clone(),
-            is_on_device: true,
-        }));
+        chain.links.extend(approximations.iter().map(|a| Link::new(a.name, &a.from, &a.to)));
         let last = scenes.len() - 1;
         self.add_references(&mut runner, last, scenes[last], &mut chain, listener)?;
         let rounds = self.time(&mut runner, scenes.len())?;
@@ -135,9 +128,9 @@ impl LedgerStudy<'_> {
         let draw = |light: &FrameReference, drawing: BlobModel| {
             render_lit_scene(scene, light, drawing, self.pixels, PixelSample::CENTER, listener)
         };
-        chain.add(Link::computed("drawing", "f32", "f64"), draw(&by_device, BlobModel::Thin));
+        chain.add(Link::new("drawing", "f32", "f64"), draw(&by_device, BlobModel::Thin));
         if scene.n_particles() > 0 && !self.is_stopped() {
-            let link = Link::computed("thin sprites", "sprites", "volume");
+            let link = Link::new("thin sprites", "sprites", "volume");
             chain.add(link, draw(&by_device, BlobModel::Volume));
         }
         if !is_lit || self.is_stopped() {
@@ -145,15 +138,15 @@ impl LedgerStudy<'_> {
         }
         // The reference of the light on surfaces has no density grid.
         let link = if scene.n_particles() > 0 && !scene.surfaces.is_empty() {
-            Link::computed("first reflection", "f32, grid", "f64, closed form on surfaces")
+            Link::new("first reflection", "f32, grid", "f64, closed form on surfaces")
         } else {
-            Link::computed("first reflection", "f32", "f64")
+            Link::new("first reflection", "f32", "f64")
         };
         let (second, second_error) = (by_device.second, Vec::new());
         let first = FrameReference { second, second_error, ..exact.clone() };
         chain.add(link, draw(&first, BlobModel::Volume));
         if n_reflections(scene) > 1 {
-            let link = Link::computed("second reflection", "pairs in f32", "areas in f64");
+            let link = Link::new("second reflection", "pairs in f32", "areas in f64");
             chain.add(link, draw(&exact, BlobModel::Volume));
         }
         self.add_models(scene, chain, listener)
@@ -171,13 +164,13 @@ impl LedgerStudy<'_> {
         };
         let (k, n) = (n_reflections(scene), self.n_reflections);
         if scene.n_particles() > 0 {
-            add(Link::computed("density grid", "grid and march", "closed form"), true, k)?;
+            add(Link::new("density grid", "grid and march", "closed form"), true, k)?;
         }
         if !scene.surfaces.is_empty() {
-            add(Link::computed("facets of surfaces", "between facets", "every pixel"), false, k)?;
+            add(Link::new("facets of surfaces", "between facets", "every pixel"), false, k)?;
         }
         if n > k {
-            add(Link::computed("reflections", &k.to_string(), &n.to_string()), false, n)?;
+            add(Link::new("reflections", &k.to_string(), &n.to_string()), false, n)?;
         }
         Ok(())
     }
@@ -228,7 +221,7 @@ impl LedgerStudy<'_> {
             share: share(error.value, sum),
             own_error: *own_error,
             is_resolved: own_error * RESOLVED <= error.value,
-            time_ratio: if link.is_on_device { time_ratio(rounds, i) } else { None },
+            time_ratio: time_ratio(rounds, i),
         };
         let (total, _) = compare(first, last)?;
         Ok(Ledger {
@@ -252,7 +245,8 @@ impl LedgerStudy<'_> {
 }
 
 /// Returns the time of configuration `i` divided by that of configuration `i + 1`, which has one
-/// approximation less. In every round the two are neighbours.
+/// approximation less. In every round the two are neighbours. None if the device does not draw
+/// both.
 fn time_ratio(rounds: &[Vec<TimedBlock>], i: usize) -> Option<Figure> {
     let ms = |block: &TimedBlock| median(&block.gpu_ms).or_else(|| median(&block.frame_ms));
     let of = |round: &Vec<TimedBlock>| {

@@ -74,7 +74,7 @@ impl Time {
 }
 
 /// Threading of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Threading {
     /// Game and render steps alternate on one thread.
     Serial,

@@ -4,8 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use super::egui_layer::{WidgetFrame, take_widgets};
 use crate::error::Result;
-use crate::frame::Renderer;
-use crate::frame::{DeviceChoice, GpuContext};
+use crate::frame::{DeviceChoice, GpuContext, Renderer};
 use crate::gpu::{
     Buffer, Commands, Instance, MemoryUsage, Overlay, PresentMode, PresentOutcome, Recorder,
     Surface, Swapchain,

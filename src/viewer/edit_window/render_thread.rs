@@ -4,6 +4,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
+use winit::event_loop::EventLoopProxy;
+
 use crate::error::{Error, Result};
 use crate::frame::DeviceChoice;
 use crate::gpu::{Instance, PresentMode, Surface};
@@ -77,13 +79,22 @@ pub enum RenderEvent {
 }
 
 /// State that the window and its render thread share.
+#[derive(Clone)]
 pub struct RenderLinks {
     pub requests: Arc<DrawRequests>,
     pub widgets: SharedWidgets,
-    /// Sends an event to the window.
-    pub send: Box<dyn Fn(RenderEvent) + Send>,
+    /// Events to the window.
+    pub events: EventLoopProxy<RenderEvent>,
     /// Ends the thread when set.
     pub stop: &'static AtomicBool,
+}
+
+impl RenderLinks {
+    /// Sends an event to the window.
+    pub fn send(&self, event: RenderEvent) {
+        // Sending fails only after the event loop has ended, when no event matters any more.
+        drop(self.events.send_event(event));
+    }
 }
 
 /// Renders the edited cloud into a window. Fields are dropped in this order.
@@ -154,13 +165,13 @@ impl EditRenderer {
             }
             match self.update(&state) {
                 Ok(()) if std::mem::take(&mut self.has_failed) => {
-                    (self.links.send)(RenderEvent::Failure(None));
+                    self.links.send(RenderEvent::Failure(None));
                 }
                 Ok(()) => {}
                 // The document stays, also where it does not fit the device.
                 Err(error @ (Error::Limit { .. } | Error::Usage { .. })) => {
                     self.has_failed = true;
-                    (self.links.send)(RenderEvent::Failure(Some(error.to_string())));
+                    self.links.send(RenderEvent::Failure(Some(error.to_string())));
                 }
                 Err(error) => return Err(error),
             }
@@ -206,7 +217,7 @@ impl EditRenderer {
             let boxes = &state.document.boxes;
             let acceptances = box_acceptances(boxes, self.edited.statuses(boxes, &statuses));
             let event = RenderEvent::Acceptances(state.document.clone(), acceptances);
-            (self.links.send)(event);
+            self.links.send(event);
         }
         Ok(())
     }

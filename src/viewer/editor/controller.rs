@@ -11,7 +11,6 @@ use super::handles::Handle;
 use super::input::{Field, Input};
 use super::numbers;
 use super::pointer::{Gesture, PictureArea, Pointer};
-use super::refusal::Refusal;
 use super::session::{Answer, Intent, Request, Session, SessionEvent};
 use super::shortcuts::{Command, Key, command};
 use super::state::Editor;
@@ -120,7 +119,7 @@ impl EditorController {
                 self.message = None;
                 match self.typed(*field, text) {
                     Ok(action) => self.act(action),
-                    Err(Refusal(why)) => self.message = Some(why),
+                    Err(why) => self.message = Some(why),
                 }
             }
         }
@@ -132,7 +131,7 @@ impl EditorController {
                 self.session = session;
                 requests.extend(request);
             }
-            Err(Refusal(why)) => self.message = Some(why),
+            Err(why) => self.message = Some(why),
         }
     }
 
@@ -196,10 +195,10 @@ impl EditorController {
         self.send(&event, requests);
     }
 
-    fn typed(&self, field: Field, text: &str) -> Result<Action, Refusal> {
+    fn typed(&self, field: Field, text: &str) -> Result<Action, String> {
         let is_of_boxes = !matches!(field, Field::Seed | Field::SnapStep);
         if is_of_boxes && self.editor().selection().is_empty() {
-            return Err(Refusal("nothing is selected".to_owned()));
+            return Err("nothing is selected".to_owned());
         }
         let length = || numbers::length(text, self.metres_per_unit);
         Ok(Action::Edit(match field {

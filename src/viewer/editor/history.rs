@@ -4,22 +4,13 @@
 //! them, and undoing by arithmetic would not restore every bit.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 
-use super::document::Document;
-use super::selection::Selection;
+use super::snapshot::Snapshot;
 
 /// Largest number of steps that are kept.
 pub const MAX_STEPS: usize = 1000;
 /// Largest size of the kept documents, bytes. The last step is kept whatever its size.
 pub const MAX_BYTES: usize = 256 << 20;
-
-/// A document and its selection.
-#[derive(Debug, Clone)]
-pub struct Snapshot {
-    pub document: Arc<Document>,
-    pub selection: Selection,
-}
 
 /// A state next to the present one, and the name of the change between them.
 #[derive(Debug, Clone)]
@@ -93,7 +84,11 @@ impl Step {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use super::super::document::Document;
     use super::super::fixtures::document;
+    use super::super::selection::Selection;
     use super::*;
     use crate::model::boxes::CloudBox;
 

@@ -8,7 +8,6 @@ use std::sync::Arc;
 
 use super::action::{Action, DragAction};
 use super::document::{Document, are_same_boxes};
-use super::refusal::Refusal;
 use super::state::Editor;
 use crate::error::Error;
 use crate::io::box_file;
@@ -168,7 +167,7 @@ impl Session {
     ///
     /// # Errors
     /// The editor rejects an action.
-    pub fn after(&self, event: &SessionEvent) -> Result<(Session, Option<Request>), Refusal> {
+    pub fn after(&self, event: &SessionEvent) -> Result<(Session, Option<Request>), String> {
         let mut next = self.clone();
         if let SessionEvent::Act(action) = event {
             next.editor = self.editor.after(action)?;

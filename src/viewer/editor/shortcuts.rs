@@ -2,10 +2,9 @@
 
 use std::fmt;
 
-use super::action::{Action, DragAction, Edit, Select, Setting};
+use super::action::{Action, DragAction, Edit, MirrorPlane, MirrorResult, Select, Setting};
 use super::axis::Axis;
 use super::grid_snap::GridSnap;
-use super::mirror::{MirrorPlane, MirrorResult};
 use super::settings::DisplayMode;
 use super::state::Editor;
 

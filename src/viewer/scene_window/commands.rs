@@ -4,13 +4,7 @@ use glam::DVec3;
 
 use super::knobs::Knob;
 use super::playback::Seek;
-
-/// File format of a captured picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CaptureFormat {
-    Png,
-    Exr,
-}
+use crate::io::image::ImageKind;
 
 /// How the picture of A is compared with that of B.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +30,7 @@ pub enum Command {
     /// Multiplies the flying speed by 2 to this power.
     Speed(f64),
     /// Saves the picture.
-    Capture(CaptureFormat),
+    Capture(ImageKind),
     TogglePanels,
     /// Counts non-finite and clipped values of the next frame.
     Count,
@@ -88,8 +82,8 @@ pub const SHORTCUTS: [Shortcut; 27] = [
     key("home", Command::Seek(Seek::To(0)), "first frame"),
     key("+", Command::Speed(1.0), "fly twice as fast"),
     key("-", Command::Speed(-1.0), "fly half as fast"),
-    key("f12", Command::Capture(CaptureFormat::Png), "save the picture as PNG"),
-    key("f11", Command::Capture(CaptureFormat::Exr), "save the picture as EXR"),
+    key("f12", Command::Capture(ImageKind::Png), "save the picture as PNG"),
+    key("f11", Command::Capture(ImageKind::Exr), "save the picture as EXR"),
     key("h", Command::TogglePanels, "show or hide the panels"),
     key("n", Command::Count, "count non-finite and clipped values of a frame"),
     key("m", Command::ToggleB, "keep the settings as B for a comparison, or drop B"),

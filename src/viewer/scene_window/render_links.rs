@@ -3,9 +3,11 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::commands::CaptureFormat;
+use winit::event_loop::EventLoopProxy;
+
 use super::status::SharedStatus;
 use super::view_state::ViewState;
+use crate::io::image::ImageKind;
 use crate::model::film::Film;
 use crate::viewer::egui_layer::SharedWidgets;
 use crate::viewer::fly_camera::FlyCamera;
@@ -20,7 +22,7 @@ pub enum RenderEvent {
     Message(String),
     /// A picture to save: premultiplied linear RGBA, rows from the top.
     Capture {
-        format: CaptureFormat,
+        format: ImageKind,
         film: Film,
         rgba: Vec<f32>,
     },
@@ -46,20 +48,27 @@ pub struct Readback {
 }
 
 /// State that the window and its render thread share.
+#[derive(Clone)]
 pub struct RenderLinks {
     pub state: Arc<Mutex<ViewState>>,
     pub status: SharedStatus,
     pub widgets: SharedWidgets,
-    /// Sends an event to the window.
-    pub send: Box<dyn Fn(RenderEvent) + Send>,
+    /// Events to the window.
+    pub events: EventLoopProxy<RenderEvent>,
     /// Ends the thread when set.
     pub stop: &'static AtomicBool,
 }
 
 impl RenderLinks {
+    /// Sends an event to the window.
+    pub fn send(&self, event: RenderEvent) {
+        // Sending fails only after the event loop has ended, when no event matters any more.
+        drop(self.events.send_event(event));
+    }
+
     /// Sends a message for the terminal.
     pub fn message(&self, text: String) {
-        (self.send)(RenderEvent::Message(text));
+        self.send(RenderEvent::Message(text));
     }
 
     /// Returns whether the thread is to end.

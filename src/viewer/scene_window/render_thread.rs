@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::comparison::CameraQueue;
-use super::frame_loop::{FrameLoop, LoopSamples, LoopTimes};
+use super::frame_loop::{FrameLoop, LoopSamples, LoopTimes, loop_times};
 use super::render_links::{RenderEvent, RenderLinks};
 use super::view_state::{Variant, ViewState};
 use crate::error::{Error, Result};
@@ -106,7 +106,7 @@ impl SceneRenderer {
             }
         }
         self.target.close()?;
-        Ok(self.samples.times())
+        Ok(loop_times(&self.samples))
     }
 
     /// Recreates the swapchain by the state's size and present mode. Returns false where the window
@@ -138,7 +138,7 @@ impl SceneRenderer {
         self.failed_at = Some((state.version, state.n_shader_loads));
         let text = format!("{}; the last good state stays", error.to_string().trim_end());
         lock(&self.links.status).render_error = Some(text.clone());
-        (self.links.send)(RenderEvent::ErrorChanged);
+        self.links.send(RenderEvent::ErrorChanged);
         self.links.message(text);
     }
 

@@ -3,11 +3,9 @@
 use std::sync::{Arc, Mutex};
 
 use super::timeline::Timeline;
-use crate::frame::Counts;
-use crate::frame::FrameTimes;
 use crate::frame::plan::Plan;
+use crate::frame::{Counts, FrameTimes};
 use crate::gpu::PresentMode;
-use crate::model::scene::Threading;
 use crate::studies::picture_error::PictureError;
 use crate::viewer::error_probe::ProbeStatus;
 
@@ -52,19 +50,16 @@ pub type SharedStatus = Arc<Mutex<ViewStatus>>;
 
 impl ViewStatus {
     /// Adds the times of a frame.
-    pub fn push(&mut self, threading: Threading, times: &FrameTimes, n_particles: u64) {
-        self.timeline.push(threading, times);
+    pub fn push(&mut self, times: &FrameTimes, n_particles: u64) {
+        self.timeline.push(times);
         let FrameTimes { time_s, plan, .. } = *times;
         self.last_frame = Some(LastFrame { time_s, n_shown: times.n_shown(), n_particles, plan });
     }
 
     /// Returns the errors to show over the picture, a line each; `None` where all is well.
     pub fn alarm(&self) -> Option<String> {
-        let errors: Vec<&str> = [&self.file_error, &self.render_error]
-            .into_iter()
-            .flatten()
-            .map(String::as_str)
-            .collect();
+        let errors = [&self.file_error, &self.render_error].into_iter().flatten();
+        let errors: Vec<&str> = errors.map(String::as_str).collect();
         (!errors.is_empty()).then(|| errors.join("\n"))
     }
 }

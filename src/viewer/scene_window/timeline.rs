@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use crate::frame::FrameTimes;
 use crate::measure::stats::{Summary, median};
-use crate::model::scene::Threading;
 
 /// Number of frames that a timeline keeps.
 pub const CAPACITY: usize = 240;
@@ -16,7 +15,6 @@ pub type Span = [f64; 2];
 /// Times of one frame, ms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
-    pub threading: Threading,
     pub frame_ms: f64,
     pub game_ms: f64,
     /// Recording and submission.
@@ -52,7 +50,7 @@ pub struct Timeline {
 
 impl Timeline {
     /// Adds a frame, and drops the oldest where there are too many.
-    pub fn push(&mut self, threading: Threading, times: &FrameTimes) {
+    pub fn push(&mut self, times: &FrameTimes) {
         let zero = *self.zero.get_or_insert(times.marks.game[0]);
         let at = |t: Instant| t.saturating_duration_since(zero).as_secs_f64() * 1e3;
         let end = at(times.marks.end);
@@ -63,7 +61,6 @@ impl Timeline {
         }
         let passes = times.passes.iter();
         self.frames.push_back(Frame {
-            threading,
             frame_ms: times.frame_ms,
             game_ms: times.game_ms,
             record_ms: times.record_ms + times.submit_ms,
@@ -142,8 +139,8 @@ mod tests {
     fn frames_share_one_time_line_and_device_passes_end_with_their_frame() {
         let zero = Instant::now();
         let mut line = Timeline::default();
-        line.push(Threading::Serial, &times(zero, 0, &[("grid", 5e6, 6e6), ("tiles", 6e6, 9e6)]));
-        line.push(Threading::Parallel, &times(zero, 1, &[("tiles", 100e6, 101e6)]));
+        line.push(&times(zero, 0, &[("grid", 5e6, 6e6), ("tiles", 6e6, 9e6)]));
+        line.push(&times(zero, 1, &[("tiles", 100e6, 101e6)]));
         let [first, second] = [0, 1].map(|i| line.frames().nth(i).unwrap().clone());
         let near = |a: Span, b: Span| (a[0] - b[0]).abs() < 1e-6 && (a[1] - b[1]).abs() < 1e-6;
         assert!(near(first.game, [0.0, 2.0]) && near(second.record, [12.0, 13.0]));
@@ -166,7 +163,7 @@ mod tests {
         let zero = Instant::now();
         let mut line = Timeline::default();
         assert!(line.summary(|f| f.frame_ms).is_none() && line.passes().is_empty());
-        (0..CAPACITY as u32 + 5).for_each(|i| line.push(Threading::Serial, &times(zero, i, &[])));
+        (0..CAPACITY as u32 + 5).for_each(|i| line.push(&times(zero, i, &[])));
         assert_eq!((line.frames().len(), line.frames().next().unwrap().frame_ms), (CAPACITY, 15.0));
     }
 }

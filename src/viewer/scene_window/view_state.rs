@@ -7,9 +7,10 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::commands::{CaptureFormat, Command, Comparison, FLYING_KEYS, SHORTCUTS, help};
+use super::commands::{Command, Comparison, FLYING_KEYS, SHORTCUTS, help};
 use super::knobs::Knob;
 use super::playback::Playback;
+use crate::io::image::ImageKind;
 use crate::model::scene::Scene;
 use crate::viewer::fly_camera::{FlyCamera, Motion};
 
@@ -38,7 +39,7 @@ pub struct ViewState {
     /// Width and height of the window in pixels.
     pub size: [u32; 2],
     /// A picture to save.
-    pub capture: Option<CaptureFormat>,
+    pub capture: Option<ImageKind>,
     /// Whether panels are shown.
     pub has_panels: bool,
     /// The next frame's values are to be counted.
@@ -208,7 +209,7 @@ impl ViewState {
 
     /// Takes the capture and the readback that were asked for, for a frame drawn at `version` of
     /// this state.
-    pub fn take_readbacks(&mut self, version: u64) -> (Option<CaptureFormat>, bool) {
+    pub fn take_readbacks(&mut self, version: u64) -> (Option<ImageKind>, bool) {
         if self.version != version {
             return (None, false);
         }
@@ -285,7 +286,7 @@ mod tests {
         );
         s.press("f12");
         s.press("escape");
-        assert!(s.capture == Some(CaptureFormat::Png) && s.is_closing);
+        assert!(s.capture == Some(ImageKind::Png) && s.is_closing);
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! `nimbus error SCENE`.
 
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::ColorChoice;
 use indicatif::ProgressBar;
@@ -9,14 +8,14 @@ use indicatif::ProgressBar;
 use super::args::ErrorArgs;
 use super::error_configurations::{axes, design, load_configuration};
 use super::error_table;
+use super::interrupt::graceful_stop;
 use super::output::{self, refuse_existing};
 use super::progress::{ReferenceProgress, progress};
 use super::scene::{
     check_time, device_choice, load, print_sizes, with_texture_hint, without_textures,
 };
 use crate::error::{Error, Result};
-use crate::frame::GpuContext;
-use crate::frame::limits;
+use crate::frame::{GpuContext, limits};
 use crate::io::image;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;
@@ -36,17 +35,12 @@ use crate::timing::machine;
 use crate::timing::names::Setting;
 use crate::timing::results::prepare_out_dir;
 
-/// Runs `nimbus error`; sets `graceful` once Ctrl-C should save the results.
+/// Runs `nimbus error`.
 ///
 /// # Errors
 /// Fails if the arguments or the scene are faulty, the device fails, or Ctrl-C came. Finished
 /// results are kept in `--out`.
-pub fn run(
-    args: &ErrorArgs,
-    color: ColorChoice,
-    stop: &AtomicBool,
-    graceful: &AtomicBool,
-) -> Result<()> {
+pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     if let (Some(out), false) = (&args.out, args.resume) {
         refuse_existing(out, args.force)?;
     }
@@ -98,7 +92,7 @@ pub fn run(
         write_reference(&out.join("reference.png"), &film, &pixels, &cached.reference.rgba)?;
         files::write(out, &study, &results)?;
     }
-    graceful.store(true, Ordering::Relaxed);
+    let stop = graceful_stop();
     let (n_frames, as_played) = (args.frames, args.as_played);
     let frames = FrameChoice { i_frame: args.frame, time_s, n_frames, as_played };
     let mut runner = DeviceRunner::new(&gpu, frames);
@@ -137,7 +131,7 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
     }
     if args.csv {
         let rows: Vec<_> = study.configurations.iter().map(files::csv_row).collect();
-        return output::rows(&rows, false);
+        return output::text(&output::rows(&rows, false)?);
     }
     output::text(&error_table::report(study))?;
     if args.plot {

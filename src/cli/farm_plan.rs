@@ -121,12 +121,13 @@ fn all_frames(loaded: &LoadedScene) -> Span {
 ///
 /// # Errors
 /// When a run fails, the runs do not determine a model, or the file cannot be written.
-pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
+pub fn calibrated(args: &CalibrateArgs) -> Result<()> {
     atomic::check_place(&args.output)?;
     refuse_existing(&args.output, args.force)?;
     let choice = DeviceChoice { device: args.device.clone(), ..DeviceChoice::default() };
     let bar = progress(n_frames(args.scenes.len(), args.frames), "frames", args.quiet);
-    let options = RunOptions { choice: &choice, stop, on_item: &|| bar.inc(1) };
+    let never = AtomicBool::new(false);
+    let options = RunOptions { choice: &choice, stop: &never, on_item: &|| bar.inc(1) };
     let found = match &args.farm[..] {
         [] => calibrate(&args.scenes, &args.set, args.frames, &options),
         farms => calibrate_by_farms(farms),

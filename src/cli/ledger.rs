@@ -1,18 +1,14 @@
 //! `nimbus ledger SCENE`.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use super::args::LedgerArgs;
+use super::interrupt::graceful_stop;
 use super::output::{self, header, interval, or_dash, refuse_existing, scientific};
 use super::progress::ReferenceProgress;
 use super::scene::{check_time, device_choice, load, with_texture_hint, without_textures};
 use crate::error::{Error, Result};
-use crate::frame::GpuContext;
-use crate::frame::limits;
+use crate::frame::{GpuContext, limits};
 use crate::io::atomic::check_place;
-use crate::reference::picture::Pixels;
-use crate::reference::picture::ReferenceKind;
-use crate::reference::picture::n_reflections;
+use crate::reference::picture::{Pixels, ReferenceKind, n_reflections};
 use crate::report::charts;
 use crate::studies::error::device_runner::FrameChoice;
 use crate::studies::ledger::records::{Ledger, Row};
@@ -22,12 +18,12 @@ use crate::timing::json::{self, ResultFile};
 use crate::timing::machine;
 use crate::timing::results::prepare_out_dir;
 
-/// Runs `nimbus ledger`; sets `graceful` once Ctrl-C should save the finished rows.
+/// Runs `nimbus ledger`.
 ///
 /// # Errors
 /// Fails if the arguments or the scene are faulty, the device fails, the rows do not sum up, or
 /// Ctrl-C came.
-pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
+pub fn run(args: &LedgerArgs) -> Result<()> {
     if let Some(out) = &args.out {
         refuse_existing(out, args.force)?;
     }
@@ -53,7 +49,7 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
         prepare_out_dir(out, true)?;
         check_place(&out.join(Ledger::FILE))?;
     }
-    graceful.store(true, Ordering::Relaxed);
+    let stop = graceful_stop();
     let shown = ReferenceProgress::new(args.options.quiet);
     let study = LedgerStudy {
         gpu: &gpu,

@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::args::SceneArgs;
 use crate::error::{Error, Result};
-use crate::frame::light_notes;
 use crate::frame::limits::advice;
-use crate::frame::{DeviceChoice, Stage};
+use crate::frame::{DeviceChoice, Stage, light_notes};
 use crate::inspect::basis::basis_warnings;
 use crate::io::bounds::{GREATEST, is_carried_place, shortest};
 use crate::io::scene_file::{self, LoadedScene};

@@ -1,10 +1,11 @@
 //! `nimbus stress [CASE…]`.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use serde::Serialize;
 
 use super::args::StressArgs;
+use super::interrupt::graceful_stop;
 use super::output::{self, header};
 use super::progress::progress;
 use crate::error::{Error, Result};
@@ -27,11 +28,11 @@ struct Report {
 
 const SCHEMA_VERSION: u32 = 1;
 
-/// Runs `nimbus stress`; sets `graceful` once Ctrl-C should print the finished cases.
+/// Runs `nimbus stress`.
 ///
 /// # Errors
 /// Fails if no case has such a name, the device fails, a case fails, or Ctrl-C came.
-pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
+pub fn run(args: &StressArgs) -> Result<()> {
     let chosen = chosen(&args.cases)?;
     if args.list {
         let text = |c: &Case| format!("{}\n    {}\n    allowed: {}\n", c.name, c.what, c.bound);
@@ -44,7 +45,7 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
         poison: false,
     };
     let mut context = StressContext::open(&choice)?;
-    graceful.store(true, Ordering::Relaxed);
+    let stop = graceful_stop();
     let bar = progress(chosen.len() as u64, "cases", args.quiet);
     let mut done: Vec<Outcome> = Vec::new();
     for case in &chosen {
@@ -70,7 +71,10 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     };
     match (args.json, args.csv) {
         (true, _) => output::object(&report)?,
-        (_, true) => output::rows(&report.cases.iter().map(row).collect::<Vec<_>>(), false)?,
+        (_, true) => {
+            let rows: Vec<_> = report.cases.iter().map(row).collect();
+            output::text(&output::rows(&rows, false)?)?;
+        }
         _ => output::text(&text(&report))?,
     }
     context.close()?;

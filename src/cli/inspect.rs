@@ -76,7 +76,7 @@ fn basis_text(report: &basis::BasisReport, what: BasisArg, args: &InspectArgs) -
     }
     match what {
         _ if args.json => output::json_text(report),
-        BasisArg::Table => output::numbers(&report.table.names(), report.table.rows()),
+        BasisArg::Table => output::csv_rows(&report.table.names(), report.table.rows()),
         BasisArg::Values => output::rows(&report.singular_values, false),
         BasisArg::Errors => output::rows(&report.errors, false),
     }

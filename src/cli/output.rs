@@ -74,13 +74,16 @@ pub fn rows<T: Serialize>(rows: &[T], json: bool) -> Result<String> {
     csv_text(writer)
 }
 
-/// Returns rows of numbers as CSV under the given column names.
+/// Returns rows that have no names as CSV under the given column names.
 ///
 /// # Errors
 /// Fails if a row cannot be serialized.
-pub fn numbers(names: &[String], rows: impl Iterator<Item = Vec<f64>>) -> Result<String> {
+pub fn csv_rows<T: Serialize>(
+    names: &[impl AsRef<str>],
+    rows: impl Iterator<Item = T>,
+) -> Result<String> {
     let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(vec![]);
-    writer.serialize(names).map_err(fail)?;
+    writer.write_record(names.iter().map(AsRef::as_ref)).map_err(fail)?;
     for row in rows {
         writer.serialize(row).map_err(fail)?;
     }
@@ -152,9 +155,9 @@ pub fn table(rows: &[Vec<String>]) -> String {
     let widths: Vec<usize> = (0..n_columns).map(width).collect();
     let mut out = String::new();
     for row in rows {
-        let cells = row.iter().enumerate().map(|(c, t)| {
-            let pad = " ".repeat(widths[c] - t.chars().count());
-            if c == 0 { format!("{t}{pad}") } else { format!("{pad}{t}") }
+        let cells = row.iter().zip(&widths).enumerate().map(|(c, (t, width))| match c {
+            0 => format!("{t:width$}"),
+            _ => format!("{t:>width$}"),
         });
         out += cells.collect::<Vec<_>>().join("  ").trim_end();
         out.push('\n');

@@ -21,7 +21,7 @@ pub use farm::{
     EmitArgs, EngineArg, FarmArgs, FarmCommand, GcArgs, JobArgs, LocalArgs, MergeArgs, RunArgs,
     StatusArgs, SubmitArg, SubmitArgs,
 };
-pub use farm_plan::{CalibrateArgs, FormatArg, PlanArgs, Span};
+pub use farm_plan::{CalibrateArgs, PlanArgs, Span};
 pub use inspect::{BasisArg, InspectArgs};
 pub use render::RenderArgs;
 pub use results::{CompareArgs, ReportArgs};
@@ -29,7 +29,7 @@ pub use scene::{DevicesArgs, SceneArgs};
 pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs};
 #[cfg(feature = "window")]
-pub use view::{EditArgs, PresentArg, ViewArgs};
+pub use view::{EditArgs, ViewArgs};
 pub use weather::WeatherArgs;
 
 /// A Vulkan testbed for cloud particles: how much error does a millisecond buy?

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::args::{CalibrateArgs, FormatArg, PlanArgs, Span};
+use super::args::{CalibrateArgs, PlanArgs, Span};
 use super::farm_told;
 use super::output::{self, refuse_existing};
 use super::progress::progress;
@@ -78,11 +78,6 @@ fn cut(args: &PlanArgs, set: &[String], loaded: &LoadedScene) -> Result<Cut> {
         shard_seconds: args.shard_seconds.unwrap_or((60.0, 600.0)),
         n_nodes: args.n_nodes(),
     };
-    let format = |usual| match args.format {
-        Some(FormatArg::Png) => PictureFormat::Png,
-        Some(FormatArg::Exr) => PictureFormat::Exr,
-        None => usual,
-    };
     if let Some(of) = args.reference {
         let request = ReferenceDivision {
             of,
@@ -90,7 +85,7 @@ fn cut(args: &PlanArgs, set: &[String], loaded: &LoadedScene) -> Result<Cut> {
             n_samples: args.samples,
             tile: args.tile,
             range: args.shard_samples,
-            format: format(PictureFormat::Exr),
+            format: args.format.unwrap_or(PictureFormat::Exr),
         };
         return request.cut(loaded, &options);
     }
@@ -100,7 +95,7 @@ fn cut(args: &PlanArgs, set: &[String], loaded: &LoadedScene) -> Result<Cut> {
         (farm_told::sweep(args, set)?, args.shard_cases, USUAL_CONFIGURATIONS)
     } else {
         let Span { first, end } = args.frames.unwrap_or_else(|| all_frames(loaded));
-        let format = format(PictureFormat::Png);
+        let format = args.format.unwrap_or(PictureFormat::Png);
         let work = AnyWork::Frames(Frames { first, n: end - first, format });
         ((work, frames_workload(loaded, first..end)?), args.shard_frames, USUAL_FRAMES)
     };

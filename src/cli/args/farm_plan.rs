@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
 
 use super::values::{at_least_one, parse_size};
+use crate::farm::PictureFormat;
 use crate::reference::picture::{MAX_SAMPLES, ReferenceKind};
 
 /// Arguments of `nimbus farm plan`.
@@ -99,7 +100,7 @@ pub struct PlanArgs {
     pub retries: Option<f64>,
     /// Format of pictures [default: png for frames, exr for a reference]
     #[arg(long, value_enum)]
-    pub format: Option<FormatArg>,
+    pub format: Option<PictureFormat>,
     /// Seed of the first cloud; the others count on from it
     #[arg(long, value_name = "N", help_heading = "Scene")]
     pub seed: Option<u32>,
@@ -141,15 +142,6 @@ pub struct Span {
     pub first: u32,
     /// The one after the last.
     pub end: u32,
-}
-
-/// Formats of pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum FormatArg {
-    /// 8-bit sRGB, tone-mapped, over the background
-    Png,
-    /// Linear premultiplied RGBA
-    Exr,
 }
 
 /// Arguments of `nimbus farm calibrate`.

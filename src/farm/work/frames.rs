@@ -33,12 +33,12 @@ pub struct Frames {
 }
 
 /// A format of picture files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum PictureFormat {
     /// 8-bit sRGB, tone-mapped, over the background.
     Png,
-    /// Linear premultiplied RGBA in f32.
+    /// Linear premultiplied RGBA.
     Exr,
 }
 

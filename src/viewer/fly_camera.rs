@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use crate::model::camera::Pose;
+use crate::model::scene::Scene;
 
 /// A camera with the distance to its target and a flying speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,6 +57,21 @@ impl FlyCamera {
             distance,
             speed: distance / CROSSING_S,
         }
+    }
+
+    /// Starts at the first key of a scene's camera; `None` where it has no direction there. The
+    /// camera's coordinates are relative to `origin`.
+    pub fn of_scene(scene: &Scene, origin: DVec3) -> Option<FlyCamera> {
+        let camera = &scene.camera;
+        let pose = camera.pose(scene.time.start_s)?;
+        let local = Pose { position: pose.position - origin, ..pose };
+        Some(FlyCamera::new(&local, camera.up, camera.keys.first()?.target - origin))
+    }
+
+    /// Returns the camera at another position, which orbits `target`. It has the same direction,
+    /// and the speed of a new camera.
+    pub fn placed(&self, position: DVec3, target: DVec3) -> FlyCamera {
+        FlyCamera::new(&Pose { position, ..self.pose() }, self.up, target)
     }
 
     /// Returns the camera's position.

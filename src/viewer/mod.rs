@@ -11,7 +11,7 @@ pub mod editor;
 #[cfg(feature = "window")]
 mod egui_layer;
 pub mod error_probe;
-mod fly_camera;
+pub mod fly_camera;
 #[cfg(feature = "window")]
 mod free_path;
 #[cfg(feature = "window")]

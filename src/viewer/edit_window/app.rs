@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use winit::application::ApplicationHandler;
 use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{KeyEvent, WindowEvent};
@@ -29,6 +29,7 @@ use crate::viewer::editor::{
     PictureArea, RecentFiles, Request, Session, SessionEvent, default_path, perform,
 };
 use crate::viewer::egui_layer::{EguiLayer, SharedWidgets};
+use crate::viewer::fly_camera::FlyCamera;
 use crate::viewer::free_path::free_path;
 use crate::viewer::native_window::{RenderThread, event_loop, open_window, wheel_notches};
 
@@ -92,33 +93,18 @@ struct App {
 impl App {
     fn new(options: Options, events: &EventLoop<RenderEvent>) -> Result<App> {
         let Options { session, scene, choice, size, stop } = options;
-        let document = session.editor().shared_document();
-        let whole = scene.scene(&document);
-        let camera = &whole.camera;
-        let pose = camera.pose(whole.time.start_s).ok_or_else(|| {
+        let whole = scene.scene(session.editor().document());
+        let camera = FlyCamera::of_scene(&whole, scene.origin()).ok_or_else(|| {
             Error::usage("the scene's camera has no direction at its first frame")
         })?;
-        let origin = scene.origin();
-        let target = camera.keys.first().map_or(DVec3::ZERO, |key| key.target) - origin;
-        let local = Pose { position: pose.position - origin, ..pose };
-        let picture = panels::picture_size(size, 1.0);
-        let [width, height] = picture.map(f64::from);
+        let [width, height] = panels::picture_size(size, 1.0).map(f64::from);
         let area = PictureArea {
             size_px: DVec2::new(width, height),
             px_per_point: 1.0,
-            fov_y_rad: camera.fov_y_rad,
+            fov_y_rad: whole.camera.fov_y_rad,
         };
-        let view = (&local, camera.up, target);
-        let controller = EditorController::new(session, view, area, scene.metres_per_unit());
-        let requests = DrawRequests::new(DrawState {
-            document,
-            pose,
-            has_cloud: false,
-            size,
-            picture,
-            is_closing: false,
-            version: 0,
-        });
+        let controller = EditorController::new(session, camera, area, scene.metres_per_unit());
+        let requests = DrawRequests::new(draw_state(&controller, &scene, size));
         Ok(App {
             controller,
             scene,
@@ -184,10 +170,10 @@ impl App {
 
     /// Passes an input to the controller, and carries out the requests that follow.
     fn handle(&mut self, input: Input) {
-        let mut inputs = vec![input];
-        while let Some(input) = inputs.pop() {
-            let requests = self.controller.handle(&input);
-            inputs.extend(requests.iter().filter_map(|request| self.carry_out(request)));
+        let mut next = Some(input);
+        while let Some(input) = next {
+            let request = self.controller.handle(&input);
+            next = request.and_then(|request| self.carry_out(&request));
         }
         if let Some(layer) = &mut self.layer {
             layer.request_update();
@@ -222,14 +208,10 @@ impl App {
     }
 
     fn request_draw(&self) {
-        let pose = self.controller.camera().pose();
-        let pose = Pose { position: pose.position + self.scene.origin(), ..pose };
-        let editor = self.controller.editor();
-        let (document, size) = (editor.shared_document(), self.size);
-        let picture = self.controller.viewport().size_px.to_array().map(|v| v as u32);
-        let has_cloud = editor.settings().display != DisplayMode::Boxes;
+        let new = draw_state(&self.controller, &self.scene, self.size);
         self.links.requests.change(|state| {
-            *state = DrawState { document, pose, has_cloud, size, picture, ..state.clone() };
+            let (is_closing, version) = (state.is_closing, state.version);
+            *state = DrawState { is_closing, version, ..new };
         });
     }
 
@@ -285,6 +267,20 @@ impl App {
         let mark = if session.is_dirty() { "*" } else { "" };
         let title = format!("{mark}{name} | nimbus");
         self.layer.iter().for_each(|layer| layer.window.set_title(&title));
+    }
+}
+
+/// Returns the first version of what the render thread draws.
+fn draw_state(controller: &EditorController, scene: &EditedScene, size: [u32; 2]) -> DrawState {
+    let (pose, editor) = (controller.camera().pose(), controller.editor());
+    DrawState {
+        document: editor.shared_document(),
+        pose: Pose { position: pose.position + scene.origin(), ..pose },
+        has_cloud: editor.settings().display != DisplayMode::Boxes,
+        size,
+        picture: controller.viewport().size_px.to_array().map(|v| v as u32),
+        is_closing: false,
+        version: 0,
     }
 }
 

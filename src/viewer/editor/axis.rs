@@ -3,8 +3,9 @@
 use glam::DVec3;
 
 /// An axis of the scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Axis {
+    #[default]
     /// The first axis, to the right.
     X,
     /// The second axis, upward.

@@ -25,7 +25,7 @@ pub struct History {
     /// The latest step is last.
     undo: VecDeque<Step>,
     /// The next step is last.
-    redo: Vec<Step>,
+    redo: VecDeque<Step>,
 }
 
 impl History {
@@ -41,17 +41,13 @@ impl History {
 
     /// Returns the state before the last step, and keeps `now` for [`History::redo`].
     pub(super) fn undo(&mut self, now: Snapshot) -> Option<Snapshot> {
-        let step = self.undo.pop_back()?;
-        self.redo.push(Step { snapshot: now, label: step.label });
-        Some(step.snapshot)
+        travel(&mut self.undo, &mut self.redo, now)
     }
 
     /// Returns the state after the step that was undone last, and keeps `now` for
     /// [`History::undo`].
     pub(super) fn redo(&mut self, now: Snapshot) -> Option<Snapshot> {
-        let step = self.redo.pop()?;
-        self.undo.push_back(Step { snapshot: now, label: step.label });
-        Some(step.snapshot)
+        travel(&mut self.redo, &mut self.undo, now)
     }
 
     /// Returns the name of the step that an undo takes back.
@@ -61,7 +57,7 @@ impl History {
 
     /// Returns the name of the step that a redo repeats.
     pub fn redo_label(&self) -> Option<&'static str> {
-        self.redo.last().map(|step| step.label)
+        self.redo.back().map(|step| step.label)
     }
 
     /// Returns the number of steps that can be undone.
@@ -73,6 +69,13 @@ impl History {
     pub fn n_redo(&self) -> usize {
         self.redo.len()
     }
+}
+
+/// Takes the last step of `from`, and puts the same step with the state `now` at the end of `to`.
+fn travel(from: &mut VecDeque<Step>, to: &mut VecDeque<Step>, now: Snapshot) -> Option<Snapshot> {
+    let Step { snapshot, label } = from.pop_back()?;
+    to.push_back(Step { snapshot: now, label });
+    Some(snapshot)
 }
 
 impl Step {

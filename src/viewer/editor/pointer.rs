@@ -8,7 +8,6 @@ use super::input::{Button, ModifierKeys};
 use super::selection::SelectionMode;
 use super::state::Editor;
 use super::viewport::{Viewport, framing, pick_all, pick_rectangle};
-use crate::model::camera::Pose;
 use crate::viewer::fly_camera::{FlyCamera, Motion};
 
 /// The part of the window that the picture fills.
@@ -241,10 +240,11 @@ impl Pointer {
     }
 
     /// Moves the camera so that everything between `low` and `high` is in view.
-    pub fn frame(&mut self, (low, high): (DVec3, DVec3), up: DVec3) {
-        let (pose, PictureArea { size_px, fov_y_rad, .. }) = (self.camera.pose(), self.area);
-        let (position, target) = framing(low, high, pose.forward, fov_y_rad, size_px.x / size_px.y);
-        self.camera = FlyCamera::new(&Pose { position, ..pose }, up, target);
+    pub fn frame(&mut self, low: DVec3, high: DVec3) {
+        let (forward, area) = (self.camera.pose().forward, self.area);
+        let aspect = area.size_px.x / area.size_px.y;
+        let (position, target) = framing(low, high, forward, area.fov_y_rad, aspect);
+        self.camera = self.camera.placed(position, target);
     }
 
     /// Returns the place for a new box: under the pointer at the depth of the target, or the target

@@ -76,11 +76,8 @@ const TURN: f64 = std::f64::consts::FRAC_PI_2;
 impl ViewState {
     /// Starts at the scene's first frame and camera; `None` where the camera has no direction.
     pub fn new(scene: Arc<Scene>, skips: bool) -> Option<ViewState> {
-        let camera = &scene.camera;
-        let pose = camera.pose(scene.time.start_s)?;
-        let camera = FlyCamera::new(&pose, camera.up, camera.keys.first()?.target);
         Some(ViewState {
-            camera,
+            camera: FlyCamera::of_scene(&scene, DVec3::ZERO)?,
             playback: Playback::new(scene.time.n_frames),
             size: [scene.film.width, scene.film.height],
             scene,

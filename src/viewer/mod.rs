@@ -19,6 +19,7 @@ mod native_window;
 #[cfg(feature = "window")]
 mod posed_player;
 pub mod scene_window;
+mod shortcut;
 mod sync;
 #[cfg(feature = "window")]
 mod window_target;

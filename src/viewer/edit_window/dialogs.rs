@@ -109,9 +109,9 @@ fn choose(ui: &Ui, dialog: &mut FileDialog, recent: &[PathBuf]) -> Option<Option
 fn help(ui: &Ui) {
     Window::new("Keys").collapsible(false).show(ui.ctx(), |ui| {
         Grid::new("keys").num_columns(2).spacing([12.0, 1.0]).show(ui, |ui| {
-            let keys = SHORTCUTS.iter().map(|s| (s.chord.to_string(), s.description));
-            let mouse = MOUSE_HELP.iter().map(|(name, use_)| ((*name).to_owned(), *use_));
-            let enter = ("Enter".to_owned(), "enter the active box's numbers");
+            let keys = SHORTCUTS.iter().map(|s| (s.key, s.description));
+            let mouse = MOUSE_HELP.iter().copied();
+            let enter = ("Enter", "enter the active box's numbers");
             for (key, description) in keys.chain([enter]).chain(mouse) {
                 ui.label(RichText::new(key).monospace());
                 ui.label(description);

@@ -97,11 +97,8 @@ impl EditorController {
                 self.act(action);
             }
             Input::Wheel(notches) => self.pointer.approach(*notches),
-            Input::Chord(chord) => {
-                let command = command(*chord)?;
-                self.message = None;
-                return self.command(command);
-            }
+            Input::Chord(chord) => return self.command(command(*chord)?),
+            Input::Command(command) => return self.command(*command),
             Input::Typed { field, text } => {
                 self.message = None;
                 match self.typed(*field, text) {
@@ -158,6 +155,7 @@ impl EditorController {
     }
 
     fn command(&mut self, command: Command) -> Option<Request> {
+        self.message = None;
         let event = match command {
             Command::New => SessionEvent::Intend(Intent::New),
             Command::Open => SessionEvent::Intend(Intent::Open(None)),

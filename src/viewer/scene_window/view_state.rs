@@ -13,6 +13,7 @@ use super::playback::Playback;
 use crate::io::image::ImageKind;
 use crate::model::scene::Scene;
 use crate::viewer::fly_camera::{FlyCamera, Motion};
+use crate::viewer::shortcut::Shortcut;
 
 /// Settings that are drawn as B.
 #[derive(Debug, Clone)]
@@ -108,8 +109,8 @@ impl ViewState {
     pub fn press(&mut self, key: &str) -> Response {
         if let Some((name, _)) = FLYING_KEYS.iter().find(|(name, _)| *name == key) {
             self.held_keys.insert(name);
-        } else if let Some(shortcut) = SHORTCUTS.iter().find(|s| s.key == key) {
-            return self.act(shortcut.command);
+        } else if let Some(command) = Shortcut::command_of(&SHORTCUTS, key) {
+            return self.act(command);
         }
         Response::Nothing
     }

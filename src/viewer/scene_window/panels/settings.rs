@@ -11,6 +11,7 @@ use crate::viewer::scene_window::knobs::Knob;
 use crate::viewer::scene_window::playback::Seek;
 use crate::viewer::scene_window::status::{ErrorStatus, ViewStatus};
 use crate::viewer::scene_window::view_state::ViewState;
+use crate::viewer::shortcut::Shortcut;
 
 /// Adds a button for each knob. A click sets the knob to its next value, as its key does.
 pub fn knobs(ui: &mut Ui, state: &ViewState, status: &ViewStatus, commands: &mut Vec<Command>) {
@@ -18,8 +19,8 @@ pub fn knobs(ui: &mut Ui, state: &ViewState, status: &ViewStatus, commands: &mut
         let mut row = |name: &str, value: &str, command: Command| {
             ui.label(name);
             let mut button = ui.add(Button::new(RichText::new(value).monospace()).small());
-            if let Some(s) = SHORTCUTS.iter().find(|s| s.command == command) {
-                button = button.on_hover_text(format!("{} ({})", s.description, s.key));
+            if let Some(text) = Shortcut::tooltip(&SHORTCUTS, command) {
+                button = button.on_hover_text(text);
             }
             if button.clicked() {
                 commands.push(command);

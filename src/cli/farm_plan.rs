@@ -6,7 +6,7 @@ use super::args::{CalibrateArgs, PlanArgs, Span};
 use super::farm_told;
 use super::output::{self, refuse_existing};
 use super::progress::progress;
-use super::scene::warnings;
+use super::scene::{print_warnings, typed_overrides};
 use crate::error::Result;
 use crate::farm::{
     AnyWork, Cut, CutOptions, Estimate, FileModel, Frames, PictureFormat, Plan, PlanRequest, Rate,
@@ -29,14 +29,9 @@ const USUAL_RETRIES: f64 = 0.02;
 /// # Errors
 /// When the work cannot be planned, or the plan cannot be written.
 pub fn plan(args: &PlanArgs) -> Result<()> {
-    let mut set = args.set.clone();
-    if let Some((width, height)) = args.size {
-        set.extend([format!("film.width={width}"), format!("film.height={height}")]);
-    }
+    let set = typed_overrides(&args.set, args.size);
     let loaded = scene_file::load(&args.scene, &set, args.seed)?;
-    for warning in warnings(&loaded).iter().filter(|_| !args.quiet) {
-        eprintln!("warning: {warning}");
-    }
+    print_warnings(&loaded, args.quiet);
     let cut = cut(args, &set, &loaded)?;
     // Errors of the price come before anything is written.
     let rate = args.rate.map(|price_per_quantum| Rate {

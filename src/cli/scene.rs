@@ -14,14 +14,18 @@ use crate::timing::machine::{Clocks, clocks_record};
 use crate::timing::names::Setting;
 use crate::timing::sweep::{SIZE_KEY, overrides};
 
-/// Returns the scene keys that the arguments set, as `--set` takes them.
-pub fn typed_overrides(args: &SceneArgs) -> Vec<String> {
-    let mut overrides = args.set.clone();
-    if let Some((width, height)) = args.size {
-        overrides.push(format!("film.width={width}"));
-        overrides.push(format!("film.height={height}"));
+/// Returns the scene keys that `--set` and `--size` set, as `--set` takes them.
+pub fn typed_overrides(set: &[String], size: Option<(u32, u32)>) -> Vec<String> {
+    let size = size
+        .map(|(width, height)| [format!("film.width={width}"), format!("film.height={height}")]);
+    set.iter().cloned().chain(size.into_iter().flatten()).collect()
+}
+
+/// Prints the warnings about a scene unless `quiet` is set.
+pub fn print_warnings(loaded: &LoadedScene, quiet: bool) {
+    for warning in warnings(loaded).iter().filter(|_| !quiet) {
+        eprintln!("warning: {warning}");
     }
-    overrides
 }
 
 /// Loads a scene with the keys that the arguments set, and prints its warnings.
@@ -37,11 +41,10 @@ pub fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
 /// # Errors
 /// Fails if the scene or a file that it names is faulty.
 pub fn load_with_files(path: &Path, args: &SceneArgs) -> Result<(LoadedScene, Vec<PathBuf>)> {
-    let (loaded, files) = scene_file::load_and_list(path, &typed_overrides(args), args.seed);
+    let (loaded, files) =
+        scene_file::load_and_list(path, &typed_overrides(&args.set, args.size), args.seed);
     let loaded = loaded?;
-    for warning in warnings(&loaded).iter().filter(|_| !args.quiet) {
-        eprintln!("warning: {warning}");
-    }
+    print_warnings(&loaded, args.quiet);
     Ok((loaded, files))
 }
 

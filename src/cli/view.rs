@@ -23,7 +23,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
     }
     let source = SceneSource {
         path: args.scene.clone(),
-        overrides: typed_overrides(&args.options),
+        overrides: typed_overrides(&args.options.set, args.options.size),
         seed: args.options.seed,
         first: Arc::new(loaded.scene),
         files,

@@ -131,7 +131,7 @@ impl FrameLoop<'_> {
             self.samples.entry((threading, now.has_panels)).or_default().push(times.frame_ms);
         }
         if now.has_panels {
-            lock(&self.links.status).push(times, self.scene.n_particles());
+            lock(&self.links.status).timeline.push(times);
         }
         if let Some(n) = self.n_left {
             *n = n.saturating_sub(1);

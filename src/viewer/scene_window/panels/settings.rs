@@ -56,8 +56,8 @@ pub fn playback(ui: &mut Ui, state: &ViewState, status: &ViewStatus, commands: &
     if ui.add_enabled(i_last > 0, Slider::new(&mut i_frame, 0..=i_last)).changed() {
         commands.push(Command::Seek(Seek::To(i_frame)));
     }
-    if let Some(frame) = &status.last_frame {
-        let (time_s, n_shown, n) = (frame.time_s, frame.n_shown, frame.n_particles);
+    if let Some(frame) = status.timeline.newest() {
+        let (time_s, n_shown, n) = (frame.time_s, frame.n_shown(), state.scene.n_particles());
         ui.label(format!("{time_s:.3} s, {n_shown} of {n} particles drawn"));
     }
     ui.label(RichText::new(&status.device_name).color(DIM).small());
@@ -70,7 +70,7 @@ fn widen_slider(ui: &mut Ui) {
 
 /// Adds the passes of the last frame, with the reason why each ran or was skipped.
 pub fn plan(ui: &mut Ui, status: &ViewStatus) {
-    let Some(frame) = &status.last_frame else {
+    let Some(frame) = status.timeline.newest() else {
         ui.weak("no frame yet");
         return;
     };

@@ -183,9 +183,9 @@ impl App {
 
     fn carry_out(&mut self, request: &Request) -> Option<Input> {
         match request {
-            Request::ChooseToOpen => self.dialog = Some(FileDialog::open()),
+            Request::ChooseToOpen => self.dialog = Some(FileDialog::new(false, None)),
             Request::ChooseToSave => {
-                self.dialog = Some(FileDialog::save(self.controller.session().path()));
+                self.dialog = Some(FileDialog::new(true, self.controller.session().path()));
             }
             // The panels show the question.
             Request::Ask(_) => {}

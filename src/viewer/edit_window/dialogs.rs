@@ -18,15 +18,10 @@ pub struct FileDialog {
 }
 
 impl FileDialog {
-    /// Creates a dialog to open a file.
-    pub fn open() -> FileDialog {
-        FileDialog { text: String::new(), saves: false, has_focus: false }
-    }
-
-    /// Creates a dialog to save a file; `path` is the suggestion.
-    pub fn save(path: Option<&Path>) -> FileDialog {
+    /// Creates a dialog to save a file, or to open one; `path` is the suggestion.
+    pub fn new(saves: bool, path: Option<&Path>) -> FileDialog {
         let text = path.map_or(String::new(), |path| path.display().to_string());
-        FileDialog { text, saves: true, has_focus: false }
+        FileDialog { text, saves, has_focus: false }
     }
 }
 

@@ -112,8 +112,8 @@ struct ActiveDocument {
     draw: PictureDraw,
     scene: PosedPlayer,
     document: Arc<Document>,
-    /// Document and camera of the last frame.
-    drawn: Option<(Arc<Document>, Pose)>,
+    /// Camera of the document's last frame; `None` before the first.
+    drawn: Option<Pose>,
 }
 
 impl EditRenderer {
@@ -202,16 +202,13 @@ impl EditRenderer {
             let boxes = state.document.regenerated_since(&active.document);
             let groups = self.edited.groups(&boxes);
             active.scene.player.reshape(&self.target.bed, scene, &groups)?;
-            active.document = state.document.clone();
+            (active.document, active.drawn) = (state.document.clone(), None);
         }
-        let is_drawn = active.drawn.as_ref().is_some_and(|(document, pose)| {
-            document.is_same(&state.document) && *pose == state.pose
-        });
-        if is_drawn || is_same && !is_new && !state.has_cloud {
+        if active.drawn == Some(state.pose) || is_same && !is_new && !state.has_cloud {
             return Ok(());
         }
         active.scene.step(0, state.pose)?;
-        active.drawn = Some((state.document.clone(), state.pose));
+        active.drawn = Some(state.pose);
         if !is_same || is_new {
             let statuses = active.scene.player.renderer.status(&self.target.bed.device)?;
             let boxes = &state.document.boxes;

@@ -190,9 +190,9 @@ impl Pointer {
                 && mode == SelectionMode::Replace;
         self.last_click = Some(pixel);
         let active = editor.selection().active().filter(|_| is_repeated);
-        let i_active = active.and_then(|active| hits.iter().position(|hit| hit.i_box == active));
+        let i_active = active.and_then(|active| hits.iter().position(|i| *i == active));
         let i_next = i_active.map_or(0, |i| (i + 1) % hits.len());
-        let boxes = vec![hits.get(i_next)?.i_box];
+        let boxes = vec![*hits.get(i_next)?];
         Some(Action::Select(Select::Boxes { boxes, mode }))
     }
 

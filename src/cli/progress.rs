@@ -106,9 +106,13 @@ pub struct ReferenceProgress {
     quiet: bool,
 }
 
+/// What the terminal shows.
 enum Shown {
+    /// Nothing, while one line replaces another.
     Nothing,
+    /// A spinner between two works.
     Spinner { _spinner: Spinner },
+    /// A bar over the parts of a work.
     Bar { work: RenderStage, n_left: usize, bar: LateProgress },
 }
 

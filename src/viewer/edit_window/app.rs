@@ -35,8 +35,11 @@ use crate::viewer::native_window::{RenderThread, event_loop, open_window, wheel_
 
 /// Options of an editor window.
 pub struct Options {
+    /// The cloud that is edited, and its file.
     pub session: Session,
+    /// The scene around the cloud.
     pub scene: EditedScene,
+    /// The device that draws.
     pub choice: DeviceChoice,
     /// Size of the window in pixels.
     pub size: [u32; 2],

@@ -21,7 +21,9 @@ use crate::viewer::window_target::{PictureDraw, WindowTarget};
 /// State that the render thread draws.
 #[derive(Debug, Clone)]
 pub struct DrawState {
+    /// The boxes and the seed.
     pub document: Arc<Document>,
+    /// The camera in the scene's coordinates.
     pub pose: Pose,
     /// Whether the cloud is shown. The boxes are widgets.
     pub has_cloud: bool,
@@ -29,6 +31,7 @@ pub struct DrawState {
     pub size: [u32; 2],
     /// Size of the picture in pixels, from the window's upper left corner.
     pub picture: [u32; 2],
+    /// Whether the thread is to end.
     pub is_closing: bool,
     /// Counts the changes.
     pub version: u64,
@@ -81,7 +84,9 @@ pub enum RenderEvent {
 /// State that the window and its render thread share.
 #[derive(Clone)]
 pub struct RenderLinks {
+    /// The state that the thread draws.
     pub requests: Arc<DrawRequests>,
+    /// The widgets over the picture.
     pub widgets: SharedWidgets,
     /// Events to the window.
     pub events: EventLoopProxy<RenderEvent>,
@@ -201,7 +206,7 @@ impl EditRenderer {
         if !is_same {
             let boxes = state.document.regenerated_since(&active.document);
             let groups = self.edited.groups(&boxes);
-            active.scene.player.reshape(&self.target.bed, scene, &groups)?;
+            active.scene.player.reshape(&self.target.gpu, scene, &groups)?;
             (active.document, active.drawn) = (state.document.clone(), None);
         }
         if active.drawn == Some(state.pose) || is_same && !is_new && !state.has_cloud {
@@ -210,7 +215,7 @@ impl EditRenderer {
         active.scene.step(0, state.pose)?;
         active.drawn = Some(state.pose);
         if !is_same || is_new {
-            let statuses = active.scene.player.renderer.status(&self.target.bed.device)?;
+            let statuses = active.scene.player.renderer.status(&self.target.gpu.device)?;
             let boxes = &state.document.boxes;
             let acceptances = box_acceptances(boxes, self.edited.statuses(boxes, &statuses));
             let event = RenderEvent::Acceptances(state.document.clone(), acceptances);
@@ -220,7 +225,7 @@ impl EditRenderer {
     }
 
     fn activate(&self, state: &DrawState) -> Result<ActiveDocument> {
-        let player = self.target.bed.player(self.scene(state), true)?;
+        let player = self.target.gpu.player(self.scene(state), true)?;
         let draw = self.target.picture_draw(&player.renderer, &player.scene.film)?;
         let draw = draw.ok_or_else(|| Error::usage("the window has no visible area"))?;
         let scene = PosedPlayer::new(player, state.pose);

@@ -5,8 +5,8 @@ use glam::DVec3;
 /// An axis of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Axis {
-    #[default]
     /// The first axis, to the right.
+    #[default]
     X,
     /// The second axis, upward.
     Y,

@@ -26,9 +26,11 @@ pub struct Drag {
     pub start: Ray,
     /// View direction of the camera.
     pub forward: DVec3,
+    /// Document and selection at the beginning.
     pub before: Snapshot,
     /// Ray through the pointer now.
     pub ray: Ray,
+    /// Settings that held keys invert now.
     pub modifiers: DragModifiers,
 }
 

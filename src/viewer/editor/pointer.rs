@@ -24,6 +24,7 @@ pub struct PictureArea {
 /// The operation that the pointer is engaged in.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Gesture {
+    /// No operation.
     #[default]
     None,
     /// A press on a handle. It is a click until the pointer has moved far enough.
@@ -62,8 +63,11 @@ const TURN: f64 = std::f64::consts::PI;
 /// The pointer and the camera.
 #[derive(Debug, Clone)]
 pub struct Pointer {
+    /// The camera.
     pub camera: FlyCamera,
+    /// The part of the window that the picture fills.
     pub area: PictureArea,
+    /// The operation in progress.
     pub gesture: Gesture,
     /// `None` outside of the picture.
     pub pixel: Option<DVec2>,

@@ -26,6 +26,7 @@ pub struct Session {
 /// The step that follows the window's answer.
 #[derive(Debug, Clone, Default)]
 enum Pending {
+    /// Nothing follows.
     #[default]
     Nothing,
     /// Asks whether to save before this.

@@ -34,15 +34,19 @@ use crate::viewer::sync::lock;
 
 /// Options of a scene window.
 pub struct Options {
+    /// The scene file that is shown.
     pub source: SceneSource,
+    /// The device that draws.
     pub choice: DeviceChoice,
     /// Whether frames skip passes that they do not need.
     pub skips: bool,
+    /// When frames are presented, where the window supports it.
     pub mode: PresentMode,
     /// Frames until the window closes; `None`: no limit.
     pub n_frames: Option<u32>,
     /// Closes the window when set.
     pub stop: &'static AtomicBool,
+    /// Whether no message is printed.
     pub is_quiet: bool,
     /// Whether panels are shown at the start.
     pub has_panels: bool,
@@ -50,6 +54,7 @@ pub struct Options {
 
 /// Times measured while a window was open.
 pub struct WindowTimes {
+    /// Frame times of each loop that ran.
     pub loops: Vec<LoopTimes>,
     /// Time that each update of the panels took on the window's thread, ms.
     pub panels_ms: Vec<f64>,

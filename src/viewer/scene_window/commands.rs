@@ -27,11 +27,13 @@ pub enum Command {
     ToggleSkipping,
     /// Selects the next present mode of the window.
     NextPresentMode,
+    /// Changes the playback position.
     Seek(Seek),
     /// Multiplies the flying speed by 2 to this power.
     Speed(f64),
     /// Saves the picture.
     Capture(ImageKind),
+    /// Shows or hides the panels.
     TogglePanels,
     /// Counts non-finite and clipped values of the next frame.
     Count,
@@ -39,6 +41,7 @@ pub enum Command {
     ToggleB,
     /// Selects the next comparison of A with B.
     NextComparison,
+    /// Compares A with B in this way.
     Compare(Comparison),
     /// Turns the error measurement on or off.
     ToggleError,
@@ -46,7 +49,9 @@ pub enum Command {
     SaveScene,
     /// Prints the command that draws this view.
     PrintCommandLine,
+    /// Prints the keys.
     Help,
+    /// Closes the window.
     Quit,
 }
 

@@ -20,9 +20,11 @@ use crate::viewer::window_target::{PictureDraw, WindowTarget};
 /// Frame times of one loop.
 #[derive(Debug, Clone, Copy)]
 pub struct LoopTimes {
+    /// The loop.
     pub threading: Threading,
     /// Whether panels were shown beside the picture.
     pub has_panels: bool,
+    /// Statistics of the frame times, ms.
     pub frame_ms: Summary,
 }
 
@@ -46,12 +48,17 @@ pub fn loop_times(samples: &LoopSamples) -> Vec<LoopTimes> {
 
 /// Everything that the loop over frames draws with.
 pub struct FrameLoop<'a> {
+    /// The window that frames are presented in.
     pub target: &'a mut WindowTarget,
+    /// State shared with the window.
     pub links: &'a RenderLinks,
+    /// Frame times so far.
     pub samples: &'a mut LoopSamples,
     /// Frames until the window closes; `None`: no limit.
     pub n_left: &'a mut Option<u32>,
+    /// The draw that shows a picture.
     pub draw: &'a PictureDraw,
+    /// The scene of A, with the size of the window.
     pub scene: &'a Scene,
     /// B, drawn after each frame.
     pub variant: Option<PosedPlayer>,
@@ -99,7 +106,7 @@ impl FrameLoop<'_> {
     fn count(&self, game: &mut Game, renderer: &mut Renderer) -> Result<()> {
         let i_frame = lock(&self.links.state).playback.i_frame();
         renderer.step(game.step(i_frame)?)?;
-        let counts = Counts::new(renderer, &self.target.bed.device, self.scene)?;
+        let counts = Counts::new(renderer, &self.target.gpu.device, self.scene)?;
         self.links.message(format!("frame {i_frame}: {}", counts.text()));
         lock(&self.links.status).counts = Some((i_frame, counts));
         Ok(())

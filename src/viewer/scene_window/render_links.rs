@@ -21,11 +21,8 @@ pub enum RenderEvent {
     /// A message for the terminal.
     Message(String),
     /// A picture to save: premultiplied linear RGBA, rows from the top.
-    Capture {
-        format: ImageKind,
-        film: Film,
-        rgba: Vec<f32>,
-    },
+    Capture { format: ImageKind, film: Film, rgba: Vec<f32> },
+    /// Pictures that the error measurement has asked for.
     Readback(Readback),
     /// The status has a new error.
     ErrorChanged,
@@ -38,8 +35,11 @@ pub enum RenderEvent {
 pub struct Readback {
     /// [`ViewState::version`] of the frame.
     pub version: u64,
+    /// Camera of the frame.
     pub camera: FlyCamera,
+    /// Number of the frame.
     pub i_frame: u32,
+    /// Film of the frame, with the size of the pictures.
     pub film: Film,
     /// Picture of A: premultiplied linear RGBA, rows from the top.
     pub a: Vec<f32>,
@@ -50,8 +50,11 @@ pub struct Readback {
 /// State that the window and its render thread share.
 #[derive(Clone)]
 pub struct RenderLinks {
+    /// The state that the thread draws.
     pub state: Arc<Mutex<ViewState>>,
+    /// The status that the panels show.
     pub status: SharedStatus,
+    /// The widgets over the picture.
     pub widgets: SharedWidgets,
     /// Events to the window.
     pub events: EventLoopProxy<RenderEvent>,

@@ -18,7 +18,9 @@ use crate::viewer::shortcut::Shortcut;
 /// Settings that are drawn as B.
 #[derive(Debug, Clone)]
 pub struct Variant {
+    /// The scene with its knobs as they were.
     pub scene: Arc<Scene>,
+    /// Whether frames skip passes that they do not need.
     pub skips: bool,
 }
 
@@ -63,9 +65,13 @@ pub struct ViewState {
 /// Work that a command leaves to the window.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Response {
+    /// No work.
     Nothing,
+    /// Prints a message.
     Message(String),
+    /// Prints and copies the command that draws this view.
     PrintCommandLine,
+    /// Saves the view as a scene file.
     SaveScene,
 }
 

@@ -23,15 +23,36 @@ pub struct FlyCamera {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Motion {
     /// Flies along (right, up, forward), each component from −1 to 1.
-    Fly { along: DVec3, seconds: f64 },
+    Fly {
+        /// Direction by the camera's axes; its length is the share of the speed.
+        along: DVec3,
+        /// Duration.
+        seconds: f64,
+    },
     /// Turns the camera in place.
-    Look { right: f64, upward: f64 },
+    Look {
+        /// Angle to the right.
+        right: f64,
+        /// Angle upward.
+        upward: f64,
+    },
     /// Moves the camera around its target, to the right and upward.
-    Orbit { right: f64, upward: f64 },
+    Orbit {
+        /// Angle to the right.
+        right: f64,
+        /// Angle upward.
+        upward: f64,
+    },
     /// Moves toward the target by notches of the wheel; negative: away.
-    Approach { notches: f64 },
+    Approach {
+        /// Notches.
+        notches: f64,
+    },
     /// Multiplies the speed by 2 to this power.
-    Speed { doublings: f64 },
+    Speed {
+        /// The power.
+        doublings: f64,
+    },
 }
 
 /// Smallest angle between the view direction and `up` or its opposite, rad.

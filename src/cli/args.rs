@@ -29,7 +29,7 @@ pub use scene::{DevicesArgs, SceneArgs};
 pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs};
 #[cfg(feature = "window")]
-pub use view::{EditArgs, PresentArg, ViewArgs};
+pub use view::{EditArgs, ViewArgs};
 pub use weather::WeatherArgs;
 
 /// A Vulkan testbed for cloud particles: how much error does a millisecond buy?

@@ -32,10 +32,7 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
         if run.interrupted { "; INTERRUPTED: what was finished" } else { "" }
     );
     if run.cases.len() > 1 {
-        for rows in [case_rows(run), pass_by_case_rows(run)] {
-            out += &table(&rows);
-            out.push('\n');
-        }
+        out += &format!("{}\n{}\n", table(&case_rows(run)), table(&pass_by_case_rows(run)));
     }
     for (case, same) in run.cases.iter().zip(same) {
         if run.cases.len() == 1 || verbose {
@@ -142,17 +139,13 @@ fn ratio_text(r: Ratio) -> String {
 /// sweep.
 fn case_columns(run: &Run) -> (Vec<String>, impl Fn(&Case) -> Vec<String>) {
     let has_phases = run.cases.iter().any(|c| c.phase.is_some());
-    let mut header: Vec<String> = if has_phases { vec!["phase".to_owned()] } else { vec![] };
-    header.extend(
-        run.cases.first().map_or(vec![], |c| c.sweep.iter().map(|s| s.key.clone()).collect()),
-    );
+    let phase = move |name: &str| has_phases.then(|| name.to_owned()).into_iter();
+    let swept = run.cases.iter().take(1).flat_map(|c| &c.sweep).map(|s| s.key.clone());
     let of = move |case: &Case| {
-        let mut row: Vec<String> =
-            if has_phases { vec![case.phase.clone().unwrap_or_default()] } else { vec![] };
-        row.extend(case.sweep.iter().map(|s| s.value.clone()));
-        row
+        let values = case.sweep.iter().map(|s| s.value.clone());
+        phase(case.phase.as_deref().unwrap_or_default()).chain(values).collect()
     };
-    (header, of)
+    (phase("phase").chain(swept).collect(), of)
 }
 
 /// Returns a row a case with the median of every pass that ran in some case, in the loop without
@@ -183,7 +176,7 @@ fn pass_by_case_rows(run: &Run) -> Vec<Vec<String>> {
 /// Returns a row a case and loop.
 fn case_rows(run: &Run) -> Vec<Vec<String>> {
     let (mut header, columns) = case_columns(run);
-    let figures = [
+    const FIGURES: [&str; 15] = [
         "particles",
         "drawn",
         "pixels",
@@ -196,9 +189,11 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
         "game",
         "gpu",
         "latency",
+        "parallel/serial",
+        "reached",
+        "gpu saved",
     ];
-    header.extend(figures.map(str::to_owned));
-    header.extend(["parallel/serial", "reached", "gpu saved"].map(str::to_owned));
+    header.extend(FIGURES.map(str::to_owned));
     let mut rows = vec![header];
     for case in &run.cases {
         let reached = case.overlap.and_then(|o| o.reached);
@@ -207,22 +202,20 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
             let is_parallel =
                 mode.threading == "parallel" && case.modes.iter().all(|m| m.skip <= mode.skip);
             let mut row = columns(case);
-            let p50 = |m: &Option<Measured>| or_dash(*m, |m| ms(m.of.p50));
-            let end =
-                |of: fn(&Measured) -> Option<f64>| or_dash(mode.frame_ms.as_ref().and_then(of), ms);
+            let p50 = |m: Option<Measured>| or_dash(m, |m| ms(m.of.p50));
             row.extend([
                 case.particles.to_string(),
                 or_dash(mode.drawn, |[_, mean, _]| format!("{mean:.0}")),
                 format!("{}x{}", case.width, case.height),
                 mode.name(),
                 mode.frames.to_string(),
-                p50(&mode.frame_ms),
-                end(|m| m.p50_low),
-                end(|m| m.p50_high),
+                p50(mode.frame_ms),
+                or_dash(mode.frame_ms.and_then(|m| m.p50_low), ms),
+                or_dash(mode.frame_ms.and_then(|m| m.p50_high), ms),
                 or_dash(mode.frame_ms, |m| format!("{:.1}", fps(m.of.p50))),
-                p50(&mode.game_ms),
-                p50(&mode.gpu_ms),
-                p50(&mode.latency_ms),
+                p50(mode.game_ms),
+                p50(mode.gpu_ms),
+                p50(mode.latency_ms),
                 or_dash(case.ratio.filter(|_| is_parallel), ratio_text),
                 or_dash(reached.filter(|_| is_parallel), |r| format!("{:.0}%", 100.0 * r.share)),
                 or_dash(saved.filter(|_| !mode.skip), ms),
@@ -263,14 +256,14 @@ fn time_rows(case: &Case) -> Vec<Vec<String>> {
         "max",
     ]);
     for (what, of) in [
-        ("frame", (|m| m.frame_ms.as_ref()) as fn(&Mode) -> Option<&Measured>),
-        ("game", |m| m.game_ms.as_ref()),
-        ("record", |m| m.record_ms.as_ref()),
-        ("submit", |m| m.submit_ms.as_ref()),
-        ("wait", |m| m.wait_ms.as_ref()),
-        ("render", |m| m.render_ms.as_ref()),
-        ("gpu", |m| m.gpu_ms.as_ref()),
-        ("latency", |m| m.latency_ms.as_ref()),
+        ("frame", (|m| m.frame_ms) as fn(&Mode) -> Option<Measured>),
+        ("game", |m| m.game_ms),
+        ("record", |m| m.record_ms),
+        ("submit", |m| m.submit_ms),
+        ("wait", |m| m.wait_ms),
+        ("render", |m| m.render_ms),
+        ("gpu", |m| m.gpu_ms),
+        ("latency", |m| m.latency_ms),
     ] {
         // The loop without skipping only shows the times that skipping is measured by.
         let is_shown = |m: &&Mode| {
@@ -278,12 +271,10 @@ fn time_rows(case: &Case) -> Vec<Vec<String>> {
         };
         for mode in case.modes.iter().filter(is_shown) {
             let Some(m) = of(mode) else { continue };
-            let s = &m.of;
+            let s = m.of;
             let mut row = vec![what.to_owned(), mode.name(), s.n.to_string(), ms(s.p50)];
-            let [mean, min, p1, p5] = [s.mean, s.min, s.p1, s.p5].map(Some);
-            let [p95, p99, max] = [s.p95, s.p99, s.max].map(Some);
-            let times = [m.p50_low, m.p50_high, mean, s.sd, min, p1, p5, p95, p99, max];
-            row.extend(times.map(|time| or_dash(time, ms)));
+            row.extend([m.p50_low, m.p50_high, Some(s.mean), s.sd].map(|time| or_dash(time, ms)));
+            row.extend([s.min, s.p1, s.p5, s.p95, s.p99, s.max].map(ms));
             rows.push(row);
         }
     }
@@ -301,12 +292,16 @@ fn pass_rows(case: &Case) -> Vec<Vec<String>> {
     let mut rows = vec![header];
     for (i, pass) in first.passes.iter().enumerate() {
         let share = pass.share.filter(|_| pass.n_run > 0);
-        let share = or_dash(share, |s| format!("{:.1}%", 100.0 * s));
         let mut row = vec![pass.name.clone()];
         let in_loop = |m: &Mode| or_dash(m.passes.get(i).and_then(|p| p.p50_ms), ms);
         row.extend(case.modes.iter().map(in_loop));
-        row.extend([share, pass.n_run.to_string(), pass.n_skipped.to_string()]);
-        row.extend([or_dash(pass.saved_ms, ms), pass.reason.clone().unwrap_or_default()]);
+        row.extend([
+            or_dash(share, |s| format!("{:.1}%", 100.0 * s)),
+            pass.n_run.to_string(),
+            pass.n_skipped.to_string(),
+            or_dash(pass.saved_ms, ms),
+            pass.reason.clone().unwrap_or_default(),
+        ]);
         rows.push(row);
     }
     rows

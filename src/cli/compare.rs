@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::args::CompareArgs;
 use super::compare_pictures;
@@ -14,46 +14,8 @@ use crate::timing::difference::{Condition, Difference};
 use crate::timing::records::Run;
 use crate::timing::results::{BenchResults, read_results};
 
-/// The output of `--json`. A change of a key or of its meaning raises `schema`.
-#[derive(Debug, Serialize)]
-struct Report {
-    schema: u32,
-    a: Side,
-    b: Side,
-    /// The differences that `--allow` accepted.
-    allowed: Vec<Difference>,
-    n_resamples: usize,
-    /// The measure that decides. The others are not corrected for multiple comparisons.
-    headline: &'static str,
-    modes: Vec<ModeComparison>,
-    remarks: Vec<String>,
-}
-
+/// Version of the output of `--json`. A change of a key or of its meaning raises it.
 const REPORT_SCHEMA: u32 = 2;
-
-/// A compared run.
-#[derive(Debug, Serialize)]
-struct Side {
-    folder: String,
-    date: String,
-    nimbus: String,
-    revision: String,
-    device: String,
-    scene_hash: String,
-}
-
-impl Side {
-    fn of(folder: &Path, run: &Run) -> Side {
-        Side {
-            folder: folder.display().to_string(),
-            date: run.date.clone(),
-            nimbus: run.nimbus.clone(),
-            revision: run.revision.clone(),
-            device: format!("{} ({})", run.device.name, run.device.driver),
-            scene_hash: run.scene_hash.clone(),
-        }
-    }
-}
 
 /// Runs `nimbus compare`.
 ///
@@ -65,23 +27,13 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     let (a, b) = (read_results(&args.a)?, read_results(&args.b)?);
     let found = Comparison::new(&a, &b);
-    let is_allowed = |d: &Difference| args.allow.contains(&d.kind);
-    let (allowed, refused): (Vec<Difference>, Vec<Difference>) =
-        found.differences.into_iter().partition(is_allowed);
+    let is_allowed = |d: &&Difference| args.allow.contains(&d.kind);
+    let (allowed, refused): (Vec<&Difference>, Vec<&Difference>) =
+        found.differences.iter().partition(is_allowed);
     if !refused.is_empty() {
         return Err(Error::usage(refusal(args, &refused)));
     }
-    let report = Report {
-        schema: REPORT_SCHEMA,
-        a: Side::of(&args.a, &a.run),
-        b: Side::of(&args.b, &b.run),
-        allowed,
-        n_resamples: Bootstrap::default().n_resamples,
-        headline: HEADLINE,
-        modes: found.modes,
-        remarks: found.remarks,
-    };
-    if report.modes.is_empty() {
+    if found.modes.is_empty() {
         let ran = |of: &BenchResults| {
             of.modes.iter().map(|m| m.name.clone()).collect::<Vec<_>>().join(", ")
         };
@@ -91,11 +43,32 @@ pub fn run(args: &CompareArgs) -> Result<()> {
             "A and B have no timed loop in common: A has {of_a}, B has {of_b}"
         )));
     }
-    if args.json { output::object(&report) } else { output::text(&text(&report)) }
+    let sides = [(&*args.a, &a.run), (&*args.b, &b.run)];
+    if !args.json {
+        return output::text(&text(sides, &allowed, &found));
+    }
+    let [a, b] = sides.map(|(folder, run)| side(folder, run));
+    output::object(&json!({
+        "schema": REPORT_SCHEMA, "a": a, "b": b, "allowed": allowed,
+        "n_resamples": Bootstrap::default().n_resamples,
+        // The measure that decides. The others are not corrected for multiple comparisons.
+        "headline": HEADLINE,
+        "modes": found.modes, "remarks": found.remarks,
+    }))
+}
+
+/// Returns what identifies a compared run.
+fn side(folder: &Path, run: &Run) -> Value {
+    json!({
+        "folder": folder.display().to_string(), "date": run.date, "nimbus": run.nimbus,
+        "revision": run.revision,
+        "device": format!("{} ({})", run.device.name, run.device.driver),
+        "scene_hash": run.scene_hash,
+    })
 }
 
 /// Returns the message about conditions that differ, with the flag that accepts them.
-fn refusal(args: &CompareArgs, refused: &[Difference]) -> String {
+fn refusal(args: &CompareArgs, refused: &[&Difference]) -> String {
     let is_named =
         |kind: &Condition| args.allow.contains(kind) || refused.iter().any(|d| d.kind == *kind);
     let flag = Condition::ALL.into_iter().filter(is_named).map(Condition::name);
@@ -117,28 +90,29 @@ fn line(d: &Difference) -> String {
 }
 
 /// Returns the tables for people.
-fn text(report: &Report) -> String {
+fn text(sides: [(&Path, &Run); 2], allowed: &[&Difference], found: &Comparison) -> String {
     let mut out = String::new();
-    for (name, side) in [("A", &report.a), ("B", &report.b)] {
-        let Side { folder, date, nimbus, revision, device, scene_hash: _ } = side;
+    for (name, (folder, run)) in ["A", "B"].into_iter().zip(sides) {
+        let (folder, Run { date, nimbus, revision, device, .. }) = (folder.display(), run);
+        let device = format!("{} ({})", device.name, device.driver);
         out += &format!("{name}  {folder}, {date}, nimbus {nimbus} {revision}, {device}\n");
     }
-    for difference in &report.allowed {
+    for difference in allowed {
         out += &format!("allowed to differ: {}\n", line(difference));
     }
-    for remark in &report.remarks {
+    for remark in &found.remarks {
         out += &format!("note: {remark}\n");
     }
-    for mode in &report.modes {
+    for mode in &found.modes {
         out += &format!("\n{}", output::table(&rows(mode)));
     }
     out.push('\n');
-    for mode in &report.modes {
+    for mode in &found.modes {
         if let Some(headline) = mode.headline() {
             out += &format!("{} frame: {}\n", mode.name, sentence(headline));
         }
     }
-    out + &foot(report)
+    out + &foot(&found.modes)
 }
 
 fn rows(mode: &ModeComparison) -> Vec<Vec<String>> {
@@ -177,14 +151,13 @@ fn sentence(m: &MeasureComparison) -> String {
 }
 
 /// Returns the note on how the intervals were computed and what they do not cover.
-fn foot(report: &Report) -> String {
-    let lens: Vec<String> =
-        report.modes.iter().filter_map(|m| Some(m.headline()?.block_len.to_string())).collect();
-    let lens = if lens.windows(2).all(|w| w[0] == w[1]) {
-        lens[..lens.len().min(1)].join("")
-    } else {
-        lens.join(" and ")
-    };
+fn foot(modes: &[ModeComparison]) -> String {
+    let mut lens: Vec<String> =
+        modes.iter().filter_map(|m| Some(m.headline()?.block_len.to_string())).collect();
+    if lens.windows(2).all(|w| w[0] == w[1]) {
+        lens.truncate(1);
+    }
+    let lens = lens.join(" and ");
     format!(
         "\nIntervals: block bootstrap, {} resamples, ⌈√n⌉ neighbouring frames drawn together \
          (frame: {lens}).\n\
@@ -192,6 +165,6 @@ fn foot(report: &Report) -> String {
         decides; the other\n\
         rows are not corrected for many comparisons: of twenty equal ones, one will seem to \
         differ.\n",
-        report.n_resamples
+        Bootstrap::default().n_resamples
     )
 }

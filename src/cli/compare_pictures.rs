@@ -3,54 +3,28 @@
 use std::path::Path;
 
 use glam::DVec3;
-use serde::Serialize;
+use serde_json::{Map, Value, json};
 
 use super::args::CompareArgs;
 use super::output::{self, or_dash, refuse_existing};
 use crate::error::{Error, Result};
 use crate::io::image::{self, Image, ImageKind};
 use crate::measure::picture::flip::{self, Flip};
-use crate::measure::picture::{self, Errors, PEAK, RELATIVE_EPSILON, ssim};
+use crate::measure::picture::{self, PEAK, RELATIVE_EPSILON, ssim};
 use crate::model::film::{Film, FilmFormat, ToneMap};
 
-/// The output of `--json`. A change of a key or of its meaning raises `schema`.
-#[derive(Debug, Serialize)]
-struct Report {
-    schema: u32,
-    a: String,
-    b: String,
-    width: u32,
-    height: u32,
-    /// "linear" (EXR) or "display" (PNG, sRGB in 0..1).
-    values: &'static str,
-    /// Pixels that are not finite in A.
-    not_finite_a: usize,
-    /// Pixels that are not finite in B.
-    not_finite_b: usize,
-    /// Pixels that are not finite in A or B, which the errors leave out.
-    not_finite: usize,
-    metrics: Metrics,
-    /// Constant of the metrics.
-    rel_mse_epsilon: f64,
-    psnr_peak: f64,
-    pixels_per_degree: f64,
-}
-
+/// Version of the output of `--json`. A change of a key or of its meaning raises it.
 const REPORT_SCHEMA: u32 = 1;
 
-/// Metrics over red, green and blue together, and over alpha if both files have it.
-#[derive(Debug, Clone, Copy, Serialize)]
-struct Metrics {
-    rmse: f64,
-    max: f64,
-    relmse: f64,
-    /// In dB; null if the pictures are equal.
-    psnr: f64,
-    /// Null if the pictures are smaller than its window.
-    ssim: Option<f64>,
-    flip: f64,
-    alpha_rmse: Option<f64>,
-    alpha_max: Option<f64>,
+/// A metric over red, green and blue together, or over alpha if both files have it.
+struct Metric {
+    name: &'static str,
+    /// `None` if it is not defined for these pictures.
+    value: Option<f64>,
+    /// The value as the table has it.
+    text: String,
+    /// The numbers that it compares.
+    of: String,
 }
 
 /// Metrics that grow with the difference of pictures, and those that fall.
@@ -114,31 +88,34 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         let (a, b) = (args.a.display(), args.b.display());
         Error::usage(format!("{a} and {b}: no pixel is finite in both"))
     })?;
-    let report = Report {
-        schema: REPORT_SCHEMA,
-        a: args.a.display().to_string(),
-        b: args.b.display().to_string(),
-        width: a.width,
-        height: a.height,
-        values: if a.kind == ImageKind::Exr { "linear" } else { "display" },
-        not_finite_a: picture::n_not_finite(&a.rgba),
-        not_finite_b: picture::n_not_finite(&b.rgba),
-        not_finite: a.rgba.iter().zip(&b.rgba).filter(|(p, q)| !both_finite(p, q)).count(),
-        metrics,
-        rel_mse_epsilon: RELATIVE_EPSILON,
-        psnr_peak: PEAK,
-        pixels_per_degree,
-    };
+    let not_finite = a.rgba.iter().zip(&b.rgba).filter(|(p, q)| !both_finite(p, q)).count();
+    let of_each = [&a, &b].map(|image| picture::n_not_finite(&image.rgba));
     if let Some(path) = &args.output {
         image::write_bytes(path, a.width, a.height, &flip.shown())?;
     }
     if args.json {
-        output::object(&report)?
+        let values: Map<String, Value> =
+            metrics.iter().map(|m| (m.name.to_owned(), m.value.into())).collect();
+        output::object(&json!({
+            "schema": REPORT_SCHEMA,
+            "a": args.a.display().to_string(), "b": args.b.display().to_string(),
+            "width": a.width, "height": a.height, "values": values_of(&a),
+            "not_finite_a": of_each[0], "not_finite_b": of_each[1],
+            // Pixels that are not finite in A or B, which the errors leave out.
+            "not_finite": not_finite,
+            "metrics": values, "rel_mse_epsilon": RELATIVE_EPSILON, "psnr_peak": PEAK,
+            "pixels_per_degree": pixels_per_degree,
+        }))?;
     } else {
-        output::text(&text(&report))?
+        output::text(&text(args, &a, &metrics, not_finite, of_each))?;
     }
-    let beyond = beyond(args, &report);
+    let beyond = beyond(args, &metrics, not_finite);
     if beyond.is_empty() { Ok(()) } else { Err(Error::Check { what: beyond.join("; ") }) }
+}
+
+/// Returns "linear" for an EXR, "display" for a PNG (sRGB in 0..1).
+fn values_of(image: &Image) -> &'static str {
+    if image.kind == ImageKind::Exr { "linear" } else { "display" }
 }
 
 fn check_names(limits: &[(String, f64)], known: &[&str], flag: &str) -> Result<()> {
@@ -173,14 +150,12 @@ fn both_finite(a: &[f64; 4], b: &[f64; 4]) -> bool {
 }
 
 /// Computes the metrics and the FLIP map; None if no pixel is finite in both.
-fn measure(a: &Image, b: &Image, pixels_per_degree: f64) -> Option<(Metrics, Flip)> {
+fn measure(a: &Image, b: &Image, pixels_per_degree: f64) -> Option<(Vec<Metric>, Flip)> {
     let pairs = || a.rgba.iter().zip(&b.rgba).filter(|(p, q)| both_finite(p, q));
     let color = picture::errors(pairs().flat_map(|(p, q)| (0..3).map(|i| (p[i], q[i]))))?;
-    let alpha: Option<Errors> = if a.has_alpha && b.has_alpha {
-        picture::errors(pairs().map(|(p, q)| (p[3], q[3])))
-    } else {
-        None
-    };
+    let alpha = (a.has_alpha && b.has_alpha)
+        .then(|| picture::errors(pairs().map(|(p, q)| (p[3], q[3]))))
+        .flatten();
     // Display values; a pixel that the errors leave out is black in both.
     let show = |of: &Image| -> Vec<[f64; 3]> {
         let shown = |((p, q), own): ((&[f64; 4], &[f64; 4]), &[f64; 4])| match both_finite(p, q) {
@@ -195,23 +170,44 @@ fn measure(a: &Image, b: &Image, pixels_per_degree: f64) -> Option<(Metrics, Fli
     };
     let flip = flip::flip(a.width, a.height, &bytes(&shown_a), &bytes(&shown_b), pixels_per_degree);
     let luminance =
-        |shown: &[[f64; 3]]| shown.iter().map(|p| ssim::luminance(*p)).collect::<Vec<f64>>();
-    let metrics = Metrics {
-        rmse: color.rmse,
-        max: color.max_abs,
-        relmse: color.rel_mse,
-        psnr: color.psnr_db,
-        ssim: ssim::ssim(
-            a.width as usize,
-            a.height as usize,
-            &luminance(&shown_a),
-            &luminance(&shown_b),
+        |shown: &[[f64; 3]]| -> Vec<f64> { shown.iter().map(|p| ssim::luminance(*p)).collect() };
+    let (width, height) = (a.width as usize, a.height as usize);
+    let ssim = ssim::ssim(width, height, &luminance(&shown_a), &luminance(&shown_b));
+    let how = if a.kind == ImageKind::Exr { "over black, tone-mapped" } else { "as stored" };
+    let of_ssim = format!("luminance, {how}; Gaussian window 11, σ 1.5, C1 = 0.01², C2 = 0.03²");
+    let exact = |v: f64| format!("{v:.6e}");
+    let metrics = [
+        ("rmse", Some(color.rmse), exact(color.rmse), format!("{} values, RGB", values_of(a))),
+        ("max", Some(color.max_abs), exact(color.max_abs), "the same".to_owned()),
+        (
+            "relmse",
+            Some(color.rel_mse),
+            exact(color.rel_mse),
+            format!("the same, (b - a)²/(a² + {RELATIVE_EPSILON})"),
         ),
-        flip: flip.mean(),
-        alpha_rmse: alpha.map(|e| e.rmse),
-        alpha_max: alpha.map(|e| e.max_abs),
-    };
-    Some((metrics, flip))
+        (
+            "psnr",
+            Some(color.psnr_db),
+            format!("{:.3} dB", color.psnr_db),
+            format!("the same, peak {PEAK}"),
+        ),
+        ("ssim", ssim, or_dash(ssim, |v| format!("{v:.6}")), of_ssim),
+        (
+            "flip",
+            Some(flip.mean()),
+            format!("{:.6}", flip.mean()),
+            format!("mean, {how}; {pixels_per_degree:.2} pixels a degree"),
+        ),
+        ("alpha_rmse", alpha.map(|e| e.rmse), or_dash(alpha, |e| exact(e.rmse)), "alpha".into()),
+        (
+            "alpha_max",
+            alpha.map(|e| e.max_abs),
+            or_dash(alpha, |e| exact(e.max_abs)),
+            "alpha".into(),
+        ),
+    ];
+    let metric = |(name, value, text, of)| Metric { name, value, text, of };
+    Some((metrics.map(metric).into(), flip))
 }
 
 /// Returns the display values of a pixel: those of a PNG as stored, those of an EXR over black and
@@ -235,57 +231,39 @@ fn display(kind: ImageKind, pixel: &[f64; 4]) -> [f64; 3] {
     }
 }
 
-/// Returns the table for people.
-fn text(report: &Report) -> String {
-    let Metrics { rmse, max, relmse, psnr, ssim, flip, alpha_rmse, alpha_max } = report.metrics;
-    let shown = if report.values == "linear" { "over black, tone-mapped" } else { "as stored" };
-    let mut rows = output::header(["metric", "value", "of"]);
-    let mut row =
-        |name: &str, value: String, of: String| rows.push(vec![name.to_owned(), value, of]);
-    row("rmse", format!("{rmse:.6e}"), format!("{} values, RGB", report.values));
-    row("max", format!("{max:.6e}"), "the same".into());
-    row("relmse", format!("{relmse:.6e}"), format!("the same, (b - a)²/(a² + {RELATIVE_EPSILON})"));
-    row("psnr", format!("{psnr:.3} dB"), format!("the same, peak {PEAK}"));
-    let of_ssim = format!("luminance, {shown}; Gaussian window 11, σ 1.5, C1 = 0.01², C2 = 0.03²");
-    row("ssim", or_dash(ssim, |v| format!("{v:.6}")), of_ssim);
-    row(
-        "flip",
-        format!("{flip:.6}"),
-        format!("mean, {shown}; {:.2} pixels a degree", report.pixels_per_degree),
-    );
-    if let (Some(rmse), Some(max)) = (alpha_rmse, alpha_max) {
-        row("alpha_rmse", format!("{rmse:.6e}"), "alpha".into());
-        row("alpha_max", format!("{max:.6e}"), "alpha".into());
+/// Returns the table for people. `of_each` counts the pixels that are not finite in A and in B.
+fn text(
+    args: &CompareArgs,
+    a: &Image,
+    metrics: &[Metric],
+    not_finite: usize,
+    of_each: [usize; 2],
+) -> String {
+    let n_bad = not_finite.to_string();
+    let mut rows = vec![["metric", "value", "of"]];
+    // Without alpha in both pictures the table is shorter.
+    let shown = metrics.iter().filter(|m| m.value.is_some() || m.name == "ssim");
+    rows.extend(shown.map(|m| [m.name, &m.text, &m.of]));
+    rows.push(["not_finite", &n_bad, "pixels, left out"]);
+    let [name, value] =
+        [0, 1].map(|c| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0));
+    let (path_a, path_b) = (args.a.display(), args.b.display());
+    let mut out = format!("A  {path_a}\nB  {path_b}, {}×{} pixels\n\n", a.width, a.height);
+    for [n, v, of] in &rows {
+        out += &format!("{n:name$}  {v:>value$}  {of}\n");
     }
-    row("not_finite", report.not_finite.to_string(), "pixels, left out".into());
-    let widths = [0, 1].map(|c| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0));
-    let mut out =
-        format!("A  {}\nB  {}, {}×{} pixels\n\n", report.a, report.b, report.width, report.height);
-    for row in &rows {
-        let [name, value] = [0, 1].map(|c| " ".repeat(widths[c] - row[c].chars().count()));
-        out += format!("{}{name}  {value}{}  {}", row[0], row[1], row[2]).trim_end();
-        out.push('\n');
-    }
-    if report.not_finite > 0 {
-        let Report { not_finite_a, not_finite_b, .. } = report;
-        out += &format!("\nnot finite: {not_finite_a} pixels of A, {not_finite_b} of B\n");
+    if not_finite > 0 {
+        let [of_a, of_b] = of_each;
+        out += &format!("\nnot finite: {of_a} pixels of A, {of_b} of B\n");
     }
     out
 }
 
 /// Returns a line for every limit that a metric exceeds.
-fn beyond(args: &CompareArgs, report: &Report) -> Vec<String> {
-    let m = &report.metrics;
-    let value = |name: &str| match name {
-        "rmse" => Some(m.rmse),
-        "max" => Some(m.max),
-        "relmse" => Some(m.relmse),
-        "psnr" => Some(m.psnr),
-        "ssim" => m.ssim,
-        "flip" => Some(m.flip),
-        "alpha_rmse" => m.alpha_rmse,
-        "alpha_max" => m.alpha_max,
-        _ => Some(report.not_finite as f64),
+fn beyond(args: &CompareArgs, metrics: &[Metric], not_finite: usize) -> Vec<String> {
+    let value = |name: &str| match metrics.iter().find(|m| m.name == name) {
+        Some(metric) => metric.value,
+        None => Some(not_finite as f64),
     };
     let check = |(name, limit): &(String, f64), is_above: bool| match value(name) {
         None => Some(format!("{name} of these pictures is not defined")),

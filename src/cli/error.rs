@@ -1,7 +1,6 @@
 //! `nimbus error SCENE`.
 
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::ColorChoice;
 use indicatif::ProgressBar;
@@ -9,14 +8,11 @@ use indicatif::ProgressBar;
 use super::args::ErrorArgs;
 use super::error_configurations::{axes, design, load_configuration};
 use super::error_table;
+use super::interrupt::graceful_stop;
 use super::output::{self, refuse_existing};
 use super::progress::{ReferenceProgress, progress};
-use super::scene::{
-    check_time, device_choice, load, print_sizes, with_texture_hint, without_textures,
-};
+use super::scene::{StudyScene, load_study, open_for_study, print_sizes, with_texture_hint};
 use crate::error::{Error, Result};
-use crate::frame::GpuContext;
-use crate::frame::limits;
 use crate::io::image;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;
@@ -32,37 +28,25 @@ use crate::studies::error::study::{ErrorStudy, Event, StudyPlan, StudyResults};
 use crate::studies::provenance::{Provenance, ReferenceRecord};
 use crate::studies::reference_cache::{self, CachedReference};
 use crate::timing::json::ResultFile;
-use crate::timing::machine;
 use crate::timing::names::Setting;
 use crate::timing::results::prepare_out_dir;
 
-/// Runs `nimbus error`; sets `graceful` once Ctrl-C should save the results.
+/// Runs `nimbus error`.
 ///
 /// # Errors
 /// Fails if the arguments or the scene are faulty, the device fails, or Ctrl-C came. Finished
 /// results are kept in `--out`.
-pub fn run(
-    args: &ErrorArgs,
-    color: ColorChoice,
-    stop: &AtomicBool,
-    graceful: &AtomicBool,
-) -> Result<()> {
+pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     if let (Some(out), false) = (&args.out, args.resume) {
         refuse_existing(out, args.force)?;
     }
-    let options = without_textures(&args.scene, &args.options, args.plain)?;
-    let base = load(&args.scene, &options)?;
-    let time_s = base.scene.time.at(args.frame);
-    let scene = &base.clone().at_frame(args.frame);
-    check_time(scene, time_s)?;
+    let StudyScene { options, loaded, scene, time_s } =
+        load_study(&args.scene, &args.options, args.plain, args.frame)?;
     let film = scene.film;
-    let axes = axes(args, &options, scene)?;
-    let gpu = GpuContext::open(&device_choice(&args.options))?;
-    limits::check(scene, gpu.device.limits())?;
-    let info = gpu.device.info();
-    let clocks = machine::clocks_record(info, &mut gpu.player(scene.clone(), true)?.renderer)?;
+    let axes = axes(args, &options, &scene)?;
+    let (gpu, clocks) = open_for_study(&options, &scene)?;
     if args.options.verbose {
-        print_sizes(scene, None);
+        print_sizes(&scene, None);
     }
     let plan = StudyPlan {
         axes,
@@ -73,9 +57,9 @@ pub fn run(
         part: args.part.map(|part| part.first as usize..part.end as usize),
     };
     let pixels = Pixels::sample(film.width, film.height, args.pixels);
-    let cached = reference(args, scene, time_s, &pixels)?;
+    let cached = reference(args, &scene, time_s, &pixels)?;
     let mut study = Study {
-        made: Provenance::now(Study::SCHEMA, &args.scene, &base, info, clocks),
+        made: Provenance::now(Study::SCHEMA, &args.scene, &loaded, gpu.device.info(), clocks),
         reference: ReferenceRecord::of(&cached, args.against, &pixels, args.frame, time_s),
         metric: plan.metric,
         time: plan.time,
@@ -98,7 +82,7 @@ pub fn run(
         write_reference(&out.join("reference.png"), &film, &pixels, &cached.reference.rgba)?;
         files::write(out, &study, &results)?;
     }
-    graceful.store(true, Ordering::Relaxed);
+    let stop = graceful_stop();
     let (n_frames, as_played) = (args.frames, args.as_played);
     let frames = FrameChoice { i_frame: args.frame, time_s, n_frames, as_played };
     let mut runner = DeviceRunner::new(&gpu, frames);
@@ -137,7 +121,7 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
     }
     if args.csv {
         let rows: Vec<_> = study.configurations.iter().map(files::csv_row).collect();
-        return output::rows(&rows, false);
+        return output::text(&output::rows(&rows, false)?);
     }
     output::text(&error_table::report(study))?;
     if args.plot {

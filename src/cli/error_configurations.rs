@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::args::{ErrorArgs, SceneArgs};
-use super::scene::{check_time, load, load_at, without_textures};
+use super::scene::{StudyScene, load_at, load_study};
 use crate::error::{Error, Result};
 use crate::farm::{StudyTurns, Workload, study_workload};
 use crate::model::film::Film;
@@ -99,10 +99,8 @@ pub fn load_configuration(
 /// # Errors
 /// Fails if the scene or a knob is faulty, or the scene has no such reference.
 pub fn configurations(args: &ErrorArgs) -> Result<(Vec<String>, Workload)> {
-    let options = without_textures(&args.scene, &args.options, args.plain)?;
-    let scene = load(&args.scene, &options)?.at_frame(args.frame);
-    let time_s = scene.time.at(args.frame);
-    check_time(&scene, time_s)?;
+    let StudyScene { options, scene, time_s, .. } =
+        load_study(&args.scene, &args.options, args.plain, args.frame)?;
     let axes = axes(args, &options, &scene)?;
     args.against.check(&scene, time_s)?;
     let all = settings(&axes, design(args));

@@ -1,10 +1,10 @@
 //! `nimbus farm …`: its commands, and those that work on a plan.
 
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::args::{FarmArgs, FarmCommand, GcArgs, LocalArgs, MergeArgs, RunArgs, StatusArgs};
+use super::interrupt::graceful_stop;
 use super::progress::{progress, spinner};
 use super::{farm_jobs, farm_plan, output};
 use crate::error::{Error, Result};
@@ -14,22 +14,19 @@ use crate::farm::{
 };
 use crate::frame::DeviceChoice;
 
-/// Runs a command of `nimbus farm`. `stop` is set by Ctrl-C, and by the signal with which Slurm
-/// takes a node back, while `graceful` says that the command keeps what it has finished.
+/// Runs a command of `nimbus farm`.
 ///
 /// # Errors
 /// When the command fails.
-pub fn run(args: &FarmArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
-    let keeps = matches!(args.command, FarmCommand::Run(_) | FarmCommand::Local(_));
-    graceful.store(keeps, Ordering::Relaxed);
+pub fn run(args: &FarmArgs) -> Result<()> {
     match &args.command {
         FarmCommand::Plan(a) => farm_plan::plan(a),
-        FarmCommand::Calibrate(a) => farm_plan::calibrated(a, stop),
-        FarmCommand::Run(a) => shard(a, stop).map_err(|error| match a.tries {
+        FarmCommand::Calibrate(a) => farm_plan::calibrated(a),
+        FarmCommand::Run(a) => shard(a).map_err(|error| match a.tries {
             Some(n_tries) => farm::give_up_after(n_tries, &a.plan, a.shard, error),
             None => error,
         }),
-        FarmCommand::Local(a) => local(a, stop),
+        FarmCommand::Local(a) => local(a),
         FarmCommand::Status(a) => print_status(a),
         FarmCommand::Merge(a) => merge(a),
         FarmCommand::Gc(a) => gc(a),
@@ -48,7 +45,9 @@ fn refuse_device(plan: &Plan, device: Option<&String>, validation: bool) -> Resu
     Ok(())
 }
 
-fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
+fn shard(args: &RunArgs) -> Result<()> {
+    // Ctrl-C, or the signal with which Slurm takes a node back.
+    let stop = graceful_stop();
     let plan = Plan::read(&args.plan)?;
     refuse_device(&plan, args.device.as_ref(), args.validation)?;
     let (n, noun) = (plan.shard(args.shard)?.n, plan.work.noun());
@@ -69,7 +68,8 @@ fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
     if args.quiet { Ok(()) } else { output::text(&format!("shard {}: {text}\n", args.shard)) }
 }
 
-fn local(args: &LocalArgs, stop: &AtomicBool) -> Result<()> {
+fn local(args: &LocalArgs) -> Result<()> {
+    let stop = graceful_stop();
     let plan = Plan::read(&args.plan)?;
     refuse_device(&plan, args.device.as_ref(), false)?;
     // A stale plan is refused here, and not once by every shard.

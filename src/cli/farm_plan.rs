@@ -6,7 +6,7 @@ use super::args::{CalibrateArgs, FormatArg, PlanArgs, Span};
 use super::farm_told;
 use super::output::{self, refuse_existing};
 use super::progress::progress;
-use super::scene::warnings;
+use super::scene::{print_warnings, typed_overrides};
 use crate::error::Result;
 use crate::farm::{
     AnyWork, Cut, CutOptions, Estimate, FileModel, Frames, Plan, PlanRequest, Rate,
@@ -30,14 +30,9 @@ const USUAL_RETRIES: f64 = 0.02;
 /// # Errors
 /// When the work cannot be planned, or the plan cannot be written.
 pub fn plan(args: &PlanArgs) -> Result<()> {
-    let mut set = args.set.clone();
-    if let Some((width, height)) = args.size {
-        set.extend([format!("film.width={width}"), format!("film.height={height}")]);
-    }
+    let set = typed_overrides(&args.set, args.size);
     let loaded = scene_file::load(&args.scene, &set, args.seed)?;
-    for warning in warnings(&loaded).iter().filter(|_| !args.quiet) {
-        eprintln!("warning: {warning}");
-    }
+    print_warnings(&loaded, args.quiet);
     let cut = cut(args, &set, &loaded)?;
     // Errors of the price come before anything is written.
     let rate = args.rate.map(|price_per_quantum| Rate {
@@ -123,12 +118,13 @@ fn all_frames(loaded: &LoadedScene) -> Span {
 ///
 /// # Errors
 /// When a run fails, the runs do not determine a model, or the file cannot be written.
-pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
+pub fn calibrated(args: &CalibrateArgs) -> Result<()> {
     atomic::check_place(&args.output)?;
     refuse_existing(&args.output, args.force)?;
     let choice = DeviceChoice { device: args.device.clone(), ..DeviceChoice::default() };
     let bar = progress(n_frames(args.scenes.len(), args.frames), "frames", args.quiet);
-    let options = RunOptions { choice: &choice, stop, on_item: &|| bar.inc(1) };
+    let never = AtomicBool::new(false);
+    let options = RunOptions { choice: &choice, stop: &never, on_item: &|| bar.inc(1) };
     let found = match &args.farm[..] {
         [] => calibrate(&args.scenes, &args.set, args.frames, &options),
         farms => calibrate_by_farms(farms),

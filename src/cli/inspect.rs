@@ -22,109 +22,88 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let i_frame = args.frame.filter(|_| !args.plan).unwrap_or(0);
     let scene = load(&args.scene, &args.options)?.at_frame(i_frame);
     if let Some(what) = args.basis {
-        return print_basis(&basis::report(&scene), what, args);
+        return output::text(&basis_text(&basis::report(&scene), what, args)?);
     }
     if args.air {
-        return output::rows(&[air::row(&scene)], args.json);
+        return output::text(&output::rows(&[air::row(&scene)], args.json)?);
     }
     check_time(&scene, scene.time.at(args.frame.unwrap_or(0)))?;
     let waiting = spinner("inspecting", args.options.quiet);
+    // The text is complete before any of it is printed.
     if args.reference {
         let scene = &scene;
-        let found = match (args.particles, args.facets) {
-            (true, _) => Rows::Particles(inspect::particles_reference(scene, i_frame)?),
-            (_, true) => {
-                Rows::Facets(of_surfaces(args, scene, inspect::facets_reference(scene, i_frame)?))
-            }
-            _ => Rows::Boxes(inspect::boxes_reference(scene)),
-        };
+        let text = match (args.particles, args.facets) {
+            (true, _) => output::rows(&inspect::particles_reference(scene, i_frame)?, args.json),
+            (_, true) => facets(args, scene, inspect::facets_reference(scene, i_frame)?),
+            _ => boxes(&inspect::boxes_reference(scene), args.json),
+        }?;
         drop(waiting);
         if args.options.verbose {
             print_sizes(scene, None);
         }
-        return print(&found, args.json);
+        return output::text(&text);
     }
     let mut stage = Stage::new(scene, &device_choice(&args.options), !args.options.no_skip)?;
-    let found = match (args.particles, args.facets, args.plan) {
-        (true, _, _) => Rows::Particles(inspect::particles(&mut stage, i_frame)?),
+    let text = match (args.particles, args.facets, args.plan) {
+        (true, _, _) => output::rows(&inspect::particles(&mut stage, i_frame)?, args.json),
         (_, true, _) => {
             let rows = inspect::facets(&mut stage, i_frame)?;
             print_notes(&mut stage, &args.options)?;
-            Rows::Facets(of_surfaces(args, &stage.scene, rows))
+            facets(args, &stage.scene, rows)
         }
-        (_, _, true) => Rows::Plan(inspect::plans(&mut stage, args.frame.unwrap_or(PLAN_FRAMES))?),
-        _ => Rows::Boxes(inspect::boxes(&mut stage)?),
-    };
+        (_, _, true) => {
+            plan(&inspect::plans(&mut stage, args.frame.unwrap_or(PLAN_FRAMES))?, args.json)
+        }
+        _ => boxes(&inspect::boxes(&mut stage)?, args.json),
+    }?;
     drop(waiting);
     if args.options.verbose {
         print_sizes(&stage.scene, Some(&stage));
     }
-    print(&found, args.json)?;
+    output::text(&text)?;
     stage.close()
 }
 
 /// Returns the rows of facets, or their means over each surface.
-fn of_surfaces(
-    args: &InspectArgs,
-    scene: &Scene,
-    rows: Vec<inspect::FacetRow>,
-) -> Vec<inspect::FacetRow> {
-    if args.per_surface { inspect::per_surface(scene, &rows) } else { rows }
+fn facets(args: &InspectArgs, scene: &Scene, rows: Vec<inspect::FacetRow>) -> Result<String> {
+    let rows = if args.per_surface { inspect::per_surface(scene, &rows) } else { rows };
+    output::rows(&rows, args.json)
 }
 
-/// The rows of a stage, complete before the first is printed.
-enum Rows {
-    Particles(Vec<inspect::ParticleRow>),
-    Facets(Vec<inspect::FacetRow>),
-    Boxes(Vec<inspect::BoxRow>),
-    Plan(Vec<inspect::PlanRow>),
-}
-
-fn print(rows: &Rows, json: bool) -> Result<()> {
-    match rows {
-        Rows::Particles(rows) => output::rows(rows, json),
-        Rows::Facets(rows) => output::rows(rows, json),
-        Rows::Boxes(rows) => boxes(rows, json),
-        Rows::Plan(rows) => plan(rows, json),
-    }
-}
-
-fn print_basis(report: &basis::BasisReport, what: BasisArg, args: &InspectArgs) -> Result<()> {
+fn basis_text(report: &basis::BasisReport, what: BasisArg, args: &InspectArgs) -> Result<String> {
     if let Some(note) = basis::note(report).filter(|_| !args.options.quiet) {
         eprintln!("note: {note}");
     }
     match what {
-        _ if args.json => output::object(report),
-        BasisArg::Table => output::numbers(&report.table.names(), report.table.rows()),
+        _ if args.json => output::json_text(report),
+        BasisArg::Table => output::csv_rows(&report.table.names(), report.table.rows()),
         BasisArg::Values => output::rows(&report.singular_values, false),
         BasisArg::Errors => output::rows(&report.errors, false),
     }
 }
 
-fn boxes(rows: &[inspect::BoxRow], json: bool) -> Result<()> {
+fn boxes(rows: &[inspect::BoxRow], json: bool) -> Result<String> {
     if json {
         return output::rows(rows, true);
     }
     let mut table = header(["cloud", "box", "particles", "attempts", "acceptance", "folded"]);
-    let mut add =
-        |names: [String; 2], particles: u64, attempts: u64, rate: Option<f64>, folded: u64| {
-            let rate = or_dash(rate, |rate| format!("{rate:.4}"));
-            let counts = [particles.to_string(), attempts.to_string(), rate, folded.to_string()];
-            table.push([&names[..], &counts[..]].concat());
-        };
+    let mut add = |[cloud, name]: [String; 2], [particles, attempts, folded]: [u64; 3]| {
+        let rate = (attempts > 0).then(|| (particles - folded) as f64 / attempts as f64);
+        let rate = or_dash(rate, |rate| format!("{rate:.4}"));
+        let [particles, attempts, folded] = [particles, attempts, folded].map(|n| n.to_string());
+        table.push(vec![cloud, name, particles, attempts, rate, folded]);
+    };
+    let mut sums = [0; 3];
     for r in rows {
-        let names = [r.cloud.to_string(), r.r#box.to_string()];
-        add(names, r.particles.into(), r.attempts, r.acceptance, r.folded.into());
+        let counts = [r.particles.into(), r.attempts, r.folded.into()];
+        add([r.cloud, r.r#box].map(|i| i.to_string()), counts);
+        (0..3).for_each(|k| sums[k] += counts[k]);
     }
-    let (particles, attempts) =
-        rows.iter().fold((0u64, 0u64), |(p, a), r| (p + u64::from(r.particles), a + r.attempts));
-    let folded: u64 = rows.iter().map(|r| u64::from(r.folded)).sum();
-    let all = (attempts > 0).then(|| (particles - folded) as f64 / attempts as f64);
-    add(["all".to_owned(), String::new()], particles, attempts, all, folded);
-    output::text(&output::table(&table))
+    add(["all".to_owned(), String::new()], sums);
+    Ok(output::table(&table))
 }
 
-fn plan(rows: &[inspect::PlanRow], json: bool) -> Result<()> {
+fn plan(rows: &[inspect::PlanRow], json: bool) -> Result<String> {
     if json {
         return output::rows(rows, true);
     }
@@ -133,5 +112,5 @@ fn plan(rows: &[inspect::PlanRow], json: bool) -> Result<()> {
         let done = if r.run { "run" } else { "skip" };
         table.push(vec![r.frame.to_string(), r.pass.into(), done.into(), r.reason.clone()]);
     }
-    output::text(&output::table(&table))
+    Ok(output::table(&table))
 }

@@ -1,41 +1,33 @@
 //! `nimbus ledger SCENE`.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use super::args::LedgerArgs;
+use super::interrupt::graceful_stop;
 use super::output::{self, header, interval, or_dash, refuse_existing, scientific};
 use super::progress::ReferenceProgress;
-use super::scene::{check_time, device_choice, load, with_texture_hint, without_textures};
+use super::scene::{StudyScene, load_study, open_for_study, with_texture_hint};
 use crate::error::{Error, Result};
-use crate::frame::GpuContext;
-use crate::frame::limits;
 use crate::io::atomic::check_place;
-use crate::reference::picture::Pixels;
-use crate::reference::picture::ReferenceKind;
-use crate::reference::picture::n_reflections;
+use crate::reference::picture::{Pixels, ReferenceKind, n_reflections};
 use crate::report::charts;
 use crate::studies::error::device_runner::FrameChoice;
 use crate::studies::ledger::records::{Ledger, Row};
 use crate::studies::ledger::study::LedgerStudy;
 use crate::studies::provenance::Provenance;
 use crate::timing::json::{self, ResultFile};
-use crate::timing::machine;
 use crate::timing::results::prepare_out_dir;
 
-/// Runs `nimbus ledger`; sets `graceful` once Ctrl-C should save the finished rows.
+/// Runs `nimbus ledger`.
 ///
 /// # Errors
 /// Fails if the arguments or the scene are faulty, the device fails, the rows do not sum up, or
 /// Ctrl-C came.
-pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
+pub fn run(args: &LedgerArgs) -> Result<()> {
     if let Some(out) = &args.out {
         refuse_existing(out, args.force)?;
     }
-    let options = without_textures(&args.scene, &args.options, args.plain)?;
-    let loaded = load(&args.scene, &options)?;
-    let time_s = loaded.scene.time.at(args.frame);
-    let scene = &loaded.clone().at_frame(args.frame).exact().into_owned();
-    check_time(scene, time_s)?;
+    let StudyScene { options, loaded, scene, time_s } =
+        load_study(&args.scene, &args.options, args.plain, args.frame)?;
+    let scene = &scene.exact().into_owned();
     ReferenceKind::Model.check(scene, time_s).map_err(|error| with_texture_hint(error, ""))?;
     let n_least = n_reflections(scene);
     if args.reflections < n_least {
@@ -44,16 +36,13 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
             args.reflections
         )));
     }
-    let gpu = GpuContext::open(&device_choice(&args.options))?;
-    limits::check(scene, gpu.device.limits())?;
-    let info = gpu.device.info();
-    let clocks = machine::clocks_record(info, &mut gpu.player(scene.clone(), true)?.renderer)?;
-    let made = Provenance::now(Ledger::SCHEMA, &args.scene, &loaded, info, clocks);
+    let (gpu, clocks) = open_for_study(&options, scene)?;
+    let made = Provenance::now(Ledger::SCHEMA, &args.scene, &loaded, gpu.device.info(), clocks);
     if let Some(out) = &args.out {
         prepare_out_dir(out, true)?;
         check_place(&out.join(Ledger::FILE))?;
     }
-    graceful.store(true, Ordering::Relaxed);
+    let stop = graceful_stop();
     let shown = ReferenceProgress::new(args.options.quiet);
     let study = LedgerStudy {
         gpu: &gpu,

@@ -59,13 +59,13 @@ pub fn text(text: &str) -> Result<()> {
     }
 }
 
-/// Prints rows as CSV with a header, or as a JSON array.
+/// Returns rows as CSV with a header, or as a JSON array.
 ///
 /// # Errors
-/// Fails if a row cannot be serialized or stdout cannot be written.
-pub fn rows<T: Serialize>(rows: &[T], json: bool) -> Result<()> {
+/// Fails if a row cannot be serialized.
+pub fn rows<T: Serialize>(rows: &[T], json: bool) -> Result<String> {
     if json {
-        return object(rows);
+        return json_text(rows);
     }
     let mut writer = csv::Writer::from_writer(vec![]);
     for row in rows {
@@ -74,13 +74,16 @@ pub fn rows<T: Serialize>(rows: &[T], json: bool) -> Result<()> {
     csv_text(writer)
 }
 
-/// Prints rows of numbers as CSV under the given column names.
+/// Returns rows that have no names as CSV under the given column names.
 ///
 /// # Errors
-/// Fails if stdout cannot be written.
-pub fn numbers(names: &[String], rows: impl Iterator<Item = Vec<f64>>) -> Result<()> {
+/// Fails if a row cannot be serialized.
+pub fn csv_rows<T: Serialize>(
+    names: &[impl AsRef<str>],
+    rows: impl Iterator<Item = T>,
+) -> Result<String> {
     let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(vec![]);
-    writer.serialize(names).map_err(fail)?;
+    writer.write_record(names.iter().map(AsRef::as_ref)).map_err(fail)?;
     for row in rows {
         writer.serialize(row).map_err(fail)?;
     }
@@ -92,11 +95,19 @@ pub fn numbers(names: &[String], rows: impl Iterator<Item = Vec<f64>>) -> Result
 /// # Errors
 /// Fails if the value cannot be serialized or stdout cannot be written.
 pub fn object<T: Serialize + ?Sized>(object: &T) -> Result<()> {
-    text(&(serde_json::to_string_pretty(object).map_err(fail)? + "\n"))
+    text(&json_text(object)?)
 }
 
-fn csv_text(writer: csv::Writer<Vec<u8>>) -> Result<()> {
-    text(&String::from_utf8_lossy(&writer.into_inner().map_err(fail)?))
+/// Returns a value as JSON.
+///
+/// # Errors
+/// Fails if the value cannot be serialized.
+pub fn json_text<T: Serialize + ?Sized>(object: &T) -> Result<String> {
+    Ok(serde_json::to_string_pretty(object).map_err(fail)? + "\n")
+}
+
+fn csv_text(writer: csv::Writer<Vec<u8>>) -> Result<String> {
+    String::from_utf8(writer.into_inner().map_err(fail)?).map_err(fail)
 }
 
 fn fail(what: impl std::fmt::Display) -> Error {
@@ -144,9 +155,9 @@ pub fn table(rows: &[Vec<String>]) -> String {
     let widths: Vec<usize> = (0..n_columns).map(width).collect();
     let mut out = String::new();
     for row in rows {
-        let cells = row.iter().enumerate().map(|(c, t)| {
-            let pad = " ".repeat(widths[c] - t.chars().count());
-            if c == 0 { format!("{t}{pad}") } else { format!("{pad}{t}") }
+        let cells = row.iter().zip(&widths).enumerate().map(|(c, (t, width))| match c {
+            0 => format!("{t:width$}"),
+            _ => format!("{t:>width$}"),
         });
         out += cells.collect::<Vec<_>>().join("  ").trim_end();
         out.push('\n');

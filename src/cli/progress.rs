@@ -16,7 +16,11 @@ pub fn progress(n: u64, what: &str, quiet: bool) -> ProgressBar {
     let target =
         if is_hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let bar = ProgressBar::with_draw_target(Some(n), target).with_message(what.to_owned());
-    match ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}") {
+    styled(bar, "{msg} {wide_bar} {pos}/{len} {eta}")
+}
+
+fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
+    match ProgressStyle::with_template(template) {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,
     }
@@ -59,15 +63,14 @@ const SPINNER_STEP: Duration = Duration::from_millis(100);
 
 /// A spinner that appears after a second and disappears when it is dropped.
 pub struct Spinner {
-    /// Dropping the sender ends the thread.
-    done: Option<Sender<()>>,
-    thread: Option<JoinHandle<()>>,
+    /// The thread that draws, and the sender whose end makes it end.
+    drawn: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
 /// Returns a spinner; it never appears if `quiet` is set or stderr is not a terminal.
 pub fn spinner(what: &'static str, quiet: bool) -> Spinner {
     if quiet || !std::io::stderr().is_terminal() {
-        return Spinner { done: None, thread: None };
+        return Spinner { drawn: None };
     }
     let (done, waiting) = mpsc::channel::<()>();
     let thread = std::thread::spawn(move || {
@@ -76,24 +79,23 @@ pub fn spinner(what: &'static str, quiet: bool) -> Spinner {
         }
         let spinner =
             ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()).with_message(what);
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
-            spinner.set_style(style);
-        }
-        spinner.set_elapsed(SPINNER_DELAY);
+        let spinner = styled(spinner, "{spinner} {msg} {elapsed}").with_elapsed(SPINNER_DELAY);
         while waiting.recv_timeout(SPINNER_STEP) == Err(RecvTimeoutError::Timeout) {
             spinner.tick();
         }
         spinner.finish_and_clear();
     });
-    Spinner { done: Some(done), thread: Some(thread) }
+    Spinner { drawn: Some((done, thread)) }
 }
 
 impl Drop for Spinner {
     fn drop(&mut self) {
-        self.done = None;
-        // Joining clears the line before anything else is printed. A thread that panicked has drawn
-        // nothing.
-        let _ = self.thread.take().map(JoinHandle::join);
+        if let Some((done, thread)) = self.drawn.take() {
+            drop(done);
+            // Joining clears the line before anything else is printed. A thread that panicked has
+            // drawn nothing.
+            let _ = thread.join();
+        }
     }
 }
 
@@ -104,9 +106,13 @@ pub struct ReferenceProgress {
     quiet: bool,
 }
 
+/// What the terminal shows.
 enum Shown {
+    /// Nothing, while one line replaces another.
     Nothing,
+    /// A spinner between two works.
     Spinner { _spinner: Spinner },
+    /// A bar over the parts of a work.
     Bar { work: RenderStage, n_left: usize, bar: LateProgress },
 }
 

@@ -4,24 +4,28 @@ use std::path::{Path, PathBuf};
 
 use super::args::SceneArgs;
 use crate::error::{Error, Result};
-use crate::frame::light_notes;
-use crate::frame::limits::advice;
-use crate::frame::{DeviceChoice, Stage};
+use crate::frame::limits::{self, advice};
+use crate::frame::{DeviceChoice, GpuContext, Stage, light_notes};
 use crate::inspect::basis::basis_warnings;
 use crate::io::bounds::{GREATEST, is_carried_place, shortest};
 use crate::io::scene_file::{self, LoadedScene};
 use crate::model::scene::Scene;
+use crate::timing::machine::{Clocks, clocks_record};
 use crate::timing::names::Setting;
 use crate::timing::sweep::{SIZE_KEY, overrides};
 
-/// Returns the scene keys that the arguments set, as `--set` takes them.
-pub fn typed_overrides(args: &SceneArgs) -> Vec<String> {
-    let mut overrides = args.set.clone();
-    if let Some((width, height)) = args.size {
-        overrides.push(format!("film.width={width}"));
-        overrides.push(format!("film.height={height}"));
+/// Returns the scene keys that `--set` and `--size` set, as `--set` takes them.
+pub fn typed_overrides(set: &[String], size: Option<(u32, u32)>) -> Vec<String> {
+    let size = size
+        .map(|(width, height)| [format!("film.width={width}"), format!("film.height={height}")]);
+    set.iter().cloned().chain(size.into_iter().flatten()).collect()
+}
+
+/// Prints the warnings about a scene unless `quiet` is set.
+pub fn print_warnings(loaded: &LoadedScene, quiet: bool) {
+    for warning in warnings(loaded).iter().filter(|_| !quiet) {
+        eprintln!("warning: {warning}");
     }
-    overrides
 }
 
 /// Loads a scene with the keys that the arguments set, and prints its warnings.
@@ -37,11 +41,10 @@ pub fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
 /// # Errors
 /// Fails if the scene or a file that it names is faulty.
 pub fn load_with_files(path: &Path, args: &SceneArgs) -> Result<(LoadedScene, Vec<PathBuf>)> {
-    let (loaded, files) = scene_file::load_and_list(path, &typed_overrides(args), args.seed);
+    let (loaded, files) =
+        scene_file::load_and_list(path, &typed_overrides(&args.set, args.size), args.seed);
     let loaded = loaded?;
-    for warning in warnings(&loaded).iter().filter(|_| !args.quiet) {
-        eprintln!("warning: {warning}");
-    }
+    print_warnings(&loaded, args.quiet);
     Ok((loaded, files))
 }
 
@@ -73,16 +76,51 @@ pub fn load_at(
 }
 
 /// Returns the arguments, with the textures of all clouds removed if `plain` is set.
-///
-/// # Errors
-/// Fails if the scene cannot be loaded.
-pub fn without_textures(path: &Path, args: &SceneArgs, plain: bool) -> Result<SceneArgs> {
+fn without_textures(path: &Path, args: &SceneArgs, plain: bool) -> Result<SceneArgs> {
     let mut args = args.clone();
     let quiet = SceneArgs { quiet: true, ..args.clone() };
     if plain && !load(path, &quiet)?.scene.clouds.is_empty() {
         args.set.push("cloud.*.texture=\"none\"".to_owned());
     }
     Ok(args)
+}
+
+/// The scene of a study at the frame that is compared.
+pub struct StudyScene {
+    /// The arguments, with the textures removed that the study leaves out.
+    pub options: SceneArgs,
+    /// The scene as loaded.
+    pub loaded: LoadedScene,
+    /// The scene at the frame, of its phase if it has phases.
+    pub scene: Scene,
+    /// Time of the frame, s.
+    pub time_s: f64,
+}
+
+/// Loads the scene of a study. `plain` removes the textures of all clouds.
+///
+/// # Errors
+/// Fails if the scene is faulty, or f32 cannot represent it at the frame.
+pub fn load_study(path: &Path, args: &SceneArgs, plain: bool, i_frame: u32) -> Result<StudyScene> {
+    let options = without_textures(path, args, plain)?;
+    let loaded = load(path, &options)?;
+    let time_s = loaded.scene.time.at(i_frame);
+    let scene = loaded.clone().at_frame(i_frame);
+    check_time(&scene, time_s)?;
+    Ok(StudyScene { options, loaded, scene, time_s })
+}
+
+/// Opens the device of a study, checks that it has room for the scene, and measures its clocks.
+///
+/// # Errors
+/// Fails if there is no such device, or the scene does not fit on it.
+pub fn open_for_study(args: &SceneArgs, scene: &Scene) -> Result<(GpuContext, Clocks)> {
+    let gpu = GpuContext::open(&device_choice(args))?;
+    limits::check(scene, gpu.device.limits())?;
+    let mut player = gpu.player(scene.clone(), true)?;
+    let clocks = clocks_record(gpu.device.info(), &mut player.renderer)?;
+    drop(player);
+    Ok((gpu, clocks))
 }
 
 /// Adds to the error of a textured scene, which has no such reference, how to go on.

@@ -1,37 +1,27 @@
 //! `nimbus stress [CASE…]`.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use serde::Serialize;
+use serde_json::json;
 
 use super::args::StressArgs;
+use super::interrupt::graceful_stop;
 use super::output::{self, header};
 use super::progress::progress;
 use crate::error::{Error, Result};
 use crate::frame::DeviceChoice;
-use crate::stress::{Case, Outcome, StressContext, Verdict, cases};
-use crate::timing::machine::{self, Cpu, Device};
+use crate::stress::{Case, Outcome, StressContext, Verdict, Worst, cases};
+use crate::timing::machine::{self, Device};
 
-/// The output of `--json`, which docs/reference/schemas/stress.schema.json describes.
-#[derive(Debug, Serialize)]
-struct Report {
-    schema: u32,
-    nimbus: &'static str,
-    revision: &'static str,
-    date: String,
-    device: Device,
-    cpu: Cpu,
-    interrupted: bool,
-    cases: Vec<Outcome>,
-}
-
+/// Version of the output of `--json`, which docs/reference/schemas/stress.schema.json describes.
 const SCHEMA_VERSION: u32 = 1;
 
-/// Runs `nimbus stress`; sets `graceful` once Ctrl-C should print the finished cases.
+/// Runs `nimbus stress`.
 ///
 /// # Errors
 /// Fails if no case has such a name, the device fails, a case fails, or Ctrl-C came.
-pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
+pub fn run(args: &StressArgs) -> Result<()> {
     let chosen = chosen(&args.cases)?;
     if args.list {
         let text = |c: &Case| format!("{}\n    {}\n    allowed: {}\n", c.name, c.what, c.bound);
@@ -44,7 +34,7 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
         poison: false,
     };
     let mut context = StressContext::open(&choice)?;
-    graceful.store(true, Ordering::Relaxed);
+    let stop = graceful_stop();
     let bar = progress(chosen.len() as u64, "cases", args.quiet);
     let mut done: Vec<Outcome> = Vec::new();
     for case in &chosen {
@@ -57,24 +47,20 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     }
     bar.finish_and_clear();
     let interrupted = done.len() < chosen.len();
-    let info = context.device().info().clone();
-    let report = Report {
-        schema: SCHEMA_VERSION,
-        nimbus: env!("CARGO_PKG_VERSION"),
-        revision: machine::revision(),
-        date: machine::utc_now(),
-        device: machine::device_record(&info),
-        cpu: machine::cpu(),
-        interrupted,
-        cases: done,
-    };
-    match (args.json, args.csv) {
-        (true, _) => output::object(&report)?,
-        (_, true) => output::rows(&report.cases.iter().map(row).collect::<Vec<_>>(), false)?,
-        _ => output::text(&text(&report))?,
-    }
+    let device = machine::device_record(context.device().info());
+    output::text(&if args.json {
+        output::json_text(&json!({
+            "schema": SCHEMA_VERSION, "nimbus": env!("CARGO_PKG_VERSION"),
+            "revision": machine::revision(), "date": machine::utc_now(), "device": device,
+            "cpu": machine::cpu(), "interrupted": interrupted, "cases": done,
+        }))?
+    } else if args.csv {
+        csv(&done)?
+    } else {
+        text(&device, &done, interrupted)
+    })?;
     context.close()?;
-    if interrupted { Err(Error::Interrupted) } else { judged(&report.cases) }
+    if interrupted { Err(Error::Interrupted) } else { judged(&done) }
 }
 
 /// Returns the cases whose names begin with one of `names`; all cases if there are none.
@@ -100,41 +86,25 @@ fn chosen(names: &[String]) -> Result<Vec<Case>> {
     Ok(all.iter().copied().filter(|c| names.is_empty() || is_meant(c)).collect())
 }
 
-/// An outcome as a row of CSV.
-#[derive(Debug, Serialize)]
-struct CsvRow<'a> {
-    name: &'a str,
-    verdict: Verdict,
-    n: usize,
-    n_beyond: usize,
-    at: Option<&'a str>,
-    value: Option<f64>,
-    truth: Option<f64>,
-    error: Option<f64>,
-    bound: Option<f64>,
-    remark: Option<&'a str>,
-    seconds: f64,
+fn csv(cases: &[Outcome]) -> Result<String> {
+    let names = [
+        "name", "verdict", "n", "n_beyond", "at", "value", "truth", "error", "bound", "remark",
+        "seconds",
+    ];
+    output::csv_rows(&names, cases.iter().map(csv_row))
 }
 
-fn row(o: &Outcome) -> CsvRow<'_> {
-    let worst = o.worst.as_ref();
-    CsvRow {
-        name: &o.name,
-        verdict: o.verdict,
-        n: o.n,
-        n_beyond: o.n_beyond,
-        at: worst.map(|w| w.at.as_str()),
-        value: worst.map(|w| w.value),
-        truth: worst.map(|w| w.truth),
-        error: worst.map(|w| w.error),
-        bound: worst.map(|w| w.bound),
-        remark: o.remark.as_deref(),
-        seconds: o.seconds,
-    }
+fn csv_row(o: &Outcome) -> impl Serialize {
+    let worst = |value: fn(&Worst) -> f64| o.worst.as_ref().map(value);
+    let at = o.worst.as_ref().map(|w| &w.at);
+    let (value, truth) = (worst(|w| w.value), worst(|w| w.truth));
+    let (error, bound) = (worst(|w| w.error), worst(|w| w.bound));
+    let (name, remark) = (&o.name, &o.remark);
+    (name, o.verdict, o.n, o.n_beyond, at, value, truth, error, bound, remark, o.seconds)
 }
 
 /// Returns the table for people.
-fn text(report: &Report) -> String {
+fn text(device: &Device, cases: &[Outcome], interrupted: bool) -> String {
     let number = |v: f64| if v == 0.0 { "0".to_owned() } else { format!("{v:.3e}") };
     let of = |o: &Outcome| {
         let worst = o.worst.as_ref().map(|w| {
@@ -154,33 +124,30 @@ fn text(report: &Report) -> String {
         "bound",
         "error/bound",
     ]);
-    rows.extend(report.cases.iter().map(of));
-    let count = |verdict: Verdict| report.cases.iter().filter(|o| o.verdict == verdict).count();
-    let mut out =
-        format!("{} ({}), {}\n\n", report.device.name, report.device.driver, report.cpu.model);
+    rows.extend(cases.iter().map(of));
+    let count = |verdict: Verdict| cases.iter().filter(|o| o.verdict == verdict).count();
+    let mut out = format!("{} ({}), {}\n\n", device.name, device.driver, machine::cpu().model);
     out += &output::table(&rows);
-    for o in report.cases.iter().filter(|o| o.verdict != Verdict::Passed || o.remark.is_some()) {
-        let beyond = match (&o.worst, o.verdict) {
+    for o in cases.iter().filter(|o| o.verdict != Verdict::Passed || o.remark.is_some()) {
+        let beyond: &str = &match (&o.worst, o.verdict) {
             (Some(w), Verdict::Failed) => {
                 format!("{} of {} out of bound; at {}", o.n_beyond, o.n, w.at)
             }
             (None, Verdict::Failed) => "nothing was compared".to_owned(),
             _ => String::new(),
         };
-        let words: Vec<&str> = [beyond.as_str(), o.remark.as_deref().unwrap_or("")]
-            .into_iter()
-            .filter(|w| !w.is_empty())
-            .collect();
+        let mut words = [beyond, o.remark.as_deref().unwrap_or_default()].to_vec();
+        words.retain(|w| !w.is_empty());
         out += &format!("\n{}: {}", o.name, words.join("; "));
     }
-    let seconds: f64 = report.cases.iter().map(|o| o.seconds).sum();
+    let seconds: f64 = cases.iter().map(|o| o.seconds).sum();
     out += &format!(
         "\n\n{} passed, {} failed, {} broken, {} not on this device; {seconds:.1} s{}\n",
         count(Verdict::Passed),
         count(Verdict::Failed),
         count(Verdict::Broken),
         count(Verdict::NotHere),
-        if report.interrupted { "; INTERRUPTED" } else { "" }
+        if interrupted { "; INTERRUPTED" } else { "" }
     );
     out
 }
@@ -196,11 +163,8 @@ fn word(verdict: Verdict) -> &'static str {
 
 /// Fails if a case failed.
 fn judged(cases: &[Outcome]) -> Result<()> {
-    let bad: Vec<&str> = cases
-        .iter()
-        .filter(|o| matches!(o.verdict, Verdict::Failed | Verdict::Broken))
-        .map(|o| o.name.as_str())
-        .collect();
+    let bad = cases.iter().filter(|o| matches!(o.verdict, Verdict::Failed | Verdict::Broken));
+    let bad: Vec<&str> = bad.map(|o| o.name.as_str()).collect();
     if bad.is_empty() {
         return Ok(());
     }

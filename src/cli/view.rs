@@ -5,11 +5,10 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
 
-use super::args::{PresentArg, ViewArgs};
+use super::args::ViewArgs;
 use super::output::{self, header};
 use super::scene::{device_choice, load_with_files, typed_overrides};
 use crate::error::Result;
-use crate::gpu::PresentMode;
 use crate::measure::stats::Summary;
 use crate::viewer::scene_window::{self, LoopTimes, Options, SceneSource, WindowTimes, help};
 
@@ -22,14 +21,9 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
     if !args.options.quiet {
         eprint!("{}", help());
     }
-    let mode = match args.present {
-        PresentArg::Fifo => PresentMode::Fifo,
-        PresentArg::Mailbox => PresentMode::Mailbox,
-        PresentArg::Immediate => PresentMode::Immediate,
-    };
     let source = SceneSource {
         path: args.scene.clone(),
-        overrides: typed_overrides(&args.options),
+        overrides: typed_overrides(&args.options.set, args.options.size),
         seed: args.options.seed,
         first: Arc::new(loaded.scene),
         files,
@@ -38,7 +32,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         source,
         choice: device_choice(&args.options),
         skips: !args.options.no_skip,
-        mode,
+        mode: args.present,
         n_frames: args.frames,
         stop,
         is_quiet: args.options.quiet,

@@ -13,11 +13,12 @@ use super::instance::Instance;
 use crate::error::{Error, Result};
 
 /// When a presented image becomes visible.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum PresentMode {
-    /// At the next refresh, one image after the other: every device has it.
+    /// In order, one at each refresh. Every window supports this mode.
+    #[value(help = "In order, one at each refresh")]
     Fifo,
-    /// At the next refresh, the newest image.
+    /// The newest at each refresh.
     Mailbox,
     /// At once.
     Immediate,

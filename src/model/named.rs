@@ -6,7 +6,7 @@ macro_rules! named {
         $($(#[$meaning:meta])* $value:ident = $name:literal,)+
     }) => {
         $(#[$about])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
         pub enum $type { $($(#[$meaning])* $value),+ }
 
         impl $type {

@@ -55,8 +55,10 @@ const ACTIVE_INTERVAL: Duration = Duration::from_millis(16);
 /// Side of the largest texture that every Vulkan device supports.
 const MAX_TEXTURE_SIDE: usize = 4096;
 
-/// egui's state in one window.
+/// A window with egui's state in it.
 pub struct EguiLayer {
+    /// The window.
+    pub window: Window,
     context: Context,
     state: egui_winit::State,
     shared: SharedWidgets,
@@ -72,7 +74,7 @@ impl EguiLayer {
     /// `has_feathering` smooths edges. Smooth edges are most of the triangles, and a software
     /// device pays for each of them.
     pub fn new(
-        window: &Window,
+        window: Window,
         shared: SharedWidgets,
         idle_interval: Duration,
         has_feathering: bool,
@@ -83,17 +85,18 @@ impl EguiLayer {
         let state = egui_winit::State::new(
             context.clone(),
             ViewportId::ROOT,
-            window,
+            &window,
             Some(window.scale_factor() as f32),
             None,
             Some(MAX_TEXTURE_SIDE),
         );
-        EguiLayer { context, state, shared, idle_interval, last_update: None, needs_update: true }
+        let (last_update, needs_update) = (None, true);
+        EguiLayer { window, context, state, shared, idle_interval, last_update, needs_update }
     }
 
     /// Passes `event` to egui. Returns whether egui consumed it.
-    pub fn handle(&mut self, window: &Window, event: &WindowEvent) -> bool {
-        let response = self.state.on_window_event(window, event);
+    pub fn handle(&mut self, event: &WindowEvent) -> bool {
+        let response = self.state.on_window_event(&self.window, event);
         self.needs_update |= response.repaint;
         response.consumed
     }
@@ -126,12 +129,12 @@ impl EguiLayer {
 
     /// Runs `add`, which adds the widgets and returns the backdrop behind them, and hands the
     /// result to the render thread.
-    pub fn update(&mut self, window: &Window, mut add: impl FnMut(&mut Ui) -> Option<Backdrop>) {
+    pub fn update(&mut self, mut add: impl FnMut(&mut Ui) -> Option<Backdrop>) {
         let begin = Instant::now();
-        let input = self.state.take_egui_input(window);
+        let input = self.state.take_egui_input(&self.window);
         let mut backdrop = None;
         let output = self.context.run_ui(input, |ui| backdrop = add(ui));
-        self.state.handle_platform_output(window, output.platform_output);
+        self.state.handle_platform_output(&self.window, output.platform_output);
         let pixels_per_point = output.pixels_per_point;
         let primitives = self.context.tessellate(output.shapes, pixels_per_point);
         // egui asks for early repaints while it animates.

@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use crate::model::camera::Pose;
+use crate::model::scene::Scene;
 
 /// A camera with the distance to its target and a flying speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,15 +23,36 @@ pub struct FlyCamera {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Motion {
     /// Flies along (right, up, forward), each component from −1 to 1.
-    Fly { along: DVec3, seconds: f64 },
+    Fly {
+        /// Direction by the camera's axes; its length is the share of the speed.
+        along: DVec3,
+        /// Duration.
+        seconds: f64,
+    },
     /// Turns the camera in place.
-    Look { right: f64, upward: f64 },
+    Look {
+        /// Angle to the right.
+        right: f64,
+        /// Angle upward.
+        upward: f64,
+    },
     /// Moves the camera around its target, to the right and upward.
-    Orbit { right: f64, upward: f64 },
+    Orbit {
+        /// Angle to the right.
+        right: f64,
+        /// Angle upward.
+        upward: f64,
+    },
     /// Moves toward the target by notches of the wheel; negative: away.
-    Approach { notches: f64 },
+    Approach {
+        /// Notches.
+        notches: f64,
+    },
     /// Multiplies the speed by 2 to this power.
-    Speed { doublings: f64 },
+    Speed {
+        /// The power.
+        doublings: f64,
+    },
 }
 
 /// Smallest angle between the view direction and `up` or its opposite, rad.
@@ -56,6 +78,21 @@ impl FlyCamera {
             distance,
             speed: distance / CROSSING_S,
         }
+    }
+
+    /// Starts at the first key of a scene's camera; `None` where it has no direction there. The
+    /// camera's coordinates are relative to `origin`.
+    pub fn of_scene(scene: &Scene, origin: DVec3) -> Option<FlyCamera> {
+        let camera = &scene.camera;
+        let pose = camera.pose(scene.time.start_s)?;
+        let local = Pose { position: pose.position - origin, ..pose };
+        Some(FlyCamera::new(&local, camera.up, camera.keys.first()?.target - origin))
+    }
+
+    /// Returns the camera at another position, which orbits `target`. It has the same direction,
+    /// and the speed of a new camera.
+    pub fn placed(&self, position: DVec3, target: DVec3) -> FlyCamera {
+        FlyCamera::new(&Pose { position, ..self.pose() }, self.up, target)
     }
 
     /// Returns the camera's position.

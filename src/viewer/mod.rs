@@ -11,7 +11,7 @@ pub mod editor;
 #[cfg(feature = "window")]
 mod egui_layer;
 pub mod error_probe;
-mod fly_camera;
+pub mod fly_camera;
 #[cfg(feature = "window")]
 mod free_path;
 #[cfg(feature = "window")]
@@ -19,6 +19,7 @@ mod native_window;
 #[cfg(feature = "window")]
 mod posed_player;
 pub mod scene_window;
+mod shortcut;
 mod sync;
 #[cfg(feature = "window")]
 mod window_target;

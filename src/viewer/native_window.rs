@@ -1,5 +1,6 @@
 //! A window with its Vulkan surface, and the thread that renders into it.
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
@@ -74,8 +75,10 @@ impl<T: Send + 'static> RenderThread<T> {
     ) -> Result<RenderThread<T>> {
         let work = move || {
             // A window would wait forever for a thread that panicked.
-            let _guard = CallOnDrop(Some(on_end));
-            render()
+            let ended = catch_unwind(AssertUnwindSafe(render));
+            on_end();
+            let panicked = || Error::Fault { what: "the drawing thread panicked".to_owned() };
+            ended.unwrap_or_else(|_| Err(panicked()))
         };
         let started = std::thread::Builder::new().name("draw".into()).spawn(work);
         started.map(RenderThread).map_err(|e| Error::vulkan("starting the drawing thread", e))
@@ -86,18 +89,7 @@ impl<T: Send + 'static> RenderThread<T> {
     /// # Errors
     /// The thread failed or panicked.
     pub fn join(self) -> Result<T> {
-        let panicked = || Error::Fault { what: "the drawing thread panicked".to_owned() };
-        self.0.join().unwrap_or_else(|_| Err(panicked()))
-    }
-}
-
-struct CallOnDrop<F: FnOnce()>(Option<F>);
-
-impl<F: FnOnce()> Drop for CallOnDrop<F> {
-    fn drop(&mut self) {
-        if let Some(call) = self.0.take() {
-            call();
-        }
+        self.0.join().unwrap_or_else(|payload| resume_unwind(payload))
     }
 }
 

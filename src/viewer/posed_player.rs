@@ -10,6 +10,7 @@ use crate::model::camera::Pose;
 
 /// A scene on the device whose camera is set before each frame.
 pub struct PosedPlayer {
+    /// The scene on the device.
     pub player: Player,
     pose: Arc<Mutex<Pose>>,
 }

@@ -4,8 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use super::egui_layer::{WidgetFrame, take_widgets};
 use crate::error::Result;
-use crate::frame::Renderer;
-use crate::frame::{DeviceChoice, GpuContext};
+use crate::frame::{DeviceChoice, GpuContext, Renderer};
 use crate::gpu::{
     Buffer, Commands, Instance, MemoryUsage, Overlay, PresentMode, PresentOutcome, Recorder,
     Surface, Swapchain,
@@ -19,7 +18,8 @@ pub struct WindowTarget {
     swapchain: Option<Swapchain>,
     /// `None` until the first swapchain exists.
     overlay: Option<Overlay>,
-    pub bed: GpuContext,
+    /// The device.
+    pub gpu: GpuContext,
     surface: Surface,
     modes: Vec<PresentMode>,
     i_mode: usize,
@@ -35,11 +35,11 @@ impl WindowTarget {
         choice: &DeviceChoice,
         mode: PresentMode,
     ) -> Result<WindowTarget> {
-        let bed = GpuContext::with_instance(instance, choice, choice.sources()?)?;
-        surface.check(&bed.device)?;
-        let modes = surface.modes(&bed.device)?;
+        let gpu = GpuContext::with_instance(instance, choice, choice.sources()?)?;
+        surface.check(&gpu.device)?;
+        let modes = surface.modes(&gpu.device)?;
         let i_mode = modes.iter().position(|m| *m == mode).unwrap_or(0);
-        Ok(WindowTarget { swapchain: None, overlay: None, bed, surface, modes, i_mode })
+        Ok(WindowTarget { swapchain: None, overlay: None, gpu, surface, modes, i_mode })
     }
 
     /// Returns the mode that the next swapchain presents by.
@@ -61,13 +61,13 @@ impl WindowTarget {
     pub fn recreate(&mut self, size: [u32; 2]) -> Result<bool> {
         // A surface has one swapchain at a time.
         self.swapchain = None;
-        self.swapchain = Swapchain::new(&self.bed.device, &self.surface, size, self.mode())?;
+        self.swapchain = Swapchain::new(&self.gpu.device, &self.surface, size, self.mode())?;
         let Some(chain) = &self.swapchain else { return Ok(false) };
         if self.overlay.is_none() {
-            self.overlay = Some(Overlay::new(&self.bed.device, chain.format())?);
+            self.overlay = Some(Overlay::new(&self.gpu.device, chain.format())?);
         }
         if let Some(overlay) = &mut self.overlay {
-            overlay.fit(&self.bed.device, chain)?;
+            overlay.fit(&self.gpu.device, chain)?;
         }
         Ok(true)
     }
@@ -85,7 +85,7 @@ impl WindowTarget {
         let Some(chain) = &self.swapchain else { return Ok(None) };
         let (format, n_bytes) = renderer.picture_format();
         let Film { width, height, background, exposure, tone_map, .. } = *film;
-        let device = &self.bed.device;
+        let device = &self.gpu.device;
         let picture = |name| Buffer::new::<u8>(device, name, n_bytes, MemoryUsage::Device);
         let pictures = [picture("window.picture")?, picture("window.other")?];
         // A picture that was never drawn is transparent, so the background shows.
@@ -94,7 +94,7 @@ impl WindowTarget {
             Ok(())
         })?;
         Ok(Some(PictureDraw {
-            present: Present::new(device, self.bed.compiler(), format, chain.format())?,
+            present: Present::new(device, self.gpu.compiler(), format, chain.format())?,
             pictures,
             shown: present::Shown {
                 background: background.as_vec3().to_array(),
@@ -155,10 +155,10 @@ impl WindowTarget {
     /// # Errors
     /// Validation or the leak report has found a fault.
     pub fn close(self) -> Result<()> {
-        let WindowTarget { swapchain, overlay, bed, surface, .. } = self;
+        let WindowTarget { swapchain, overlay, gpu, surface, .. } = self;
         drop((swapchain, overlay));
         // The device is destroyed before the surface, the instance after both.
-        let closed = bed.close();
+        let closed = gpu.close();
         drop(surface);
         closed
     }

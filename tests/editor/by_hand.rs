@@ -11,6 +11,7 @@ use nimbus::viewer::editor::{
     Axis, Button, Chord, EditorController, Field, Handle, Input, Key, ModifierKeys, PictureArea,
     Request, Session, SessionEvent, perform,
 };
+use nimbus::viewer::fly_camera::FlyCamera;
 
 const NONE: ModifierKeys = ModifierKeys { ctrl: false, shift: false };
 const CTRL: ModifierKeys = ModifierKeys { ctrl: true, ..NONE };
@@ -107,8 +108,8 @@ fn boxes_of_the_papers_table_are_made_by_pixels_keys_and_numbers() {
     let pose = Pose { position, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
     let fov_y_rad = 45f64.to_radians();
     let area = PictureArea { size_px: DVec2::new(800.0, 600.0), px_per_point: 1.0, fov_y_rad };
-    let controller =
-        EditorController::new(Session::default(), (&pose, DVec3::Y, DVec3::ZERO), area, 250.0);
+    let camera = FlyCamera::new(&pose, DVec3::Y, DVec3::ZERO);
+    let controller = EditorController::new(Session::default(), camera, area, 250.0);
     let mut window = Window { controller, path: &path, has_quit: false };
 
     let table = Path::new("scenes/cubes-554.dat");

@@ -72,6 +72,7 @@ pub struct BenchArgs {
     /// Print run.json instead of the table
     #[arg(long)]
     pub json: bool,
+    /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,
 }

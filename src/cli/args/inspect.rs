@@ -47,6 +47,7 @@ pub struct InspectArgs {
     /// Print JSON instead of CSV
     #[arg(long)]
     pub json: bool,
+    /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,
 }

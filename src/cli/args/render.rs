@@ -52,6 +52,7 @@ pub struct RenderArgs {
     /// Print JSON: hash of the picture, device and passes, or the reference and its error
     #[arg(long)]
     pub json: bool,
+    /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,
 }

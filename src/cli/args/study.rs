@@ -111,6 +111,7 @@ pub struct ErrorArgs {
     /// Print configurations.csv instead of the table
     #[arg(long)]
     pub csv: bool,
+    /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,
 }
@@ -157,6 +158,7 @@ pub struct LedgerArgs {
     /// Print ledger.json instead of the table
     #[arg(long)]
     pub json: bool,
+    /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,
 }

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
 
 use super::scene::SceneArgs;
 use super::values::at_least_one;
+use crate::gpu::PresentMode;
 
 /// Arguments of `nimbus view`.
 #[derive(Debug, ClapArgs)]
@@ -14,7 +15,7 @@ pub struct ViewArgs {
     pub scene: PathBuf,
     /// When pictures are presented
     #[arg(long, value_name = "MODE", default_value = "fifo")]
-    pub present: PresentArg,
+    pub present: PresentMode,
     /// Close the window after this many frames
     #[arg(long, value_name = "N", value_parser = at_least_one())]
     pub frames: Option<u32>,
@@ -24,6 +25,7 @@ pub struct ViewArgs {
     /// Print the times of the loops that ran as JSON when the window is closed
     #[arg(long)]
     pub json: bool,
+    /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,
 }
@@ -36,17 +38,7 @@ pub struct EditArgs {
     /// Scene around the cloud; the edited cloud replaces its first cloud made from boxes
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
+    /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,
-}
-
-/// The present modes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum PresentArg {
-    /// In order, one at each refresh
-    Fifo,
-    /// The newest at each refresh
-    Mailbox,
-    /// At once
-    Immediate,
 }

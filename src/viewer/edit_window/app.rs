@@ -6,13 +6,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use winit::application::ApplicationHandler;
 use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{KeyEvent, WindowEvent};
-use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::{Key, ModifiersState, NamedKey};
-use winit::window::{Window, WindowId};
+use winit::window::WindowId;
 
 use super::dialogs::FileDialog;
 use super::fields::FieldTexts;
@@ -29,13 +29,17 @@ use crate::viewer::editor::{
     PictureArea, RecentFiles, Request, Session, SessionEvent, default_path, perform,
 };
 use crate::viewer::egui_layer::{EguiLayer, SharedWidgets};
+use crate::viewer::fly_camera::FlyCamera;
 use crate::viewer::free_path::free_path;
 use crate::viewer::native_window::{RenderThread, event_loop, open_window, wheel_notches};
 
 /// Options of an editor window.
 pub struct Options {
+    /// The cloud that is edited, and its file.
     pub session: Session,
+    /// The scene around the cloud.
     pub scene: EditedScene,
+    /// The device that draws.
     pub choice: DeviceChoice,
     /// Size of the window in pixels.
     pub size: [u32; 2],
@@ -55,12 +59,12 @@ pub fn run(options: Options) -> Result<()> {
     let alternative = "a box file is text that any editor changes, and `nimbus render SCENE -o \
         FILE.png` draws it";
     let events = event_loop::<RenderEvent>(alternative)?;
-    let mut app = App::new(options, events.create_proxy())?;
+    let mut app = App::new(options, &events)?;
     let ran = events.run_app(&mut app).map_err(|e| Error::vulkan("window", e));
     app.close();
     // The render thread ends before the window that it draws into.
     let rendered = app.thread.take().map(RenderThread::join);
-    drop(app.window.take());
+    drop(app.layer.take());
     app.rescue();
     if let Some(error) = app.failure {
         return Err(error);
@@ -74,12 +78,8 @@ struct App {
     scene: EditedScene,
     choice: DeviceChoice,
     size: [u32; 2],
-    stop: &'static AtomicBool,
-    requests: Arc<DrawRequests>,
-    widgets: SharedWidgets,
-    proxy: EventLoopProxy<RenderEvent>,
+    links: RenderLinks,
     thread: Option<RenderThread<()>>,
-    window: Option<Window>,
     layer: Option<EguiLayer>,
     modifiers: ModifiersState,
     texts: FieldTexts,
@@ -94,46 +94,32 @@ struct App {
 }
 
 impl App {
-    fn new(options: Options, proxy: EventLoopProxy<RenderEvent>) -> Result<App> {
+    fn new(options: Options, events: &EventLoop<RenderEvent>) -> Result<App> {
         let Options { session, scene, choice, size, stop } = options;
-        let document = session.editor().shared_document();
-        let whole = scene.scene(&document);
-        let camera = &whole.camera;
-        let pose = camera.pose(whole.time.start_s).ok_or_else(|| {
+        let whole = scene.scene(session.editor().document());
+        let camera = FlyCamera::of_scene(&whole, scene.origin()).ok_or_else(|| {
             Error::usage("the scene's camera has no direction at its first frame")
         })?;
-        let origin = scene.origin();
-        let target = camera.keys.first().map_or(DVec3::ZERO, |key| key.target) - origin;
-        let local = Pose { position: pose.position - origin, ..pose };
-        let picture = panels::picture_size(size, 1.0);
-        let [width, height] = picture.map(f64::from);
+        let [width, height] = panels::picture_size(size, 1.0).map(f64::from);
         let area = PictureArea {
             size_px: DVec2::new(width, height),
             px_per_point: 1.0,
-            fov_y_rad: camera.fov_y_rad,
+            fov_y_rad: whole.camera.fov_y_rad,
         };
-        let view = (&local, camera.up, target);
-        let controller = EditorController::new(session, view, area, scene.metres_per_unit());
-        let requests = DrawRequests::new(DrawState {
-            document,
-            pose,
-            has_cloud: false,
-            size,
-            picture,
-            is_closing: false,
-            version: 0,
-        });
+        let controller = EditorController::new(session, camera, area, scene.metres_per_unit());
+        let requests = DrawRequests::new(draw_state(&controller, &scene, size));
         Ok(App {
             controller,
             scene,
             choice,
             size,
-            stop,
-            requests: Arc::new(requests),
-            widgets: SharedWidgets::default(),
-            proxy,
+            links: RenderLinks {
+                requests: Arc::new(requests),
+                widgets: SharedWidgets::default(),
+                events: events.create_proxy(),
+                stop,
+            },
             thread: None,
-            window: None,
             layer: None,
             modifiers: ModifiersState::empty(),
             texts: FieldTexts::default(),
@@ -148,7 +134,7 @@ impl App {
     }
 
     fn close(&self) {
-        self.requests.change(|state| state.is_closing = true);
+        self.links.requests.change(|state| state.is_closing = true);
     }
 
     /// Saves unsaved changes beside the file, where the window has ended without a question: by a
@@ -168,21 +154,13 @@ impl App {
 
     fn open(&mut self, events: &ActiveEventLoop) -> Result<()> {
         let (window, surface) = open_window(events, "nimbus", self.size, self.choice.validation)?;
-        let proxy = self.proxy.clone();
-        let links = RenderLinks {
-            requests: self.requests.clone(),
-            widgets: self.widgets.clone(),
-            // Sending fails only after the event loop has ended, when no event matters any more.
-            send: Box::new(move |event| drop(proxy.send_event(event))),
-            stop: self.stop,
-        };
-        let renderer = EditRenderer::new(surface, &self.choice, self.scene.clone(), links)?;
-        self.layer = Some(EguiLayer::new(&window, self.widgets.clone(), IDLE_INTERVAL, true));
-        let proxy = self.proxy.clone();
-        let on_end = move || drop(proxy.send_event(RenderEvent::Ended));
-        self.thread = Some(RenderThread::start(move || renderer.run(), on_end)?);
         let (size, px_per_point) = (window.inner_size(), window.scale_factor());
-        self.window = Some(window);
+        let links = self.links.clone();
+        let renderer = EditRenderer::new(surface, &self.choice, self.scene.clone(), links.clone())?;
+        let widgets = links.widgets.clone();
+        self.layer = Some(EguiLayer::new(window, widgets, IDLE_INTERVAL, true));
+        let on_end = move || links.send(RenderEvent::Ended);
+        self.thread = Some(RenderThread::start(move || renderer.run(), on_end)?);
         self.resize(size, px_per_point);
         Ok(())
     }
@@ -195,10 +173,10 @@ impl App {
 
     /// Passes an input to the controller, and carries out the requests that follow.
     fn handle(&mut self, input: Input) {
-        let mut inputs = vec![input];
-        while let Some(input) = inputs.pop() {
-            let requests = self.controller.handle(&input);
-            inputs.extend(requests.iter().filter_map(|request| self.carry_out(request)));
+        let mut next = Some(input);
+        while let Some(input) = next {
+            let request = self.controller.handle(&input);
+            next = request.and_then(|request| self.carry_out(&request));
         }
         if let Some(layer) = &mut self.layer {
             layer.request_update();
@@ -208,9 +186,9 @@ impl App {
 
     fn carry_out(&mut self, request: &Request) -> Option<Input> {
         match request {
-            Request::ChooseToOpen => self.dialog = Some(FileDialog::open()),
+            Request::ChooseToOpen => self.dialog = Some(FileDialog::new(false, None)),
             Request::ChooseToSave => {
-                self.dialog = Some(FileDialog::save(self.controller.session().path()));
+                self.dialog = Some(FileDialog::new(true, self.controller.session().path()));
             }
             // The panels show the question.
             Request::Ask(_) => {}
@@ -233,14 +211,10 @@ impl App {
     }
 
     fn request_draw(&self) {
-        let pose = self.controller.camera().pose();
-        let pose = Pose { position: pose.position + self.scene.origin(), ..pose };
-        let editor = self.controller.editor();
-        let (document, size) = (editor.shared_document(), self.size);
-        let picture = self.controller.viewport().size_px.to_array().map(|v| v as u32);
-        let has_cloud = editor.settings().display != DisplayMode::Boxes;
-        self.requests.change(|state| {
-            *state = DrawState { document, pose, has_cloud, size, picture, ..state.clone() };
+        let new = draw_state(&self.controller, &self.scene, self.size);
+        self.links.requests.change(|state| {
+            let (is_closing, version) = (state.is_closing, state.version);
+            *state = DrawState { is_closing, version, ..new };
         });
     }
 
@@ -263,7 +237,7 @@ impl App {
 
     /// Updates the panels, and handles the inputs that follow.
     fn update_panels(&mut self) {
-        let (Some(layer), Some(window)) = (&mut self.layer, &self.window) else { return };
+        let Some(layer) = &mut self.layer else { return };
         let state = PanelState {
             controller: &self.controller,
             acceptances: &self.acceptances,
@@ -273,13 +247,13 @@ impl App {
         let (texts, dialog) = (&mut self.texts, &mut self.dialog);
         let mut inputs = vec![];
         // egui may run the closure twice, but reports a click once.
-        layer.update(window, |ui| {
+        layer.update(|ui| {
             inputs.extend(panels::show(ui, &state, texts, dialog));
             None
         });
         inputs.into_iter().for_each(|input| self.handle(input));
         // The widgets over the picture have changed.
-        self.requests.change(|_| ());
+        self.links.requests.change(|_| ());
         self.update_title();
     }
 
@@ -294,13 +268,28 @@ impl App {
         let session = self.controller.session();
         let name = session.path().map_or("new cloud".to_owned(), |path| path.display().to_string());
         let mark = if session.is_dirty() { "*" } else { "" };
-        self.window.iter().for_each(|window| window.set_title(&format!("{mark}{name} | nimbus")));
+        let title = format!("{mark}{name} | nimbus");
+        self.layer.iter().for_each(|layer| layer.window.set_title(&title));
+    }
+}
+
+/// Returns the first version of what the render thread draws.
+fn draw_state(controller: &EditorController, scene: &EditedScene, size: [u32; 2]) -> DrawState {
+    let (pose, editor) = (controller.camera().pose(), controller.editor());
+    DrawState {
+        document: editor.shared_document(),
+        pose: Pose { position: pose.position + scene.origin(), ..pose },
+        has_cloud: editor.settings().display != DisplayMode::Boxes,
+        size,
+        picture: controller.viewport().size_px.to_array().map(|v| v as u32),
+        is_closing: false,
+        version: 0,
     }
 }
 
 impl ApplicationHandler<RenderEvent> for App {
     fn resumed(&mut self, events: &ActiveEventLoop) {
-        if self.window.is_none()
+        if self.layer.is_none()
             && let Err(error) = self.open(events)
         {
             self.failure = Some(error);
@@ -321,7 +310,7 @@ impl ApplicationHandler<RenderEvent> for App {
     }
 
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
-        if self.stop.load(Ordering::Relaxed) {
+        if self.links.stop.load(Ordering::Relaxed) {
             self.close();
         }
         if self.layer.as_ref().is_some_and(EguiLayer::is_due) {
@@ -337,12 +326,12 @@ impl ApplicationHandler<RenderEvent> for App {
         if let WindowEvent::MouseInput { .. } = &event {
             self.update_panels();
         }
-        let (Some(layer), Some(window)) = (&mut self.layer, &self.window) else { return };
+        let Some(layer) = &mut self.layer else { return };
         // egui has the keys only while text is entered; else Tab would move its focus.
         let is_key = matches!(event, WindowEvent::KeyboardInput { .. });
         let is_typing = layer.has_keyboard_focus() || self.dialog.is_some();
-        let is_consumed = (!is_key || is_typing) && layer.handle(window, &event);
-        let px_per_point = window.scale_factor();
+        let is_consumed = (!is_key || is_typing) && layer.handle(&event);
+        let px_per_point = layer.window.scale_factor();
         match event {
             WindowEvent::CloseRequested => {
                 self.handle(Input::Event(SessionEvent::Intend(Intent::Quit)));

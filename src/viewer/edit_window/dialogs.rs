@@ -18,15 +18,10 @@ pub struct FileDialog {
 }
 
 impl FileDialog {
-    /// Creates a dialog to open a file.
-    pub fn open() -> FileDialog {
-        FileDialog { text: String::new(), saves: false, has_focus: false }
-    }
-
-    /// Creates a dialog to save a file; `path` is the suggestion.
-    pub fn save(path: Option<&Path>) -> FileDialog {
+    /// Creates a dialog to save a file, or to open one; `path` is the suggestion.
+    pub fn new(saves: bool, path: Option<&Path>) -> FileDialog {
         let text = path.map_or(String::new(), |path| path.display().to_string());
-        FileDialog { text, saves: true, has_focus: false }
+        FileDialog { text, saves, has_focus: false }
     }
 }
 
@@ -109,9 +104,9 @@ fn choose(ui: &Ui, dialog: &mut FileDialog, recent: &[PathBuf]) -> Option<Option
 fn help(ui: &Ui) {
     Window::new("Keys").collapsible(false).show(ui.ctx(), |ui| {
         Grid::new("keys").num_columns(2).spacing([12.0, 1.0]).show(ui, |ui| {
-            let keys = SHORTCUTS.iter().map(|s| (s.chord.to_string(), s.description));
-            let mouse = MOUSE_HELP.iter().map(|(name, use_)| ((*name).to_owned(), *use_));
-            let enter = ("Enter".to_owned(), "enter the active box's numbers");
+            let keys = SHORTCUTS.iter().map(|s| (s.key, s.description));
+            let mouse = MOUSE_HELP.iter().copied();
+            let enter = ("Enter", "enter the active box's numbers");
             for (key, description) in keys.chain([enter]).chain(mouse) {
                 ui.label(RichText::new(key).monospace());
                 ui.label(description);

@@ -10,6 +10,7 @@ use crate::viewer::editor::{
     Action, Axis, Command, DisplayMode, Input, SHORTCUTS, ScalingAnchor, Select, SelectionMode,
     SessionEvent, Setting, mean_rate,
 };
+use crate::viewer::shortcut::Shortcut;
 
 /// Width of the panel, points.
 const WIDTH: f32 = 230.0;
@@ -57,19 +58,14 @@ pub fn show(
     inputs
 }
 
-/// Returns the input of a command's first shortcut.
-fn press(command: Command) -> Option<Input> {
-    SHORTCUTS.iter().find(|s| s.command == command).map(|s| Input::Chord(s.chord))
-}
-
 /// Adds a button for a command. Its tooltip names the shortcut.
 fn button(ui: &mut Ui, text: &str, command: Command, is_enabled: bool, inputs: &mut Vec<Input>) {
     let mut response = ui.add_enabled(is_enabled, egui::Button::new(text).small());
-    if let Some(s) = SHORTCUTS.iter().find(|s| s.command == command) {
-        response = response.on_hover_text(format!("{} ({})", s.description, s.chord));
+    if let Some(text) = Shortcut::tooltip(&SHORTCUTS, command) {
+        response = response.on_hover_text(text);
     }
     if response.clicked() {
-        inputs.extend(press(command));
+        inputs.push(Input::Command(command));
     }
 }
 
@@ -120,11 +116,11 @@ fn buttons(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
         use DisplayMode::{Both, Boxes, Cloud};
         for (text, display) in [("Boxes", Boxes), ("Cloud", Cloud), ("Both", Both)] {
             if ui.selectable_label(settings.display == display, text).clicked() {
-                inputs.extend(press(Command::Display(display)));
+                inputs.push(Input::Command(Command::Display(display)));
             }
         }
         if ui.checkbox(&mut settings.snap.is_on.clone(), "Snap").clicked() {
-            inputs.extend(press(Command::ToggleSnap));
+            inputs.push(Input::Command(Command::ToggleSnap));
         }
     });
     ui.horizontal(|ui| {
@@ -137,7 +133,7 @@ fn buttons(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
         ui.label("mirror by");
         for axis in Axis::ALL {
             if ui.selectable_label(settings.axis == axis, axis.name()).clicked() {
-                inputs.extend(press(Command::Axis(axis)));
+                inputs.push(Input::Command(Command::Axis(axis)));
             }
         }
     });

@@ -4,6 +4,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
+use winit::event_loop::EventLoopProxy;
+
 use crate::error::{Error, Result};
 use crate::frame::DeviceChoice;
 use crate::gpu::{Instance, PresentMode, Surface};
@@ -19,7 +21,9 @@ use crate::viewer::window_target::{PictureDraw, WindowTarget};
 /// State that the render thread draws.
 #[derive(Debug, Clone)]
 pub struct DrawState {
+    /// The boxes and the seed.
     pub document: Arc<Document>,
+    /// The camera in the scene's coordinates.
     pub pose: Pose,
     /// Whether the cloud is shown. The boxes are widgets.
     pub has_cloud: bool,
@@ -27,6 +31,7 @@ pub struct DrawState {
     pub size: [u32; 2],
     /// Size of the picture in pixels, from the window's upper left corner.
     pub picture: [u32; 2],
+    /// Whether the thread is to end.
     pub is_closing: bool,
     /// Counts the changes.
     pub version: u64,
@@ -77,13 +82,24 @@ pub enum RenderEvent {
 }
 
 /// State that the window and its render thread share.
+#[derive(Clone)]
 pub struct RenderLinks {
+    /// The state that the thread draws.
     pub requests: Arc<DrawRequests>,
+    /// The widgets over the picture.
     pub widgets: SharedWidgets,
-    /// Sends an event to the window.
-    pub send: Box<dyn Fn(RenderEvent) + Send>,
+    /// Events to the window.
+    pub events: EventLoopProxy<RenderEvent>,
     /// Ends the thread when set.
     pub stop: &'static AtomicBool,
+}
+
+impl RenderLinks {
+    /// Sends an event to the window.
+    pub fn send(&self, event: RenderEvent) {
+        // Sending fails only after the event loop has ended, when no event matters any more.
+        drop(self.events.send_event(event));
+    }
 }
 
 /// Renders the edited cloud into a window. Fields are dropped in this order.
@@ -101,8 +117,8 @@ struct ActiveDocument {
     draw: PictureDraw,
     scene: PosedPlayer,
     document: Arc<Document>,
-    /// Document and camera of the last frame.
-    drawn: Option<(Arc<Document>, Pose)>,
+    /// Camera of the document's last frame; `None` before the first.
+    drawn: Option<Pose>,
 }
 
 impl EditRenderer {
@@ -154,13 +170,13 @@ impl EditRenderer {
             }
             match self.update(&state) {
                 Ok(()) if std::mem::take(&mut self.has_failed) => {
-                    (self.links.send)(RenderEvent::Failure(None));
+                    self.links.send(RenderEvent::Failure(None));
                 }
                 Ok(()) => {}
                 // The document stays, also where it does not fit the device.
                 Err(error @ (Error::Limit { .. } | Error::Usage { .. })) => {
                     self.has_failed = true;
-                    (self.links.send)(RenderEvent::Failure(Some(error.to_string())));
+                    self.links.send(RenderEvent::Failure(Some(error.to_string())));
                 }
                 Err(error) => return Err(error),
             }
@@ -190,29 +206,26 @@ impl EditRenderer {
         if !is_same {
             let boxes = state.document.regenerated_since(&active.document);
             let groups = self.edited.groups(&boxes);
-            active.scene.player.reshape(&self.target.bed, scene, &groups)?;
-            active.document = state.document.clone();
+            active.scene.player.reshape(&self.target.gpu, scene, &groups)?;
+            (active.document, active.drawn) = (state.document.clone(), None);
         }
-        let is_drawn = active.drawn.as_ref().is_some_and(|(document, pose)| {
-            document.is_same(&state.document) && *pose == state.pose
-        });
-        if is_drawn || is_same && !is_new && !state.has_cloud {
+        if active.drawn == Some(state.pose) || is_same && !is_new && !state.has_cloud {
             return Ok(());
         }
         active.scene.step(0, state.pose)?;
-        active.drawn = Some((state.document.clone(), state.pose));
+        active.drawn = Some(state.pose);
         if !is_same || is_new {
-            let statuses = active.scene.player.renderer.status(&self.target.bed.device)?;
+            let statuses = active.scene.player.renderer.status(&self.target.gpu.device)?;
             let boxes = &state.document.boxes;
             let acceptances = box_acceptances(boxes, self.edited.statuses(boxes, &statuses));
             let event = RenderEvent::Acceptances(state.document.clone(), acceptances);
-            (self.links.send)(event);
+            self.links.send(event);
         }
         Ok(())
     }
 
     fn activate(&self, state: &DrawState) -> Result<ActiveDocument> {
-        let player = self.target.bed.player(self.scene(state), true)?;
+        let player = self.target.gpu.player(self.scene(state), true)?;
         let draw = self.target.picture_draw(&player.renderer, &player.scene.film)?;
         let draw = draw.ok_or_else(|| Error::usage("the window has no visible area"))?;
         let scene = PosedPlayer::new(player, state.pose);

@@ -9,9 +9,11 @@ use crate::reference::generate::Acceptance;
 /// The acceptance of one box's particles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BoxAcceptance {
+    /// Attempts, and accepted and folded particles, of those generated so far.
     pub acceptance: Acceptance,
     /// Particles that are generated so far.
     pub n_generated: u32,
+    /// Particles that the box is to have.
     pub n_particles: u32,
 }
 

@@ -5,7 +5,6 @@ use glam::DVec3;
 use super::axis::Axis;
 use super::grid_snap::GridSnap;
 use super::handles::Handle;
-use super::mirror::{MirrorPlane, MirrorResult};
 use super::ray::Ray;
 use super::selection::SelectionMode;
 use super::settings::{DisplayMode, ScalingAnchor};
@@ -61,6 +60,25 @@ pub enum Edit {
     },
     /// Sets the cloud's seed, whatever is selected.
     Seed(u32),
+}
+
+/// The plane of a mirror.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MirrorPlane {
+    /// Coordinate 0.
+    Zero,
+    /// The middle of the selected boxes' bounds.
+    Middle,
+}
+
+/// The use of the mirror images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MirrorResult {
+    /// Images replace the boxes.
+    Move,
+    /// Images are appended and selected. A box that is its own image is left out, because two
+    /// boxes in one place would double its particles.
+    Copy,
 }
 
 /// A change of the selection.

@@ -3,9 +3,10 @@
 use glam::DVec3;
 
 /// An axis of the scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Axis {
     /// The first axis, to the right.
+    #[default]
     X,
     /// The second axis, upward.
     Y,

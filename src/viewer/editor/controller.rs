@@ -3,7 +3,7 @@
 //! Pointer, keys and typed numbers become events of the session, or motions of the camera. The
 //! window passes its input on, draws the state, and carries out the requests.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use super::action::{Action, Edit, Setting};
 use super::grid_snap::GridSnap;
@@ -11,12 +11,10 @@ use super::handles::Handle;
 use super::input::{Field, Input};
 use super::numbers;
 use super::pointer::{Gesture, PictureArea, Pointer};
-use super::refusal::Refusal;
 use super::session::{Answer, Intent, Request, Session, SessionEvent};
-use super::shortcuts::{Command, Key, command};
+use super::shortcuts::{Chord, Command, Key, command};
 use super::state::Editor;
 use super::viewport::Viewport;
-use crate::model::camera::Pose;
 use crate::viewer::fly_camera::FlyCamera;
 
 /// The state of the editor's window.
@@ -24,8 +22,6 @@ use crate::viewer::fly_camera::FlyCamera;
 pub struct EditorController {
     session: Session,
     pointer: Pointer,
-    /// Up direction of the camera.
-    up: DVec3,
     /// Length of a scene unit, m.
     metres_per_unit: f64,
     shows_help: bool,
@@ -42,47 +38,40 @@ pub struct PointerFeedback {
 }
 
 impl EditorController {
-    /// Creates a controller with the camera at `pose`, which orbits `target`.
+    /// Creates a controller with the given camera. A scene unit has `metres_per_unit` metres.
     pub fn new(
         session: Session,
-        (pose, up, target): (&Pose, DVec3, DVec3),
+        camera: FlyCamera,
         area: PictureArea,
         metres_per_unit: f64,
     ) -> EditorController {
-        EditorController {
-            session,
-            pointer: Pointer::new(FlyCamera::new(pose, up, target), area),
-            up: up.normalize_or(DVec3::Y),
-            metres_per_unit,
-            shows_help: false,
-            message: None,
-        }
+        let pointer = Pointer::new(camera, area);
+        EditorController { session, pointer, metres_per_unit, shows_help: false, message: None }
     }
 
-    /// Handles an input. Returns the work for the window, in this order. A rejected input changes
-    /// nothing but the message.
-    pub fn handle(&mut self, input: &Input) -> Vec<Request> {
-        let mut requests = vec![];
-        self.dispatch(input, &mut requests);
+    /// Handles an input. Returns the work for the window. A rejected input changes nothing but the
+    /// message.
+    pub fn handle(&mut self, input: &Input) -> Option<Request> {
+        let request = self.dispatch(input);
         // The editor may have refused the drag, or an event of the session may have ended it.
         if self.pointer.gesture.is_drag() && self.editor().dragged_handle().is_none() {
             self.pointer.gesture = Gesture::None;
         }
-        requests
+        request
     }
 
-    fn dispatch(&mut self, input: &Input, requests: &mut Vec<Request>) {
+    fn dispatch(&mut self, input: &Input) -> Option<Request> {
         match input {
             Input::PointerMoved { pixel, keys } => {
                 if let Some(action) = self.pointer.moved(*pixel, *keys) {
                     self.message = None;
-                    self.act(action);
+                    self.act([action]);
                 }
             }
             Input::PointerLeft => self.pointer.pixel = None,
             Input::Button { button, is_down: false, .. } => {
                 let actions = self.pointer.released(self.session.editor(), *button);
-                actions.into_iter().for_each(|action| self.act(action));
+                self.act(actions);
             }
             Input::Resized { size_px, px_per_point } => {
                 // A minimized window has no size.
@@ -94,59 +83,59 @@ impl EditorController {
             }
             Input::FocusLost => {
                 let action = self.pointer.release_all();
-                action.into_iter().for_each(|action| self.act(action));
+                self.act(action);
             }
-            Input::Event(event) => self.event(event, requests),
+            Input::Event(event) => return self.event(event),
             // An open question takes no other input.
-            Input::Chord(chord) if self.session.question().is_some() => {
-                if chord.key == Key::Escape {
-                    self.send(&SessionEvent::Answer(Answer::Cancel), requests);
-                }
+            Input::Chord(Chord { key: Key::Escape, .. }) if self.session.question().is_some() => {
+                return self.send(&SessionEvent::Answer(Answer::Cancel));
             }
             _ if self.session.question().is_some() => {}
             Input::Button { button, keys, .. } => {
                 self.message = None;
                 let action = self.pointer.pressed(self.session.editor(), *button, *keys);
-                action.into_iter().for_each(|action| self.act(action));
+                self.act(action);
             }
             Input::Wheel(notches) => self.pointer.approach(*notches),
-            Input::Chord(chord) => {
-                if let Some(command) = command(*chord) {
-                    self.message = None;
-                    self.command(command, requests);
-                }
-            }
+            Input::Chord(chord) => return self.command(command(*chord)?),
+            Input::Command(command) => return self.command(*command),
             Input::Typed { field, text } => {
                 self.message = None;
                 match self.typed(*field, text) {
-                    Ok(action) => self.act(action),
-                    Err(Refusal(why)) => self.message = Some(why),
+                    Ok(action) => self.act([action]),
+                    Err(why) => self.message = Some(why),
                 }
             }
         }
+        None
     }
 
-    fn send(&mut self, event: &SessionEvent, requests: &mut Vec<Request>) {
+    fn send(&mut self, event: &SessionEvent) -> Option<Request> {
         match self.session.after(event) {
             Ok((session, request)) => {
                 self.session = session;
-                requests.extend(request);
+                request
             }
-            Err(Refusal(why)) => self.message = Some(why),
+            Err(why) => {
+                self.message = Some(why);
+                None
+            }
         }
     }
 
-    fn act(&mut self, action: Action) {
-        // An action makes no request.
-        self.send(&SessionEvent::Act(action), &mut vec![]);
+    fn act(&mut self, actions: impl IntoIterator<Item = Action>) {
+        for action in actions {
+            // An action makes no request.
+            self.send(&SessionEvent::Act(action));
+        }
     }
 
-    fn event(&mut self, event: &SessionEvent, requests: &mut Vec<Request>) {
+    fn event(&mut self, event: &SessionEvent) -> Option<Request> {
         let before = self.editor().shared_document();
         if matches!(event, SessionEvent::Act(_)) {
             self.message = None;
         }
-        self.send(event, requests);
+        let request = self.send(event);
         match event {
             SessionEvent::Failed(error) => self.message = Some(error.to_string()),
             SessionEvent::Saved { path, .. } => {
@@ -162,25 +151,34 @@ impl EditorController {
             }
             _ => {}
         }
+        request
     }
 
-    fn command(&mut self, command: Command, requests: &mut Vec<Request>) {
+    fn command(&mut self, command: Command) -> Option<Request> {
+        self.message = None;
         let event = match command {
             Command::New => SessionEvent::Intend(Intent::New),
             Command::Open => SessionEvent::Intend(Intent::Open(None)),
             Command::Quit => SessionEvent::Intend(Intent::Quit),
             Command::Save => SessionEvent::Save,
             Command::SaveAs => SessionEvent::SaveAs,
-            Command::Help => return self.shows_help = !self.shows_help,
-            Command::Cancel if self.shows_help => return self.shows_help = false,
+            Command::Help => {
+                self.shows_help = !self.shows_help;
+                return None;
+            }
+            Command::Cancel if self.shows_help => {
+                self.shows_help = false;
+                return None;
+            }
             Command::Cancel if matches!(self.pointer.gesture, Gesture::Rectangle { .. }) => {
-                return self.pointer.gesture = Gesture::None;
+                self.pointer.gesture = Gesture::None;
+                return None;
             }
             Command::Frame => {
                 if !self.pointer.gesture.is_drag() && !self.frame() {
                     self.message = Some("there is no box to look at".to_owned());
                 }
-                return;
+                return None;
             }
             Command::Add => {
                 let new = self.editor().new_box(self.pointer.place_for_new());
@@ -188,18 +186,15 @@ impl EditorController {
             }
             Command::Move => SessionEvent::Act(self.pointer.begin_key_drag(Handle::MoveView)),
             Command::Scale => SessionEvent::Act(self.pointer.begin_key_drag(Handle::ScaleAll)),
-            _ => match command.action(self.editor()) {
-                Some(action) => SessionEvent::Act(action),
-                None => return,
-            },
+            _ => SessionEvent::Act(command.action(self.editor())?),
         };
-        self.send(&event, requests);
+        self.send(&event)
     }
 
-    fn typed(&self, field: Field, text: &str) -> Result<Action, Refusal> {
+    fn typed(&self, field: Field, text: &str) -> Result<Action, String> {
         let is_of_boxes = !matches!(field, Field::Seed | Field::SnapStep);
         if is_of_boxes && self.editor().selection().is_empty() {
-            return Err(Refusal("nothing is selected".to_owned()));
+            return Err("nothing is selected".to_owned());
         }
         let length = || numbers::length(text, self.metres_per_unit);
         Ok(Action::Edit(match field {
@@ -219,7 +214,7 @@ impl EditorController {
     /// Moves the camera to the selection, or to all boxes. Returns false where there is no box.
     fn frame(&mut self) -> bool {
         let bounds = self.editor().bounds();
-        bounds.into_iter().for_each(|bounds| self.pointer.frame(bounds, self.up));
+        bounds.into_iter().for_each(|(low, high)| self.pointer.frame(low, high));
         bounds.is_some()
     }
 

@@ -1,6 +1,5 @@
 //! The edited document: the boxes of one cloud and its seed.
 
-use super::refusal::Refusal;
 use crate::io::box_file;
 use crate::model::boxes::CloudBox;
 
@@ -39,14 +38,16 @@ impl Document {
     ///
     /// # Errors
     /// The first value that a box file's reader rejects, or too many boxes.
-    pub(super) fn check(&self, before: &Document) -> Result<(), Refusal> {
+    pub(super) fn check(&self, before: &Document) -> Result<(), String> {
         let n = self.boxes.len();
         if n > MAX_BOXES.max(before.boxes.len()) {
-            return Err(Refusal(format!("expected at most {MAX_BOXES} boxes, found {n}")));
+            return Err(format!("expected at most {MAX_BOXES} boxes, found {n}"));
         }
-        let mut faults = self.boxes.iter().enumerate().filter_map(|(i, b)| {
-            box_file::wrong(b).map(|what| Refusal(format!("box {i}: {what}")))
-        });
+        let mut faults = self
+            .boxes
+            .iter()
+            .enumerate()
+            .filter_map(|(i, b)| box_file::wrong(b).map(|what| format!("box {i}: {what}")));
         faults.next().map_or(Ok(()), Err)
     }
 

@@ -7,13 +7,12 @@ use glam::DVec3;
 
 use super::action::DragModifiers;
 use super::axis::Axis;
-use super::document::Document;
-use super::edits::{middle, resize, scaled, shifted};
+use super::edits::{resize, scale, shifted};
 use super::grid_snap::GridSnap;
 use super::handles::Handle;
-use super::history::Snapshot;
 use super::ray::Ray;
 use super::settings::{ScalingAnchor, Settings};
+use super::snapshot::Snapshot;
 use crate::io::bounds::LEAST_EXTENT;
 
 /// A drag in progress.
@@ -27,9 +26,11 @@ pub struct Drag {
     pub start: Ray,
     /// View direction of the camera.
     pub forward: DVec3,
+    /// Document and selection at the beginning.
     pub before: Snapshot,
     /// Ray through the pointer now.
     pub ray: Ray,
+    /// Settings that held keys invert now.
     pub modifiers: DragModifiers,
 }
 
@@ -53,22 +54,22 @@ impl Drag {
         self
     }
 
-    /// Returns the document at the pointer's place; `None` where the ray determines no place.
-    pub fn document(&self, settings: &Settings) -> Option<Document> {
-        let Snapshot { document, selection } = &self.before;
-        let active = document.boxes.get(selection.active()?)?;
+    /// Returns the state at the pointer's place; `None` where the ray determines no place.
+    pub fn after(&self, settings: &Settings) -> Option<Snapshot> {
+        let mut new = self.before.clone();
+        let active = *new.document.boxes.get(new.selection.active()?)?;
         let snap = (settings.snap.is_on != self.modifiers.snap).then_some(settings.snap);
         let along = |place: DVec3, axis: Axis| {
             let at = |ray: Ray| ray.nearest_on_axis(place, axis.unit());
             Some(at(self.ray)? - at(self.start)?)
         };
-        Some(match self.handle {
+        match self.handle {
             Handle::MoveAxis(axis) => {
-                self.moved(active.center, along(active.center, axis)? * axis.unit(), snap)
+                move_by(&mut new, along(active.center, axis)? * axis.unit(), snap)
             }
             Handle::MoveView => {
                 let at = |ray: Ray| ray.on_plane(active.center, self.forward);
-                self.moved(active.center, at(self.ray)? - at(self.start)?, snap)
+                move_by(&mut new, at(self.ray)? - at(self.start)?, snap)
             }
             Handle::ScaleFace(axis, side) => {
                 let face = active.center + 0.5 * side.sign() * active.extent * axis.unit();
@@ -77,75 +78,28 @@ impl Drag {
                     true => settings.anchor.toggled(),
                     false => settings.anchor,
                 };
-                self.grown(axis, outward, anchor, side.sign(), snap)
+                let growth = if anchor == ScalingAnchor::Center { 2.0 * outward } else { outward };
+                if growth != 0.0 {
+                    new.each(|_, b| {
+                        let length = grown(b.extent[axis.index()], growth, snap);
+                        resize(b, axis, length, anchor, side.sign());
+                    });
+                }
             }
-            Handle::ScaleAll => scaled(document, selection, DVec3::splat(self.factor(snap)?)),
+            Handle::ScaleAll => scale(&mut new, DVec3::splat(self.factor(snap)?)),
             Handle::ScaleAxis(axis) => {
                 let mut factors = DVec3::ONE;
                 factors[axis.index()] = self.factor(snap)?;
-                scaled(document, selection, factors)
-            }
-        })
-    }
-
-    /// Moves the selected boxes. The active box, whose centre is `active`, snaps to the grid, and
-    /// the others keep their places relative to it.
-    fn moved(&self, active: DVec3, mut offset: DVec3, snap: Option<GridSnap>) -> Document {
-        for k in 0..3 {
-            if offset[k].abs() <= MIN_COMPONENT * offset.length() {
-                offset[k] = 0.0;
-            } else if let Some(snap) = snap {
-                offset[k] = snap.coordinate(active[k] + offset[k]) - active[k];
+                scale(&mut new, factors);
             }
         }
-        let Snapshot { document, selection } = &self.before;
-        let mut new = Document::clone(document);
-        for i in selection.boxes() {
-            let center = &mut new.boxes[*i].center;
-            *center = shifted(*center, offset);
-            if let (Some(snap), true) = (snap, Some(*i) == selection.active()) {
-                // In f64 c + (v − c) is not always v.
-                for k in (0..3).filter(|k| offset[*k] != 0.0) {
-                    center[k] = snap.coordinate(center[k]);
-                }
-            }
-        }
-        new
-    }
-
-    /// Moves the face on the side of `sign` of every selected box outward.
-    fn grown(
-        &self,
-        axis: Axis,
-        outward: f64,
-        anchor: ScalingAnchor,
-        sign: f64,
-        snap: Option<GridSnap>,
-    ) -> Document {
-        let Snapshot { document, selection } = &self.before;
-        let mut new = Document::clone(document);
-        if outward == 0.0 {
-            return new;
-        }
-        let growth = if anchor == ScalingAnchor::Center { 2.0 * outward } else { outward };
-        for i in selection.boxes() {
-            let b = &mut new.boxes[*i];
-            let length = b.extent[axis.index()] + growth;
-            let length = match snap {
-                Some(snap) => snap.size(length),
-                // A face stops at the opposite one.
-                None if length < LEAST_EXTENT => 0.0,
-                None => length,
-            };
-            resize(b, axis, length, anchor, sign);
-        }
-        new
+        Some(new)
     }
 
     /// Returns the pointer's distance from the middle, divided by that at the start. Distances are
     /// measured in the plane through the middle that faces the camera.
     fn factor(&self, snap: Option<GridSnap>) -> Option<f64> {
-        let middle = middle(&self.before.document, &self.before.selection)?;
+        let middle = self.before.middle()?;
         let distance = |ray: Ray| Some(ray.on_plane(middle, self.forward)?.distance(middle));
         let start = distance(self.start)?;
         if start <= MIN_DISTANCE * self.start.origin.distance(middle) {
@@ -153,6 +107,40 @@ impl Drag {
         }
         let factor = distance(self.ray)? / start;
         Some(snap.map_or(factor, |snap| GridSnap { step: FACTOR_STEP, ..snap }.size(factor)))
+    }
+}
+
+/// Moves the selected boxes. The active box snaps to the grid, and the others keep their places
+/// relative to it.
+fn move_by(new: &mut Snapshot, mut offset: DVec3, snap: Option<GridSnap>) {
+    let Some(i_active) = new.selection.active() else { return };
+    let active = new.document.boxes[i_active].center;
+    for k in 0..3 {
+        if offset[k].abs() <= MIN_COMPONENT * offset.length() {
+            offset[k] = 0.0;
+        } else if let Some(snap) = snap {
+            offset[k] = snap.coordinate(active[k] + offset[k]) - active[k];
+        }
+    }
+    new.each(|i, b| {
+        b.center = shifted(b.center, offset);
+        if let Some(snap) = snap.filter(|_| i == i_active) {
+            // In f64 c + (v − c) is not always v.
+            for k in (0..3).filter(|k| offset[*k] != 0.0) {
+                b.center[k] = snap.coordinate(b.center[k]);
+            }
+        }
+    });
+}
+
+/// Returns a length after growth.
+fn grown(length: f64, growth: f64, snap: Option<GridSnap>) -> f64 {
+    let length = length + growth;
+    match snap {
+        Some(snap) => snap.size(length),
+        // A face stops at the opposite one.
+        None if length < LEAST_EXTENT => 0.0,
+        None => length,
     }
 }
 

@@ -1,18 +1,17 @@
-//! Changes of the document: (document, selection, edit) → (document, selection).
+//! Changes of the document: (document and selection, edit) → (document and selection).
 //!
 //! Values that an edit does not set keep their bits.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
-use super::action::Edit;
+use super::action::{Edit, MirrorPlane, MirrorResult};
 use super::axis::Axis;
-use super::document::{Document, volume};
-use super::history::Snapshot;
-use super::mirror::mirrored;
-use super::refusal::Refusal;
+use super::document::{is_same, volume};
 use super::selection::Selection;
 use super::settings::{ScalingAnchor, Settings};
-use super::viewport::bounds;
+use super::snapshot::Snapshot;
 use crate::model::boxes::CloudBox;
 
 /// Returns document and selection after `edit`. The caller checks that a box file can hold them.
@@ -23,80 +22,85 @@ pub(super) fn edited(
     before: &Snapshot,
     settings: &Settings,
     edit: &Edit,
-) -> Result<(Document, Selection), Refusal> {
-    let Snapshot { document, selection } = before;
-    let all =
-        |change: &dyn Fn(&mut CloudBox)| Ok((each(document, selection, change), selection.clone()));
-    match edit {
+) -> Result<Snapshot, String> {
+    let mut new = before.clone();
+    let n = new.document.boxes.len();
+    match *edit {
         Edit::Add(b) => {
-            let mut new = Document::clone(document);
-            new.boxes.push(*b);
-            Ok((new, Selection::new([document.boxes.len()])))
+            new.boxes_mut().push(b);
+            new.selection = Selection::new([n]);
         }
-        Edit::Duplicate => Ok(duplicated(document, selection)),
+        Edit::Duplicate => duplicate(&mut new),
         Edit::Delete => {
-            let mask = selection.mask(document.boxes.len());
-            let kept = document.boxes.iter().zip(mask).filter(|(_, is_selected)| !is_selected);
-            let boxes = kept.map(|(b, _)| *b).collect();
-            Ok((Document { boxes, ..**document }, Selection::default()))
+            let mut mask = new.selection.mask(n).into_iter();
+            new.boxes_mut().retain(|_| mask.next() == Some(false));
+            new.selection = Selection::default();
         }
-        Edit::Count(n) => all(&|b| b.n_particles = *n),
-        Edit::Density(density) => {
-            Ok((with_density(document, selection, *density)?, selection.clone()))
-        }
-        Edit::Extent(axis, v) => all(&|b| resize(b, *axis, *v, settings.anchor, 1.0)),
-        Edit::Center(axis, v) => all(&|b| b.center[axis.index()] = *v),
-        Edit::Radius(v) => all(&|b| b.radius_max = *v),
-        Edit::MoveBy(offset) => all(&|b| b.center = shifted(b.center, *offset)),
-        Edit::Mirror { axis, plane, result } => {
-            Ok(mirrored(document, selection, *axis, *plane, *result))
-        }
-        Edit::Seed(seed) => {
-            Ok((Document { seed: *seed, boxes: document.boxes.clone() }, selection.clone()))
-        }
+        Edit::Count(n_particles) => new.each(|_, b| b.n_particles = n_particles),
+        Edit::Density(density) => set_density(&mut new, density)?,
+        Edit::Extent(axis, v) => new.each(|_, b| resize(b, axis, v, settings.anchor, 1.0)),
+        Edit::Center(axis, v) => new.each(|_, b| b.center[axis.index()] = v),
+        Edit::Radius(v) => new.each(|_, b| b.radius_max = v),
+        Edit::MoveBy(offset) => new.each(|_, b| b.center = shifted(b.center, offset)),
+        Edit::Mirror { axis, plane, result } => mirror(&mut new, axis, plane, result),
+        Edit::Seed(seed) => Arc::make_mut(&mut new.document).seed = seed,
     }
-}
-
-fn each(document: &Document, selection: &Selection, change: &dyn Fn(&mut CloudBox)) -> Document {
-    let mut new = document.clone();
-    selection.boxes().iter().for_each(|i| change(&mut new.boxes[*i]));
-    new
+    Ok(new)
 }
 
 /// Appends copies in the order of the list. They are selected in the order of their originals.
-fn duplicated(document: &Document, selection: &Selection) -> (Document, Selection) {
-    let mut new = document.clone();
-    let first = new.boxes.len();
-    let mut originals = selection.boxes().to_vec();
+fn duplicate(new: &mut Snapshot) {
+    let first = new.document.boxes.len();
+    let mut originals = new.selection.boxes().to_vec();
     originals.sort_unstable();
-    new.boxes.extend(originals.iter().map(|i| document.boxes[*i]));
     let copy = |i: &usize| first + originals.partition_point(|original| original < i);
-    let copies = Selection::new(selection.boxes().iter().map(copy));
-    (new, copies)
+    new.selection = Selection::new(new.selection.boxes().iter().map(copy));
+    let boxes = new.boxes_mut();
+    originals.iter().for_each(|i| boxes.push(boxes[*i]));
 }
 
-fn with_density(
-    document: &Document,
-    selection: &Selection,
-    density: f64,
-) -> Result<Document, Refusal> {
-    let mut new = document.clone();
-    for i in selection.boxes() {
-        let b = &mut new.boxes[*i];
+fn set_density(new: &mut Snapshot, density: f64) -> Result<(), String> {
+    for i in new.selection.clone().boxes() {
+        let b = &mut new.boxes_mut()[*i];
         if volume(b) == 0.0 {
-            return Err(Refusal(format!(
-                "box {i} has no volume, so that no density gives it particles"
-            )));
+            return Err(format!("box {i} has no volume, so that no density gives it particles"));
         }
         let (n, max) = ((density * volume(b)).round(), u32::MAX);
         if !(0.0..=f64::from(max)).contains(&n) {
-            return Err(Refusal(format!(
-                "box {i}: density times volume: expected 0 to {max}, found {n}"
-            )));
+            let expected = format!("expected 0 to {max}, found {n}");
+            return Err(format!("box {i}: density times volume: {expected}"));
         }
         b.n_particles = n as u32;
     }
-    Ok(new)
+    Ok(())
+}
+
+/// Mirrors the selected boxes. A box is its own mirror image, so only its centre moves. The
+/// particles of a mirrored copy are new random ones.
+fn mirror(new: &mut Snapshot, axis: Axis, plane: MirrorPlane, result: MirrorResult) {
+    let k = axis.index();
+    let twice_plane = match plane {
+        MirrorPlane::Zero => 0.0,
+        // For one box exactly twice its centre, so that it stays in place.
+        MirrorPlane::Middle => new.middle().map_or(0.0, |middle| 2.0 * middle[k]),
+    };
+    let image = |mut b: CloudBox| {
+        // Across 0 the sign of 0 is kept, so that mirroring twice restores every bit.
+        if b.center[k] != 0.0 || twice_plane != 0.0 {
+            b.center[k] = twice_plane - b.center[k];
+        }
+        b
+    };
+    if result == MirrorResult::Move {
+        return new.each(|_, b| *b = image(*b));
+    }
+    let originals = new.selected().filter(|b| !is_same(b, &image(**b)));
+    let images: Vec<CloudBox> = originals.map(|b| image(*b)).collect();
+    if !images.is_empty() {
+        let first = new.document.boxes.len();
+        new.selection = Selection::new(first..first + images.len());
+        new.boxes_mut().extend(images);
+    }
 }
 
 /// Returns c + offset. A component without offset keeps its bits, where −0 + 0 would be 0.
@@ -119,21 +123,10 @@ pub(super) fn resize(b: &mut CloudBox, axis: Axis, length: f64, anchor: ScalingA
     }
 }
 
-/// Returns the middle of the selected boxes' bounds. For one box it is exactly its centre.
-pub(super) fn middle(document: &Document, selection: &Selection) -> Option<DVec3> {
-    match selection.boxes() {
-        [i] => Some(document.boxes[*i].center),
-        several => {
-            let (low, high) = bounds(several.iter().map(|i| &document.boxes[*i]))?;
-            Some(0.5 * (low + high))
-        }
-    }
-}
-
 /// Scales the selected boxes, and the distances between them, about their middle.
-pub(super) fn scaled(document: &Document, selection: &Selection, factors: DVec3) -> Document {
-    let Some(middle) = middle(document, selection) else { return document.clone() };
-    each(document, selection, &|b| {
+pub(super) fn scale(new: &mut Snapshot, factors: DVec3) {
+    let Some(middle) = new.middle() else { return };
+    new.each(|_, b| {
         for k in 0..3 {
             // Rounding must not change a box by the factor 1, nor a centre in the middle.
             if factors[k] != 1.0 {
@@ -143,7 +136,7 @@ pub(super) fn scaled(document: &Document, selection: &Selection, factors: DVec3)
                 }
             }
         }
-    })
+    });
 }
 
 #[cfg(test)]

@@ -40,26 +40,13 @@ impl GridSnap {
     }
 }
 
-/// Returns k times `step` in decimal arithmetic: 46 · 0.1 is 4.6, where f64 gives
+/// Returns k times `step`, rounded to the decimals of `step`: 46 · 0.1 is 4.6, where f64 gives
 /// 4.6000000000000005. The file then has the number that the user means.
 fn multiple(k: f64, step: f64) -> f64 {
-    let plain = k * step;
-    let written = format!("{step:e}");
-    let Some((digits, exponent)) = written.split_once('e') else { return plain };
-    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
-    let (Ok(digits), Ok(exponent)) =
-        (format!("{whole}{fraction}").parse::<f64>(), exponent.parse::<i32>())
-    else {
-        return plain;
-    };
-    /// Integers up to 2^53 are exact in f64.
-    const EXACT: f64 = 9_007_199_254_740_992.0;
-    let product = k * digits;
-    if product.abs() > EXACT || product == 0.0 {
-        // Adding 0 turns −0 into 0.
-        return plain + 0.0;
-    }
-    format!("{product}e{}", exponent - fraction.len() as i32).parse().unwrap_or(plain)
+    let (product, written) = (k * step, step.to_string());
+    let n_decimals = written.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    // Adding 0 turns −0 into 0.
+    format!("{product:.n_decimals$}").parse().unwrap_or(product) + 0.0
 }
 
 #[cfg(test)]

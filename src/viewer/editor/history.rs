@@ -4,22 +4,13 @@
 //! them, and undoing by arithmetic would not restore every bit.
 
 use std::collections::VecDeque;
-use std::sync::Arc;
 
-use super::document::Document;
-use super::selection::Selection;
+use super::snapshot::Snapshot;
 
 /// Largest number of steps that are kept.
 pub const MAX_STEPS: usize = 1000;
 /// Largest size of the kept documents, bytes. The last step is kept whatever its size.
 pub const MAX_BYTES: usize = 256 << 20;
-
-/// A document and its selection.
-#[derive(Debug, Clone)]
-pub struct Snapshot {
-    pub document: Arc<Document>,
-    pub selection: Selection,
-}
 
 /// A state next to the present one, and the name of the change between them.
 #[derive(Debug, Clone)]
@@ -34,7 +25,7 @@ pub struct History {
     /// The latest step is last.
     undo: VecDeque<Step>,
     /// The next step is last.
-    redo: Vec<Step>,
+    redo: VecDeque<Step>,
 }
 
 impl History {
@@ -50,17 +41,13 @@ impl History {
 
     /// Returns the state before the last step, and keeps `now` for [`History::redo`].
     pub(super) fn undo(&mut self, now: Snapshot) -> Option<Snapshot> {
-        let step = self.undo.pop_back()?;
-        self.redo.push(Step { snapshot: now, label: step.label });
-        Some(step.snapshot)
+        travel(&mut self.undo, &mut self.redo, now)
     }
 
     /// Returns the state after the step that was undone last, and keeps `now` for
     /// [`History::undo`].
     pub(super) fn redo(&mut self, now: Snapshot) -> Option<Snapshot> {
-        let step = self.redo.pop()?;
-        self.undo.push_back(Step { snapshot: now, label: step.label });
-        Some(step.snapshot)
+        travel(&mut self.redo, &mut self.undo, now)
     }
 
     /// Returns the name of the step that an undo takes back.
@@ -70,7 +57,7 @@ impl History {
 
     /// Returns the name of the step that a redo repeats.
     pub fn redo_label(&self) -> Option<&'static str> {
-        self.redo.last().map(|step| step.label)
+        self.redo.back().map(|step| step.label)
     }
 
     /// Returns the number of steps that can be undone.
@@ -84,6 +71,13 @@ impl History {
     }
 }
 
+/// Takes the last step of `from`, and puts the same step with the state `now` at the end of `to`.
+fn travel(from: &mut VecDeque<Step>, to: &mut VecDeque<Step>, now: Snapshot) -> Option<Snapshot> {
+    let Step { snapshot, label } = from.pop_back()?;
+    to.push_back(Step { snapshot: now, label });
+    Some(snapshot)
+}
+
 impl Step {
     fn n_bytes(&self) -> usize {
         let Snapshot { document, selection } = &self.snapshot;
@@ -93,7 +87,11 @@ impl Step {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use super::super::document::Document;
     use super::super::fixtures::document;
+    use super::super::selection::Selection;
     use super::*;
     use crate::model::boxes::CloudBox;
 

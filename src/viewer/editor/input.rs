@@ -6,7 +6,7 @@ use super::action::DragModifiers;
 use super::axis::Axis;
 use super::selection::SelectionMode;
 use super::session::SessionEvent;
-use super::shortcuts::Chord;
+use super::shortcuts::{Chord, Command};
 
 /// An input event. Pixels are counted as in [`super::Viewport`].
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +33,8 @@ pub enum Input {
     Wheel(f64),
     /// A key was pressed.
     Chord(Chord),
+    /// A button of a panel was clicked.
+    Command(Command),
     /// The picture has another size.
     Resized {
         /// Width and height in pixels.

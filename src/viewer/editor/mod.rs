@@ -23,7 +23,6 @@ mod grid_snap;
 mod handles;
 mod history;
 mod input;
-mod mirror;
 pub mod numbers;
 #[cfg(feature = "window")]
 mod overlay;
@@ -31,15 +30,17 @@ mod pointer;
 mod ray;
 #[cfg(feature = "window")]
 mod recent_files;
-mod refusal;
 mod selection;
 mod session;
 mod settings;
 mod shortcuts;
+mod snapshot;
 mod state;
 mod viewport;
 
-pub use action::{Action, DragAction, DragModifiers, Edit, Select, Setting};
+pub use action::{
+    Action, DragAction, DragModifiers, Edit, MirrorPlane, MirrorResult, Select, Setting,
+};
 pub use axis::Axis;
 pub use controller::EditorController;
 pub use document::Document;
@@ -47,7 +48,6 @@ pub use edited_scene::EditedScene;
 pub use grid_snap::GridSnap;
 pub use handles::{Handle, Side};
 pub use input::{Button, Field, Input, ModifierKeys};
-pub use mirror::{MirrorPlane, MirrorResult};
 pub use pointer::PictureArea;
 pub use ray::Ray;
 pub use selection::SelectionMode;

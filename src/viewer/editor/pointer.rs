@@ -8,7 +8,6 @@ use super::input::{Button, ModifierKeys};
 use super::selection::SelectionMode;
 use super::state::Editor;
 use super::viewport::{Viewport, framing, pick_all, pick_rectangle};
-use crate::model::camera::Pose;
 use crate::viewer::fly_camera::{FlyCamera, Motion};
 
 /// The part of the window that the picture fills.
@@ -25,6 +24,7 @@ pub struct PictureArea {
 /// The operation that the pointer is engaged in.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Gesture {
+    /// No operation.
     #[default]
     None,
     /// A press on a handle. It is a click until the pointer has moved far enough.
@@ -63,8 +63,11 @@ const TURN: f64 = std::f64::consts::PI;
 /// The pointer and the camera.
 #[derive(Debug, Clone)]
 pub struct Pointer {
+    /// The camera.
     pub camera: FlyCamera,
+    /// The part of the window that the picture fills.
     pub area: PictureArea,
+    /// The operation in progress.
     pub gesture: Gesture,
     /// `None` outside of the picture.
     pub pixel: Option<DVec2>,
@@ -191,9 +194,9 @@ impl Pointer {
                 && mode == SelectionMode::Replace;
         self.last_click = Some(pixel);
         let active = editor.selection().active().filter(|_| is_repeated);
-        let i_active = active.and_then(|active| hits.iter().position(|hit| hit.i_box == active));
+        let i_active = active.and_then(|active| hits.iter().position(|i| *i == active));
         let i_next = i_active.map_or(0, |i| (i + 1) % hits.len());
-        let boxes = vec![hits.get(i_next)?.i_box];
+        let boxes = vec![*hits.get(i_next)?];
         Some(Action::Select(Select::Boxes { boxes, mode }))
     }
 
@@ -241,10 +244,11 @@ impl Pointer {
     }
 
     /// Moves the camera so that everything between `low` and `high` is in view.
-    pub fn frame(&mut self, (low, high): (DVec3, DVec3), up: DVec3) {
-        let (pose, PictureArea { size_px, fov_y_rad, .. }) = (self.camera.pose(), self.area);
-        let (position, target) = framing(low, high, pose.forward, fov_y_rad, size_px.x / size_px.y);
-        self.camera = FlyCamera::new(&Pose { position, ..pose }, up, target);
+    pub fn frame(&mut self, low: DVec3, high: DVec3) {
+        let (forward, area) = (self.camera.pose().forward, self.area);
+        let aspect = area.size_px.x / area.size_px.y;
+        let (position, target) = framing(low, high, forward, area.fov_y_rad, aspect);
+        self.camera = self.camera.placed(position, target);
     }
 
     /// Returns the place for a new box: under the pointer at the depth of the target, or the target

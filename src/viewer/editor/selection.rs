@@ -78,19 +78,16 @@ impl Selection {
         }
     }
 
-    /// Returns the box `by` places after the active one, alone; the list of `n` boxes is cyclic.
-    /// Without an active box it is the first one forwards, and the last one backwards.
-    pub(super) fn neighbour(&self, n: usize, by: isize) -> Selection {
-        let Ok(count) = isize::try_from(n) else { return Selection::default() };
-        if count == 0 {
-            return Selection::default();
-        }
-        let from = match self.active().and_then(|i| isize::try_from(i).ok()) {
-            Some(i) => i,
-            None if by > 0 => -1,
-            None => 0,
+    /// Returns the box after the active one, or the one before it, alone. The list of `n` boxes is
+    /// cyclic. Without an active box it is the first box forwards, and the last one backwards.
+    pub(super) fn neighbour(&self, n: usize, is_forward: bool) -> Selection {
+        let i = match (self.active(), is_forward) {
+            _ if n == 0 => return Selection::default(),
+            (Some(i), true) => (i + 1) % n,
+            (None, true) => 0,
+            (active, false) => active.filter(|i| *i > 0).unwrap_or(n) - 1,
         };
-        Selection::new([(from + by).rem_euclid(count).unsigned_abs()])
+        Selection::new([i])
     }
 }
 
@@ -112,10 +109,12 @@ mod tests {
 
     #[test]
     fn neighbours_are_cyclic() {
-        let of =
-            |boxes: &[usize], by| Selection::new(boxes.iter().copied()).neighbour(3, by).active();
-        assert_eq!([of(&[], 1), of(&[0, 2], 1), of(&[1], 1)], [Some(0), Some(0), Some(2)]);
-        assert_eq!([of(&[], -1), of(&[0], -1), of(&[2], -1)], [Some(2), Some(2), Some(1)]);
-        assert_eq!(Selection::new([1]).neighbour(0, 1), Selection::default());
+        let of = |boxes: &[usize], is_forward| {
+            Selection::new(boxes.iter().copied()).neighbour(3, is_forward).active()
+        };
+        let [after, before] = [true, false].map(|way| move |boxes: &[usize]| of(boxes, way));
+        assert_eq!([after(&[]), after(&[0, 2]), after(&[1])], [Some(0), Some(0), Some(2)]);
+        assert_eq!([before(&[]), before(&[0]), before(&[2])], [Some(2), Some(2), Some(1)]);
+        assert_eq!(Selection::new([1]).neighbour(0, true), Selection::default());
     }
 }

@@ -8,7 +8,6 @@ use std::sync::Arc;
 
 use super::action::{Action, DragAction};
 use super::document::{Document, are_same_boxes};
-use super::refusal::Refusal;
 use super::state::Editor;
 use crate::error::Error;
 use crate::io::box_file;
@@ -27,6 +26,7 @@ pub struct Session {
 /// The step that follows the window's answer.
 #[derive(Debug, Clone, Default)]
 enum Pending {
+    /// Nothing follows.
     #[default]
     Nothing,
     /// Asks whether to save before this.
@@ -119,29 +119,32 @@ pub enum Request {
 impl Default for Session {
     /// Creates a new cloud without boxes and without a file.
     fn default() -> Self {
-        let editor = Editor::default();
-        let saved = editor.shared_document();
-        Session { saved, editor, path: None, pending: Pending::Nothing }
+        Session::of(Editor::default(), None)
     }
 }
 
 impl Session {
+    /// Creates a session whose document is saved.
+    fn of(editor: Editor, path: Option<&Path>) -> Session {
+        let (saved, path) = (editor.shared_document(), path.map(Path::to_owned));
+        Session { saved, editor, path, pending: Pending::Nothing }
+    }
+
     /// Creates a new cloud that will be saved as `path`.
     pub fn with_path(path: &Path) -> Session {
-        Session { path: Some(path.to_owned()), ..Session::default() }
+        Session::of(Editor::default(), Some(path))
     }
 
     /// Creates a session with the boxes read from `path`.
     pub fn from_file(path: &Path, boxes: Vec<CloudBox>) -> Session {
-        let editor = Editor::new(boxes);
-        Session { saved: editor.shared_document(), editor, ..Session::with_path(path) }
+        Session::of(Editor::new(boxes), Some(path))
     }
 
     /// Returns the session with a scene's seed and an empty history.
     pub fn with_seed(self, seed: u32) -> Session {
         let document = Document { seed, ..self.editor.document().clone() };
         let editor = Editor::with_settings(document, *self.editor.settings());
-        Session { saved: editor.shared_document(), editor, ..self }
+        Session::of(editor, self.path())
     }
 
     /// Returns the editor's state.
@@ -168,7 +171,7 @@ impl Session {
     ///
     /// # Errors
     /// The editor rejects an action.
-    pub fn after(&self, event: &SessionEvent) -> Result<(Session, Option<Request>), Refusal> {
+    pub fn after(&self, event: &SessionEvent) -> Result<(Session, Option<Request>), String> {
         let mut next = self.clone();
         if let SessionEvent::Act(action) = event {
             next.editor = self.editor.after(action)?;
@@ -260,9 +263,7 @@ impl Session {
     /// Replaces the document. The scene's seed and the settings stay.
     fn replace(&mut self, path: Option<&Path>, boxes: Vec<CloudBox>) {
         let document = Document { boxes, seed: self.editor.document().seed };
-        self.editor = Editor::with_settings(document, *self.editor.settings());
-        self.saved = self.editor.shared_document();
-        self.path = path.map(Path::to_owned);
+        *self = Session::of(Editor::with_settings(document, *self.editor.settings()), path);
     }
 }
 

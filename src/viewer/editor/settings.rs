@@ -4,10 +4,13 @@ use super::axis::Axis;
 use super::grid_snap::GridSnap;
 
 /// Settings of the editor.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Settings {
+    /// The parts of the document that are drawn.
     pub display: DisplayMode,
+    /// The grid that drags snap to.
     pub snap: GridSnap,
+    /// The point that stays in place in scaling.
     pub anchor: ScalingAnchor,
     /// The axis that mirroring reverses.
     pub axis: Axis,
@@ -41,17 +44,6 @@ impl ScalingAnchor {
         match self {
             ScalingAnchor::Center => ScalingAnchor::OppositeFace,
             ScalingAnchor::OppositeFace => ScalingAnchor::Center,
-        }
-    }
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Settings {
-            display: DisplayMode::default(),
-            snap: GridSnap::default(),
-            anchor: ScalingAnchor::default(),
-            axis: Axis::X,
         }
     }
 }

@@ -2,17 +2,17 @@
 
 use std::fmt;
 
-use super::action::{Action, DragAction, Edit, Select, Setting};
+use super::action::{Action, DragAction, Edit, MirrorPlane, MirrorResult, Select, Setting};
 use super::axis::Axis;
 use super::grid_snap::GridSnap;
-use super::mirror::{MirrorPlane, MirrorResult};
 use super::settings::DisplayMode;
 use super::state::Editor;
+use crate::viewer::shortcut::Shortcut;
 
 /// A key of the keyboard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Key {
-    /// The character that the key types; letters in lower case.
+    /// The character that the key types.
     Char(char),
     /// Delete.
     Delete,
@@ -40,123 +40,96 @@ pub struct Chord {
 /// A command of the editor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Command {
+    /// Begins a new cloud.
     New,
+    /// Opens a box file.
     Open,
+    /// Saves to the file.
     Save,
+    /// Saves under another name.
     SaveAs,
+    /// Closes the window.
     Quit,
+    /// Takes the last step back.
     Undo,
+    /// Repeats the step that was taken back last.
     Redo,
+    /// Adds a box.
     Add,
+    /// Duplicates the selection.
     Duplicate,
-    /// Delete.
+    /// Deletes the selection.
     Delete,
+    /// Selects all boxes.
     SelectAll,
     /// Cancels a drag, or clears the selection.
     Cancel,
+    /// Selects the next box.
     NextBox,
+    /// Selects the box before.
     PreviousBox,
     /// Moves the camera so that the selection fills the picture.
     Frame,
-    /// Begins a drag without a button; the next press ends it.
+    /// Begins to move without a button; the next press ends the drag.
     Move,
+    /// Begins to scale without a button.
     Scale,
     /// Restricts a drag to an axis; without a drag, sets the axis of mirroring.
     Axis(Axis),
+    /// Mirrors the selection across 0.
     Mirror,
+    /// Mirrors a copy of the selection across 0.
     MirrorCopy,
+    /// Mirrors the selection across its middle.
     MirrorMiddle,
+    /// Switches snapping to the grid on or off.
     ToggleSnap,
+    /// Sets what is drawn.
     Display(DisplayMode),
+    /// Lists the keys.
     Help,
 }
 
-/// A chord with its command.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shortcut {
-    pub chord: Chord,
-    pub command: Command,
-    #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "only panels list the keys"))]
-    pub description: &'static str,
-}
-
-const fn shortcut(key: Key, command: Command, description: &'static str) -> Shortcut {
-    Shortcut { chord: Chord { key, ctrl: false, shift: false, alt: false }, command, description }
-}
-
-const fn ctrl(key: char, command: Command, description: &'static str) -> Shortcut {
-    let chord = Chord { key: Key::Char(key), ctrl: true, shift: false, alt: false };
-    Shortcut { chord, command, description }
-}
-
-const fn with_shift(shortcut: Shortcut) -> Shortcut {
-    Shortcut { chord: Chord { shift: true, ..shortcut.chord }, ..shortcut }
-}
-
-const fn with_alt(shortcut: Shortcut) -> Shortcut {
-    Shortcut { chord: Chord { alt: true, ..shortcut.chord }, ..shortcut }
-}
-
 /// Every shortcut, in the order of the list of keys. Panels show the first chord of a command.
-pub const SHORTCUTS: [Shortcut; 30] = [
-    ctrl('n', Command::New, "new cloud"),
-    ctrl('o', Command::Open, "open a box file"),
-    ctrl('s', Command::Save, "save"),
-    with_shift(ctrl('s', Command::SaveAs, "save under another name")),
-    ctrl('q', Command::Quit, "quit"),
-    ctrl('z', Command::Undo, "undo"),
-    with_shift(ctrl('z', Command::Redo, "redo")),
-    ctrl('y', Command::Redo, "redo"),
-    shortcut(Key::Char('a'), Command::Add, "add a box"),
-    ctrl('d', Command::Duplicate, "duplicate the selection"),
-    shortcut(Key::Delete, Command::Delete, "delete the selection"),
-    shortcut(Key::Backspace, Command::Delete, "delete the selection"),
-    ctrl('a', Command::SelectAll, "select all boxes"),
-    shortcut(Key::Escape, Command::Cancel, "cancel the drag, or select nothing"),
-    shortcut(Key::Tab, Command::NextBox, "select the next box"),
-    with_shift(shortcut(Key::Tab, Command::PreviousBox, "select the box before")),
-    shortcut(Key::Char('f'), Command::Frame, "look at the selection, or at everything"),
-    shortcut(Key::Char('g'), Command::Move, "move the selection"),
-    shortcut(Key::Char('s'), Command::Scale, "scale the selection"),
-    shortcut(Key::Char('x'), Command::Axis(Axis::X), "along x only; the axis to mirror by"),
-    shortcut(Key::Char('y'), Command::Axis(Axis::Y), "along y only; the axis to mirror by"),
-    shortcut(Key::Char('z'), Command::Axis(Axis::Z), "along z only; the axis to mirror by"),
-    shortcut(Key::Char('m'), Command::Mirror, "mirror the selection across 0"),
-    with_shift(shortcut(
-        Key::Char('m'),
-        Command::MirrorCopy,
-        "mirror a copy of the selection across 0",
-    )),
-    with_alt(shortcut(
-        Key::Char('m'),
-        Command::MirrorMiddle,
-        "mirror the selection across its middle",
-    )),
-    with_shift(shortcut(Key::Char('s'), Command::ToggleSnap, "snap to the grid, or do not")),
-    shortcut(Key::Char('1'), Command::Display(DisplayMode::Boxes), "show the boxes"),
-    shortcut(Key::Char('2'), Command::Display(DisplayMode::Cloud), "show the cloud"),
-    shortcut(Key::Char('3'), Command::Display(DisplayMode::Both), "show both"),
-    shortcut(Key::Char('?'), Command::Help, "list the keys"),
+pub const SHORTCUTS: [Shortcut<Command>; 30] = [
+    Shortcut::new("Ctrl+N", Command::New, "new cloud"),
+    Shortcut::new("Ctrl+O", Command::Open, "open a box file"),
+    Shortcut::new("Ctrl+S", Command::Save, "save"),
+    Shortcut::new("Ctrl+Shift+S", Command::SaveAs, "save under another name"),
+    Shortcut::new("Ctrl+Q", Command::Quit, "quit"),
+    Shortcut::new("Ctrl+Z", Command::Undo, "undo"),
+    Shortcut::new("Ctrl+Shift+Z", Command::Redo, "redo"),
+    Shortcut::new("Ctrl+Y", Command::Redo, "redo"),
+    Shortcut::new("A", Command::Add, "add a box"),
+    Shortcut::new("Ctrl+D", Command::Duplicate, "duplicate the selection"),
+    Shortcut::new("Delete", Command::Delete, "delete the selection"),
+    Shortcut::new("Backspace", Command::Delete, "delete the selection"),
+    Shortcut::new("Ctrl+A", Command::SelectAll, "select all boxes"),
+    Shortcut::new("Escape", Command::Cancel, "cancel the drag, or select nothing"),
+    Shortcut::new("Tab", Command::NextBox, "select the next box"),
+    Shortcut::new("Shift+Tab", Command::PreviousBox, "select the box before"),
+    Shortcut::new("F", Command::Frame, "look at the selection, or at everything"),
+    Shortcut::new("G", Command::Move, "move the selection"),
+    Shortcut::new("S", Command::Scale, "scale the selection"),
+    Shortcut::new("X", Command::Axis(Axis::X), "along x only; the axis to mirror by"),
+    Shortcut::new("Y", Command::Axis(Axis::Y), "along y only; the axis to mirror by"),
+    Shortcut::new("Z", Command::Axis(Axis::Z), "along z only; the axis to mirror by"),
+    Shortcut::new("M", Command::Mirror, "mirror the selection across 0"),
+    Shortcut::new("Shift+M", Command::MirrorCopy, "mirror a copy of the selection across 0"),
+    Shortcut::new("Alt+M", Command::MirrorMiddle, "mirror the selection across its middle"),
+    Shortcut::new("Shift+S", Command::ToggleSnap, "snap to the grid, or do not"),
+    Shortcut::new("1", Command::Display(DisplayMode::Boxes), "show the boxes"),
+    Shortcut::new("2", Command::Display(DisplayMode::Cloud), "show the cloud"),
+    Shortcut::new("3", Command::Display(DisplayMode::Both), "show both"),
+    Shortcut::new("?", Command::Help, "list the keys"),
 ];
 
 /// Returns the command of a chord.
 pub fn command(chord: Chord) -> Option<Command> {
-    let chord = chord.normal();
-    SHORTCUTS.iter().find(|shortcut| shortcut.chord == chord).map(|shortcut| shortcut.command)
-}
-
-impl Chord {
-    /// Returns the chord with a lower-case letter. A sign loses its shift, because "?" needs shift
-    /// only on some keyboards.
-    fn normal(self) -> Chord {
-        match self.key {
-            Key::Char(c) if c.is_alphabetic() => {
-                Chord { key: Key::Char(c.to_lowercase().next().unwrap_or(c)), ..self }
-            }
-            Key::Char(_) => Chord { shift: false, ..self },
-            _ => self,
-        }
-    }
+    // "?" needs shift only on some keyboards.
+    let is_sign = matches!(chord.key, Key::Char(c) if !c.is_alphabetic());
+    let chord = Chord { shift: chord.shift && !is_sign, ..chord };
+    Shortcut::command_of(&SHORTCUTS, &chord.to_string())
 }
 
 impl Command {

@@ -9,10 +9,10 @@ use super::document::Document;
 use super::drag::Drag;
 use super::edits::edited;
 use super::handles::{Handle, PlacedHandle, place_handles};
-use super::history::{History, Snapshot};
-use super::refusal::Refusal;
+use super::history::History;
 use super::selection::Selection;
 use super::settings::Settings;
+use super::snapshot::Snapshot;
 use super::viewport::{Viewport, bounds};
 use crate::model::boxes::CloudBox;
 
@@ -51,13 +51,13 @@ impl Editor {
     ///
     /// # Errors
     /// A box file cannot hold the result, or the action does not fit a drag in progress.
-    pub fn after(&self, action: &Action) -> Result<Editor, Refusal> {
+    pub fn after(&self, action: &Action) -> Result<Editor, String> {
         let mut next = self.clone();
         match action {
             Action::Drag(drag) => next.drag(*drag)?,
             Action::Set(setting) => next.set(*setting)?,
             _ if self.drag.is_some() => {
-                return Err(Refusal("a drag is under way: end or cancel it first".to_owned()));
+                return Err("a drag is under way: end or cancel it first".to_owned());
             }
             Action::Edit(edit) => next.edit(edit)?,
             Action::Select(select) => next.now.selection = self.selected(select)?,
@@ -67,13 +67,12 @@ impl Editor {
         Ok(next)
     }
 
-    fn edit(&mut self, edit: &Edit) -> Result<(), Refusal> {
-        let (document, selection) = edited(&self.now, &self.settings, edit)?;
-        document.check(self.document())?;
+    fn edit(&mut self, edit: &Edit) -> Result<(), String> {
+        let new = edited(&self.now, &self.settings, edit)?;
+        new.document.check(self.document())?;
         // An edit without effect is no step, and keeps what can be redone.
-        if !document.is_same(self.document()) {
-            let now = Snapshot { document: document.into(), selection };
-            self.history.push(std::mem::replace(&mut self.now, now), edit.label());
+        if !new.document.is_same(self.document()) {
+            self.history.push(std::mem::replace(&mut self.now, new), edit.label());
         }
         Ok(())
     }
@@ -84,31 +83,31 @@ impl Editor {
         }
     }
 
-    fn selected(&self, select: &Select) -> Result<Selection, Refusal> {
+    fn selected(&self, select: &Select) -> Result<Selection, String> {
         let (n, selection) = (self.boxes().len(), self.selection());
         Ok(match select {
             Select::Boxes { boxes, mode } => {
                 if let Some(i) = boxes.iter().find(|i| **i >= n) {
-                    return Err(Refusal(format!("box: expected a number below {n}, found {i}")));
+                    return Err(format!("box: expected a number below {n}, found {i}"));
                 }
                 selection.with(boxes, *mode)
             }
             // The active box stays active.
             Select::All => Selection::new((0..n).chain(selection.active())),
             Select::None => Selection::default(),
-            Select::Next => selection.neighbour(n, 1),
-            Select::Previous => selection.neighbour(n, -1),
+            Select::Next => selection.neighbour(n, true),
+            Select::Previous => selection.neighbour(n, false),
         })
     }
 
-    fn set(&mut self, setting: Setting) -> Result<(), Refusal> {
+    fn set(&mut self, setting: Setting) -> Result<(), String> {
         let settings = &mut self.settings;
         match setting {
             Setting::Display(display) => settings.display = display,
             Setting::Snap(snap) if snap.is_valid() => settings.snap = snap,
             Setting::Snap(snap) => {
                 let step = snap.step;
-                return Err(Refusal(format!("grid step: expected a number above 0, found {step}")));
+                return Err(format!("grid step: expected a number above 0, found {step}"));
             }
             Setting::Anchor(anchor) => settings.anchor = anchor,
             Setting::Axis(axis) => settings.axis = axis,
@@ -116,13 +115,13 @@ impl Editor {
         Ok(())
     }
 
-    fn drag(&mut self, action: DragAction) -> Result<(), Refusal> {
+    fn drag(&mut self, action: DragAction) -> Result<(), String> {
         let drag = match (action, self.drag.take()) {
             (DragAction::Begin { .. }, Some(_)) => {
-                return Err(Refusal("a drag is under way".to_owned()));
+                return Err("a drag is under way".to_owned());
             }
             (DragAction::Begin { .. }, None) if self.selection().is_empty() => {
-                return Err(Refusal("nothing is selected".to_owned()));
+                return Err("nothing is selected".to_owned());
             }
             (DragAction::Begin { handle, ray, forward }, None) => Drag {
                 pressed: handle,
@@ -148,9 +147,9 @@ impl Editor {
                 return Ok(());
             }
         };
-        if let Some(document) = drag.document(&self.settings) {
-            document.check(&drag.before.document)?;
-            self.now.document = document.into();
+        if let Some(new) = drag.after(&self.settings) {
+            new.document.check(&drag.before.document)?;
+            self.now = new;
         }
         self.drag = Some(drag);
         Ok(())
@@ -216,7 +215,7 @@ impl Editor {
         if self.selection().is_empty() {
             return bounds(self.boxes());
         }
-        bounds(self.selection().boxes().iter().filter_map(|i| self.boxes().get(*i)))
+        bounds(self.now.selected())
     }
 }
 

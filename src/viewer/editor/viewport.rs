@@ -23,13 +23,6 @@ pub struct Viewport {
     pub px_per_point: f64,
 }
 
-/// A box under the pointer, with its distance.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hit {
-    pub i_box: usize,
-    pub distance: f64,
-}
-
 impl Viewport {
     /// Returns the slopes of a pixel's ray: right and up over forward.
     fn slopes(&self, pixel: DVec2) -> DVec2 {
@@ -88,13 +81,12 @@ impl Viewport {
     }
 }
 
-/// Returns all boxes that a ray hits, nearest first.
-pub fn pick_all(boxes: &[CloudBox], ray: &Ray) -> Vec<Hit> {
-    let hits = boxes.iter().enumerate();
-    let mut hits: Vec<Hit> =
-        hits.filter_map(|(i_box, b)| Some(Hit { i_box, distance: ray.hit(b)? })).collect();
-    hits.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-    hits
+/// Returns the indices of all boxes that a ray hits, nearest first.
+pub fn pick_all(boxes: &[CloudBox], ray: &Ray) -> Vec<usize> {
+    let hits = boxes.iter().enumerate().filter_map(|(i, b)| Some((i, ray.hit(b)?)));
+    let mut hits: Vec<(usize, f64)> = hits.collect();
+    hits.sort_by(|a, b| a.1.total_cmp(&b.1));
+    hits.into_iter().map(|(i, _)| i).collect()
 }
 
 /// Returns every box with a part inside the rectangle between two pixels, whether or not other

@@ -4,14 +4,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use crate::io::image::display_bytes;
-use crate::measure::picture::flip;
 use crate::model::camera::{Camera, CameraKey};
 use crate::model::film::Film;
 use crate::model::scene::Scene;
 use crate::reference::picture::{Pixels, Reference, ReferenceKind};
-use crate::studies::picture_error::PictureError;
-use crate::studies::picture_error::picture_error;
+use crate::studies::picture_error::{PictureError, picture_error};
 use crate::studies::reference_cache;
 
 /// A view of a scene, and the kind of reference that measures it.
@@ -92,20 +89,5 @@ impl ReferencePicture {
         };
         let picture: Vec<[f64; 4]> = self.pixels.at.iter().map(pixel).collect();
         picture_error(&self.pixels, &picture, &self.reference.rgba, self.reference.own_error)
-    }
-
-    /// Returns the mean FLIP difference of the two pictures as the film displays them.
-    ///
-    /// FLIP filters over neighbouring pixels. The result is `None` unless the reference has all
-    /// pixels.
-    pub fn flip(&self, rgba: &[f32]) -> Option<f64> {
-        let [width, height] = self.request.size;
-        if self.pixels.cell > 1 || rgba.len() != 4 * self.pixels.at.len() {
-            return None;
-        }
-        let film = &self.request.scene.film;
-        let reference: Vec<f32> = self.reference.rgba.iter().flatten().map(|v| *v as f32).collect();
-        let [a, b] = [&reference[..], rgba].map(|rgba| display_bytes(film, width, height, rgba));
-        Some(flip::flip(width, height, &a, &b, flip::PIXELS_PER_DEGREE).mean())
     }
 }

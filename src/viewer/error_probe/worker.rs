@@ -62,6 +62,7 @@ struct State {
 }
 
 impl Shared {
+    /// Replaces the request, unless both have the same reference.
     pub fn request(&self, request: ProbeRequest) {
         if let Some(current) = &mut self.lock().request
             && current.has_same_reference(&request)
@@ -73,6 +74,7 @@ impl Shared {
         self.replace(Some(request));
     }
 
+    /// Replaces or withdraws the request, and stops the work in progress.
     pub fn replace(&self, request: Option<ProbeRequest>) {
         let mut state = self.lock();
         let status = ProbeStatus { is_working: request.is_some(), ..ProbeStatus::default() };
@@ -80,12 +82,14 @@ impl Shared {
         self.interrupt();
     }
 
+    /// Stops the work in progress and ends the thread.
     pub fn close(&self) {
         let mut state = self.lock();
         state.is_closed = true;
         self.interrupt();
     }
 
+    /// Returns the state of the last request.
     pub fn status(&self) -> ProbeStatus {
         self.lock().status.clone()
     }
@@ -106,9 +110,13 @@ struct Interrupted;
 
 /// The thread that computes references.
 pub struct Worker {
+    /// State shared with the owner.
     pub shared: Arc<Shared>,
+    /// The threads that compute a reference.
     pub pool: ThreadPool,
+    /// Folder of cached references.
     pub cache_folder: Option<PathBuf>,
+    /// Time for the pixels of one view.
     pub budget: Duration,
 }
 

@@ -9,11 +9,10 @@ use glam::DVec2;
 use winit::application::ApplicationHandler;
 use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{ElementState, MouseButton, WindowEvent};
-use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
+use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::keyboard::{Key, NamedKey};
-use winit::window::{Window, WindowId};
+use winit::window::WindowId;
 
-use super::commands::CaptureFormat;
 use super::error_meter::ErrorMeter;
 use super::file_watch::FileWatch;
 use super::frame_loop::LoopTimes;
@@ -26,7 +25,7 @@ use super::view_state::{Response, ViewState};
 use crate::error::{Error, Result};
 use crate::frame::DeviceChoice;
 use crate::gpu::PresentMode;
-use crate::io::image;
+use crate::io::image::{self, ImageKind};
 use crate::model::film::Film;
 use crate::viewer::egui_layer::{EguiLayer, SharedWidgets};
 use crate::viewer::free_path::free_path;
@@ -35,15 +34,19 @@ use crate::viewer::sync::lock;
 
 /// Options of a scene window.
 pub struct Options {
+    /// The scene file that is shown.
     pub source: SceneSource,
+    /// The device that draws.
     pub choice: DeviceChoice,
     /// Whether frames skip passes that they do not need.
     pub skips: bool,
+    /// When frames are presented, where the window supports it.
     pub mode: PresentMode,
     /// Frames until the window closes; `None`: no limit.
     pub n_frames: Option<u32>,
     /// Closes the window when set.
     pub stop: &'static AtomicBool,
+    /// Whether no message is printed.
     pub is_quiet: bool,
     /// Whether panels are shown at the start.
     pub has_panels: bool,
@@ -51,6 +54,7 @@ pub struct Options {
 
 /// Times measured while a window was open.
 pub struct WindowTimes {
+    /// Frame times of each loop that ran.
     pub loops: Vec<LoopTimes>,
     /// Time that each update of the panels took on the window's thread, ms.
     pub panels_ms: Vec<f64>,
@@ -70,16 +74,19 @@ pub fn run(options: Options) -> Result<WindowTimes> {
     state.has_panels = options.has_panels;
     let events = event_loop::<RenderEvent>("`nimbus render SCENE -o FILE.png` needs none")?;
     let files = FileWatch::new(&options.source.files, options.choice.shaders.as_deref());
-    let mut app = App {
-        proxy: events.create_proxy(),
+    let links = RenderLinks {
         state: Arc::new(Mutex::new(state)),
-        options,
-        files,
-        thread: None,
-        window: None,
-        layer: None,
         status: SharedStatus::default(),
         widgets: SharedWidgets::default(),
+        events: events.create_proxy(),
+        stop: options.stop,
+    };
+    let mut app = App {
+        options,
+        links,
+        files,
+        thread: None,
+        layer: None,
         pointer: Pointer::default(),
         error_meter: ErrorMeter::default(),
         failure: None,
@@ -88,13 +95,13 @@ pub fn run(options: Options) -> Result<WindowTimes> {
     app.state().is_closing = true;
     // The render thread ends before the window that it draws into.
     let rendered = app.thread.take().map(RenderThread::join);
-    drop(app.window.take());
+    drop(app.layer.take());
     if let Some(error) = app.failure {
         return Err(error);
     }
     ran?;
     let loops = rendered.unwrap_or_else(|| Ok(vec![]))?;
-    let panels_ms = std::mem::take(&mut lock(&app.widgets).update_ms);
+    let panels_ms = std::mem::take(&mut lock(&app.links.widgets).update_ms);
     Ok(WindowTimes { loops, panels_ms })
 }
 
@@ -108,14 +115,10 @@ struct Pointer {
 
 struct App {
     options: Options,
-    state: Arc<Mutex<ViewState>>,
-    proxy: EventLoopProxy<RenderEvent>,
+    links: RenderLinks,
     files: FileWatch,
     thread: Option<RenderThread<Vec<LoopTimes>>>,
-    window: Option<Window>,
     layer: Option<EguiLayer>,
-    status: SharedStatus,
-    widgets: SharedWidgets,
     pointer: Pointer,
     error_meter: ErrorMeter,
     /// Why the window could not open.
@@ -124,7 +127,7 @@ struct App {
 
 impl ApplicationHandler<RenderEvent> for App {
     fn resumed(&mut self, events: &ActiveEventLoop) {
-        if self.window.is_none()
+        if self.layer.is_none()
             && let Err(error) = self.open(events)
         {
             self.failure = Some(error);
@@ -134,7 +137,9 @@ impl ApplicationHandler<RenderEvent> for App {
 
     fn user_event(&mut self, events: &ActiveEventLoop, event: RenderEvent) {
         match event {
-            RenderEvent::Title(text) => self.window.iter().for_each(|w| w.set_title(&text)),
+            RenderEvent::Title(text) => {
+                self.layer.iter().for_each(|layer| layer.window.set_title(&text));
+            }
             RenderEvent::Message(text) => self.print(&text),
             RenderEvent::Capture { format, film, rgba } => {
                 let message = capture(format, &film, &rgba);
@@ -151,7 +156,7 @@ impl ApplicationHandler<RenderEvent> for App {
 
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
         self.reload_files();
-        self.error_meter.update(&self.state, &self.status);
+        self.error_meter.update(&self.links.state, &self.links.status);
         let is_shown = self.update_panels();
         let idle = Instant::now() + IDLE_INTERVAL;
         let due = self.layer.as_ref().filter(|_| is_shown).and_then(EguiLayer::due);
@@ -172,8 +177,8 @@ impl ApplicationHandler<RenderEvent> for App {
             _ => {}
         }
         if self.state().has_panels
-            && let (Some(layer), Some(window)) = (&mut self.layer, &self.window)
-            && layer.handle(window, &event)
+            && let Some(layer) = &mut self.layer
+            && layer.handle(&event)
         {
             return;
         }
@@ -213,31 +218,22 @@ impl ApplicationHandler<RenderEvent> for App {
 
 impl App {
     fn state(&self) -> MutexGuard<'_, ViewState> {
-        lock(&self.state)
+        lock(&self.links.state)
     }
 
     fn open(&mut self, events: &ActiveEventLoop) -> Result<()> {
-        let Options { source, choice, mode, n_frames, stop, .. } = &self.options;
+        let Options { source, choice, mode, n_frames, .. } = &self.options;
         let scene = &source.first;
         let title = if scene.title.is_empty() { "nimbus" } else { &scene.title };
         let size = [scene.film.width, scene.film.height];
         let (window, surface) = open_window(events, title, size, choice.validation)?;
         self.state().size = window.inner_size().into();
-        let proxy = self.proxy.clone();
-        let links = RenderLinks {
-            state: self.state.clone(),
-            status: self.status.clone(),
-            widgets: self.widgets.clone(),
-            // Sending fails only after the event loop has ended, when no event matters any more.
-            send: Box::new(move |event| drop(proxy.send_event(event))),
-            stop,
-        };
-        let renderer = SceneRenderer::new(surface, choice, *mode, *n_frames, links)?;
-        self.layer = Some(EguiLayer::new(&window, self.widgets.clone(), IDLE_INTERVAL, false));
-        let proxy = self.proxy.clone();
-        let on_end = move || drop(proxy.send_event(RenderEvent::Ended));
+        let links = self.links.clone();
+        let renderer = SceneRenderer::new(surface, choice, *mode, *n_frames, links.clone())?;
+        let widgets = links.widgets.clone();
+        self.layer = Some(EguiLayer::new(window, widgets, IDLE_INTERVAL, false));
+        let on_end = move || links.send(RenderEvent::Ended);
         self.thread = Some(RenderThread::start(move || renderer.run(), on_end)?);
-        self.window = Some(window);
         Ok(())
     }
 
@@ -253,7 +249,7 @@ impl App {
         let state = self.state().clone();
         let read = self.options.source.read(&state);
         self.files.set_scene_files(&self.options.source.files);
-        lock(&self.status).file_error = read.as_ref().err().map(Error::to_string);
+        lock(&self.links.status).file_error = read.as_ref().err().map(Error::to_string);
         match read {
             Ok(scene) => {
                 self.state().reload(scene);
@@ -271,8 +267,8 @@ impl App {
     /// Updates the panels where due. Returns whether any widget is shown.
     fn update_panels(&mut self) -> bool {
         let has_panels = self.state().has_panels;
-        let is_shown = has_panels || lock(&self.status).alarm().is_some();
-        let (Some(layer), Some(window)) = (&mut self.layer, &self.window) else { return is_shown };
+        let is_shown = has_panels || lock(&self.links.status).alarm().is_some();
+        let Some(layer) = &mut self.layer else { return is_shown };
         if !is_shown {
             layer.hide();
             return false;
@@ -281,9 +277,9 @@ impl App {
             return true;
         }
         // Copies, so that the render thread never waits for the panels.
-        let (state, status) = (lock(&self.state).clone(), lock(&self.status).clone());
+        let (state, status) = (lock(&self.links.state).clone(), lock(&self.links.status).clone());
         let mut commands = vec![];
-        layer.update(window, |ui| {
+        layer.update(|ui| {
             let backdrop = has_panels.then(|| {
                 let (clicked, backdrop) = panels::show(ui, &state, &status);
                 commands.extend(clicked);
@@ -331,10 +327,10 @@ impl App {
 }
 
 /// Saves a picture in the current folder under a free name. Returns a message.
-fn capture(format: CaptureFormat, film: &Film, rgba: &[f32]) -> Result<String> {
+fn capture(format: ImageKind, film: &Film, rgba: &[f32]) -> Result<String> {
     let extension = match format {
-        CaptureFormat::Png => "png",
-        CaptureFormat::Exr => "exr",
+        ImageKind::Png => "png",
+        ImageKind::Exr => "exr",
     };
     let path = free_path(|n| PathBuf::from(format!("view-{n}.{extension}")));
     image::write(&path, film, film.width, film.height, rgba)?;

@@ -4,13 +4,8 @@ use glam::DVec3;
 
 use super::knobs::Knob;
 use super::playback::Seek;
-
-/// File format of a captured picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CaptureFormat {
-    Png,
-    Exr,
-}
+use crate::io::image::ImageKind;
+use crate::viewer::shortcut::Shortcut;
 
 /// How the picture of A is compared with that of B.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,11 +27,13 @@ pub enum Command {
     ToggleSkipping,
     /// Selects the next present mode of the window.
     NextPresentMode,
+    /// Changes the playback position.
     Seek(Seek),
     /// Multiplies the flying speed by 2 to this power.
     Speed(f64),
     /// Saves the picture.
-    Capture(CaptureFormat),
+    Capture(ImageKind),
+    /// Shows or hides the panels.
     TogglePanels,
     /// Counts non-finite and clipped values of the next frame.
     Count,
@@ -44,6 +41,7 @@ pub enum Command {
     ToggleB,
     /// Selects the next comparison of A with B.
     NextComparison,
+    /// Compares A with B in this way.
     Compare(Comparison),
     /// Turns the error measurement on or off.
     ToggleError,
@@ -51,54 +49,73 @@ pub enum Command {
     SaveScene,
     /// Prints the command that draws this view.
     PrintCommandLine,
+    /// Prints the keys.
     Help,
+    /// Closes the window.
     Quit,
 }
 
-/// A key with its command. Letters and signs are their own names.
-pub struct Shortcut {
-    pub key: &'static str,
-    pub command: Command,
-    pub description: &'static str,
-}
-
-const fn key(key: &'static str, command: Command, description: &'static str) -> Shortcut {
-    Shortcut { key, command, description }
-}
-
 /// Every key of the window except the flying keys.
-pub const SHORTCUTS: [Shortcut; 27] = [
-    key(
+pub const SHORTCUTS: [Shortcut<Command>; 27] = [
+    Shortcut::new(
         "t",
         Command::Advance(Knob::Threading),
         "run game and render step in sequence (serial) or side by side (parallel)",
     ),
-    key("c", Command::Advance(Knob::Simulate), "move particles on the device or the game thread"),
-    key("l", Command::Advance(Knob::Lighting), "lighting: none, first or two reflections"),
-    key("b", Command::Advance(Knob::Bases), "number of basis vectors"),
-    key("g", Command::Advance(Knob::Gather), "gather the second reflection by pairs or clusters"),
-    key("o", Command::Advance(Knob::Theta), "opening angle of the clusters"),
-    key("p", Command::Advance(Knob::Path), "draw particles by compute tiles or by sprites"),
-    key("r", Command::Advance(Knob::Resolution), "resolution of the particles' picture"),
-    key("k", Command::ToggleSkipping, "skip passes that a frame does not need, or run all"),
-    key("v", Command::NextPresentMode, "present mode: fifo, mailbox or immediate"),
-    key("space", Command::Seek(Seek::TogglePause), "play or pause"),
-    key(".", Command::Seek(Seek::By(1)), "next frame"),
-    key(",", Command::Seek(Seek::By(-1)), "previous frame"),
-    key("home", Command::Seek(Seek::To(0)), "first frame"),
-    key("+", Command::Speed(1.0), "fly twice as fast"),
-    key("-", Command::Speed(-1.0), "fly half as fast"),
-    key("f12", Command::Capture(CaptureFormat::Png), "save the picture as PNG"),
-    key("f11", Command::Capture(CaptureFormat::Exr), "save the picture as EXR"),
-    key("h", Command::TogglePanels, "show or hide the panels"),
-    key("n", Command::Count, "count non-finite and clipped values of a frame"),
-    key("m", Command::ToggleB, "keep the settings as B for a comparison, or drop B"),
-    key("x", Command::NextComparison, "show A and B split, their difference, or B alone"),
-    key("j", Command::ToggleError, "measure the error against the f64 reference, when paused"),
-    key("f10", Command::SaveScene, "save the view as a scene file"),
-    key("i", Command::PrintCommandLine, "print and copy the command that draws this view"),
-    key("?", Command::Help, "print the keys"),
-    key("escape", Command::Quit, "close the window"),
+    Shortcut::new(
+        "c",
+        Command::Advance(Knob::Simulate),
+        "move particles on the device or the game thread",
+    ),
+    Shortcut::new(
+        "l",
+        Command::Advance(Knob::Lighting),
+        "lighting: none, first or two reflections",
+    ),
+    Shortcut::new("b", Command::Advance(Knob::Bases), "number of basis vectors"),
+    Shortcut::new(
+        "g",
+        Command::Advance(Knob::Gather),
+        "gather the second reflection by pairs or clusters",
+    ),
+    Shortcut::new("o", Command::Advance(Knob::Theta), "opening angle of the clusters"),
+    Shortcut::new(
+        "p",
+        Command::Advance(Knob::Path),
+        "draw particles by compute tiles or by sprites",
+    ),
+    Shortcut::new("r", Command::Advance(Knob::Resolution), "resolution of the particles' picture"),
+    Shortcut::new(
+        "k",
+        Command::ToggleSkipping,
+        "skip passes that a frame does not need, or run all",
+    ),
+    Shortcut::new("v", Command::NextPresentMode, "present mode: fifo, mailbox or immediate"),
+    Shortcut::new("space", Command::Seek(Seek::TogglePause), "play or pause"),
+    Shortcut::new(".", Command::Seek(Seek::By(1)), "next frame"),
+    Shortcut::new(",", Command::Seek(Seek::By(-1)), "previous frame"),
+    Shortcut::new("home", Command::Seek(Seek::To(0)), "first frame"),
+    Shortcut::new("+", Command::Speed(1.0), "fly twice as fast"),
+    Shortcut::new("-", Command::Speed(-1.0), "fly half as fast"),
+    Shortcut::new("f12", Command::Capture(ImageKind::Png), "save the picture as PNG"),
+    Shortcut::new("f11", Command::Capture(ImageKind::Exr), "save the picture as EXR"),
+    Shortcut::new("h", Command::TogglePanels, "show or hide the panels"),
+    Shortcut::new("n", Command::Count, "count non-finite and clipped values of a frame"),
+    Shortcut::new("m", Command::ToggleB, "keep the settings as B for a comparison, or drop B"),
+    Shortcut::new("x", Command::NextComparison, "show A and B split, their difference, or B alone"),
+    Shortcut::new(
+        "j",
+        Command::ToggleError,
+        "measure the error against the f64 reference, when paused",
+    ),
+    Shortcut::new("f10", Command::SaveScene, "save the view as a scene file"),
+    Shortcut::new(
+        "i",
+        Command::PrintCommandLine,
+        "print and copy the command that draws this view",
+    ),
+    Shortcut::new("?", Command::Help, "print the keys"),
+    Shortcut::new("escape", Command::Quit, "close the window"),
 ];
 
 /// Keys that move the camera while they are held: direction as (right, up, forward).

@@ -1,6 +1,7 @@
 //! The loop over frames of a scene window: draw, present, measure, and read back what was asked
 //! for.
 
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -8,10 +9,7 @@ use super::comparison::{CameraQueue, compare_of};
 use super::render_links::{Readback, RenderEvent, RenderLinks};
 use super::view_state::ViewState;
 use crate::error::Result;
-use crate::frame::Counts;
-use crate::frame::Game;
-use crate::frame::Renderer;
-use crate::frame::{FrameTimes, parallel, serial};
+use crate::frame::{Counts, FrameTimes, Game, Renderer, parallel, serial};
 use crate::measure::stats::Summary;
 use crate::model::scene::{Scene, Threading};
 use crate::viewer::fly_camera::FlyCamera;
@@ -22,9 +20,11 @@ use crate::viewer::window_target::{PictureDraw, WindowTarget};
 /// Frame times of one loop.
 #[derive(Debug, Clone, Copy)]
 pub struct LoopTimes {
+    /// The loop.
     pub threading: Threading,
     /// Whether panels were shown beside the picture.
     pub has_panels: bool,
+    /// Statistics of the frame times, ms.
     pub frame_ms: Summary,
 }
 
@@ -36,36 +36,29 @@ const TITLE_INTERVAL: Duration = Duration::from_millis(500);
 const MAX_STEP_S: f64 = 0.25;
 
 /// Frame times by loop and by whether panels were shown.
-#[derive(Default)]
-pub struct LoopSamples(Vec<(Threading, bool, Vec<f64>)>);
+pub type LoopSamples = BTreeMap<(Threading, bool), Vec<f64>>;
 
-impl LoopSamples {
-    fn push(&mut self, threading: Threading, has_panels: bool, ms: f64) {
-        match self.0.iter_mut().find(|(t, p, _)| (*t, *p) == (threading, has_panels)) {
-            Some((.., samples)) => samples.push(ms),
-            None => self.0.push((threading, has_panels, vec![ms])),
-        }
-    }
-
-    /// Returns the statistics of each loop that ran, serial loops first.
-    pub fn times(mut self) -> Vec<LoopTimes> {
-        self.0.sort_by_key(|(threading, has_panels, _)| (*threading as u8, *has_panels));
-        let of = |(threading, has_panels, ms): &(Threading, bool, Vec<f64>)| {
-            let (threading, has_panels) = (*threading, *has_panels);
-            Summary::of(ms).map(|frame_ms| LoopTimes { threading, has_panels, frame_ms })
-        };
-        self.0.iter().filter_map(of).collect()
-    }
+/// Returns the statistics of each loop that ran, serial loops first.
+pub fn loop_times(samples: &LoopSamples) -> Vec<LoopTimes> {
+    let of = |(&(threading, has_panels), ms): (&(Threading, bool), &Vec<f64>)| {
+        Summary::of(ms).map(|frame_ms| LoopTimes { threading, has_panels, frame_ms })
+    };
+    samples.iter().filter_map(of).collect()
 }
 
 /// Everything that the loop over frames draws with.
 pub struct FrameLoop<'a> {
+    /// The window that frames are presented in.
     pub target: &'a mut WindowTarget,
+    /// State shared with the window.
     pub links: &'a RenderLinks,
+    /// Frame times so far.
     pub samples: &'a mut LoopSamples,
     /// Frames until the window closes; `None`: no limit.
     pub n_left: &'a mut Option<u32>,
+    /// The draw that shows a picture.
     pub draw: &'a PictureDraw,
+    /// The scene of A, with the size of the window.
     pub scene: &'a Scene,
     /// B, drawn after each frame.
     pub variant: Option<PosedPlayer>,
@@ -93,7 +86,7 @@ impl FrameLoop<'_> {
             let frames = Frames { state: self.links.state.clone(), last: Instant::now() };
             let mut on_frame = |times: FrameTimes, renderer: &mut Renderer| {
                 if let Some(text) = title.update(self.scene, &times) {
-                    (self.links.send)(RenderEvent::Title(text));
+                    self.links.send(RenderEvent::Title(text));
                 }
                 let is_warm = n_warm_up == 0;
                 n_warm_up = n_warm_up.saturating_sub(1);
@@ -113,7 +106,7 @@ impl FrameLoop<'_> {
     fn count(&self, game: &mut Game, renderer: &mut Renderer) -> Result<()> {
         let i_frame = lock(&self.links.state).playback.i_frame();
         renderer.step(game.step(i_frame)?)?;
-        let counts = Counts::new(renderer, &self.target.bed.device, self.scene)?;
+        let counts = Counts::new(renderer, &self.target.gpu.device, self.scene)?;
         self.links.message(format!("frame {i_frame}: {}", counts.text()));
         lock(&self.links.status).counts = Some((i_frame, counts));
         Ok(())
@@ -142,10 +135,10 @@ impl FrameLoop<'_> {
         }
         // With B, a frame draws two pictures, so its time is not that of the scene.
         if is_warm && self.variant.is_none() {
-            self.samples.push(threading, now.has_panels, times.frame_ms);
+            self.samples.entry((threading, now.has_panels)).or_default().push(times.frame_ms);
         }
         if now.has_panels {
-            lock(&self.links.status).push(threading, times, self.scene.n_particles());
+            lock(&self.links.status).timeline.push(times);
         }
         if let Some(n) = self.n_left {
             *n = n.saturating_sub(1);
@@ -169,13 +162,13 @@ impl FrameLoop<'_> {
         let (version, film) = (self.begun.version, self.scene.film);
         let (capture, wants_readback) = lock(&self.links.state).take_readbacks(version);
         if let Some(format) = capture {
-            (self.links.send)(RenderEvent::Capture { format, film, rgba: renderer.image()? });
+            self.links.send(RenderEvent::Capture { format, film, rgba: renderer.image()? });
         }
         if let (true, Some(camera)) = (wants_readback, camera) {
             let b = self.variant.as_mut().map(|variant| variant.player.renderer.image());
             let (a, b) = (renderer.image()?, b.transpose()?);
             let readback = Readback { version, camera, i_frame, film, a, b };
-            (self.links.send)(RenderEvent::Readback(readback));
+            self.links.send(RenderEvent::Readback(readback));
         }
         Ok(())
     }

@@ -7,13 +7,21 @@ use crate::model::scene::{DrawPath, Gather, LightingMode, Scene, Simulate, Threa
 /// A setting that a key cycles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Knob {
+    /// Whether game and render steps alternate or run side by side.
     Threading,
+    /// Processor that moves the particles.
     Simulate,
+    /// Number of reflections.
     Lighting,
+    /// Number of basis vectors.
     Bases,
+    /// How the second reflection is gathered.
     Gather,
+    /// Opening angle of clusters.
     Theta,
+    /// How particles are drawn.
     Path,
+    /// Resolution of the particles' picture.
     Resolution,
 }
 

@@ -12,6 +12,7 @@ pub struct Playback {
 /// A change of the playback position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Seek {
+    /// Pauses or plays.
     TogglePause,
     /// Moves by a number of frames, and pauses.
     By(i32),

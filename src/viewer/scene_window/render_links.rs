@@ -3,9 +3,11 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::commands::CaptureFormat;
+use winit::event_loop::EventLoopProxy;
+
 use super::status::SharedStatus;
 use super::view_state::ViewState;
+use crate::io::image::ImageKind;
 use crate::model::film::Film;
 use crate::viewer::egui_layer::SharedWidgets;
 use crate::viewer::fly_camera::FlyCamera;
@@ -19,11 +21,8 @@ pub enum RenderEvent {
     /// A message for the terminal.
     Message(String),
     /// A picture to save: premultiplied linear RGBA, rows from the top.
-    Capture {
-        format: CaptureFormat,
-        film: Film,
-        rgba: Vec<f32>,
-    },
+    Capture { format: ImageKind, film: Film, rgba: Vec<f32> },
+    /// Pictures that the error measurement has asked for.
     Readback(Readback),
     /// The status has a new error.
     ErrorChanged,
@@ -36,8 +35,11 @@ pub enum RenderEvent {
 pub struct Readback {
     /// [`ViewState::version`] of the frame.
     pub version: u64,
+    /// Camera of the frame.
     pub camera: FlyCamera,
+    /// Number of the frame.
     pub i_frame: u32,
+    /// Film of the frame, with the size of the pictures.
     pub film: Film,
     /// Picture of A: premultiplied linear RGBA, rows from the top.
     pub a: Vec<f32>,
@@ -46,20 +48,30 @@ pub struct Readback {
 }
 
 /// State that the window and its render thread share.
+#[derive(Clone)]
 pub struct RenderLinks {
+    /// The state that the thread draws.
     pub state: Arc<Mutex<ViewState>>,
+    /// The status that the panels show.
     pub status: SharedStatus,
+    /// The widgets over the picture.
     pub widgets: SharedWidgets,
-    /// Sends an event to the window.
-    pub send: Box<dyn Fn(RenderEvent) + Send>,
+    /// Events to the window.
+    pub events: EventLoopProxy<RenderEvent>,
     /// Ends the thread when set.
     pub stop: &'static AtomicBool,
 }
 
 impl RenderLinks {
+    /// Sends an event to the window.
+    pub fn send(&self, event: RenderEvent) {
+        // Sending fails only after the event loop has ended, when no event matters any more.
+        drop(self.events.send_event(event));
+    }
+
     /// Sends a message for the terminal.
     pub fn message(&self, text: String) {
-        (self.send)(RenderEvent::Message(text));
+        self.send(RenderEvent::Message(text));
     }
 
     /// Returns whether the thread is to end.

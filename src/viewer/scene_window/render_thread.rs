@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::comparison::CameraQueue;
-use super::frame_loop::{FrameLoop, LoopSamples, LoopTimes};
+use super::frame_loop::{FrameLoop, LoopSamples, LoopTimes, loop_times};
 use super::render_links::{RenderEvent, RenderLinks};
 use super::view_state::{Variant, ViewState};
 use crate::error::{Error, Result};
@@ -61,7 +61,7 @@ impl SceneRenderer {
             let (mode, used) = (mode.name(), target.mode().name());
             links.message(format!("this window does not support {mode}; it uses {used}"));
         }
-        lock(&links.status).device_name = target.bed.device.info().name.clone();
+        lock(&links.status).device_name = target.gpu.device.info().name.clone();
         Ok(SceneRenderer {
             target,
             choice: choice.clone(),
@@ -106,7 +106,7 @@ impl SceneRenderer {
             }
         }
         self.target.close()?;
-        Ok(self.samples.times())
+        Ok(loop_times(&self.samples))
     }
 
     /// Recreates the swapchain by the state's size and present mode. Returns false where the window
@@ -130,7 +130,7 @@ impl SceneRenderer {
             return None;
         }
         let sources = self.choice.sources();
-        let replaced = sources.and_then(|sources| self.target.bed.set_sources(sources));
+        let replaced = sources.and_then(|sources| self.target.gpu.set_sources(sources));
         replaced.map_err(|error| self.report(&error, state)).ok()
     }
 
@@ -138,7 +138,7 @@ impl SceneRenderer {
         self.failed_at = Some((state.version, state.n_shader_loads));
         let text = format!("{}; the last good state stays", error.to_string().trim_end());
         lock(&self.links.status).render_error = Some(text.clone());
-        (self.links.send)(RenderEvent::ErrorChanged);
+        self.links.send(RenderEvent::ErrorChanged);
         self.links.message(text);
     }
 
@@ -154,7 +154,7 @@ impl SceneRenderer {
         failed: &ViewState,
     ) -> Result<()> {
         match (old_shaders, good) {
-            (Some(compiler), _) => self.target.bed.set_compiler(compiler),
+            (Some(compiler), _) => self.target.gpu.set_compiler(compiler),
             (None, Some((scene, variant)))
                 if *scene != failed.scene || variant.is_none() && failed.variant.is_some() =>
             {
@@ -172,10 +172,10 @@ impl SceneRenderer {
 
     /// Makes the state's scenes ready on the device; `None` without a visible area.
     fn activate(&self, state: &ViewState) -> Result<Option<ActiveScene>> {
-        let bed = &self.target.bed;
-        let player = bed.player(self.with_window_size(&state.scene), state.skips)?;
+        let gpu = &self.target.gpu;
+        let player = gpu.player(self.with_window_size(&state.scene), state.skips)?;
         let variant = state.variant.as_ref().map(|v| {
-            let player = bed.player(self.with_window_size(&v.scene), v.skips)?;
+            let player = gpu.player(self.with_window_size(&v.scene), v.skips)?;
             Ok(PosedPlayer::new(player, state.camera.pose()))
         });
         let variant = variant.transpose()?;

@@ -12,9 +12,11 @@ use crate::viewer::free_path::free_path;
 
 /// A scene file with the overrides it is read with.
 pub struct SceneSource {
+    /// The scene's file.
     pub path: PathBuf,
     /// Overrides of the command line: `--set` and `--size`.
     pub overrides: Vec<String>,
+    /// Seed of the first cloud, if `--seed` gives it.
     pub seed: Option<u32>,
     /// The scene as last read, before any knob was changed.
     pub first: Arc<Scene>,

@@ -4,21 +4,20 @@ use std::sync::{Arc, Mutex};
 
 use super::timeline::Timeline;
 use crate::frame::Counts;
-use crate::frame::FrameTimes;
-use crate::frame::plan::Plan;
 use crate::gpu::PresentMode;
-use crate::model::scene::Threading;
 use crate::studies::picture_error::PictureError;
 use crate::viewer::error_probe::ProbeStatus;
 
 /// Status of the scene window.
 #[derive(Debug, Clone, Default)]
 pub struct ViewStatus {
+    /// Times of the last frames.
     pub timeline: Timeline,
-    pub last_frame: Option<LastFrame>,
     /// Counts of the frame with this number.
     pub counts: Option<(u32, Counts)>,
+    /// The mode that frames are presented by; `None` before the first.
     pub present_mode: Option<PresentMode>,
+    /// Name of the device that draws.
     pub device_name: String,
     /// Why the scene's files could not be read.
     pub file_error: Option<String>,
@@ -33,38 +32,22 @@ pub struct ViewStatus {
 /// Error of the view against its reference.
 #[derive(Debug, Clone, Default)]
 pub struct ErrorStatus {
+    /// State of the reference.
     pub probe: ProbeStatus,
+    /// Error of A, once it is measured.
     pub a: Option<PictureError>,
+    /// Error of B, once it is measured.
     pub b: Option<PictureError>,
-}
-
-/// The frame that ended last.
-#[derive(Debug, Clone)]
-pub struct LastFrame {
-    pub time_s: f64,
-    pub n_shown: u32,
-    pub n_particles: u64,
-    pub plan: Plan,
 }
 
 /// A status shared by the window and the render thread.
 pub type SharedStatus = Arc<Mutex<ViewStatus>>;
 
 impl ViewStatus {
-    /// Adds the times of a frame.
-    pub fn push(&mut self, threading: Threading, times: &FrameTimes, n_particles: u64) {
-        self.timeline.push(threading, times);
-        let FrameTimes { time_s, plan, .. } = *times;
-        self.last_frame = Some(LastFrame { time_s, n_shown: times.n_shown(), n_particles, plan });
-    }
-
     /// Returns the errors to show over the picture, a line each; `None` where all is well.
     pub fn alarm(&self) -> Option<String> {
-        let errors: Vec<&str> = [&self.file_error, &self.render_error]
-            .into_iter()
-            .flatten()
-            .map(String::as_str)
-            .collect();
+        let errors = [&self.file_error, &self.render_error].into_iter().flatten();
+        let errors: Vec<&str> = errors.map(String::as_str).collect();
         (!errors.is_empty()).then(|| errors.join("\n"))
     }
 }

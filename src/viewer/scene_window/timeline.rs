@@ -5,37 +5,17 @@ use std::time::Instant;
 
 use crate::frame::FrameTimes;
 use crate::measure::stats::{Summary, median};
-use crate::model::scene::Threading;
 
 /// Number of frames that a timeline keeps.
 pub const CAPACITY: usize = 240;
 
-/// Begin and end, ms after the timeline's first frame began.
+/// Begin and end, ms after the beginning of a time line.
 pub type Span = [f64; 2];
-
-/// Times of one frame, ms.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
-    pub threading: Threading,
-    pub frame_ms: f64,
-    pub game_ms: f64,
-    /// Recording and submission.
-    pub record_ms: f64,
-    pub wait_ms: f64,
-    pub latency_ms: f64,
-    pub game: Span,
-    pub record: Span,
-    pub end: f64,
-    /// Passes of the device in order; empty without timestamps.
-    ///
-    /// The last pass is assumed to end with the frame, because the offset between the clocks of
-    /// device and host is not measured here (`bench --trace` measures it).
-    pub passes: Vec<(&'static str, Span)>,
-}
 
 /// The median of one pass over the frames of a timeline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PassTime {
+    /// Name of the pass.
     pub name: &'static str,
     /// Median over the frames that ran the pass.
     pub p50_ms: f64,
@@ -46,53 +26,40 @@ pub struct PassTime {
 /// Times of the last [`CAPACITY`] frames, oldest first.
 #[derive(Debug, Clone, Default)]
 pub struct Timeline {
-    zero: Option<Instant>,
-    frames: VecDeque<Frame>,
+    frames: VecDeque<FrameTimes>,
 }
 
 impl Timeline {
     /// Adds a frame, and drops the oldest where there are too many.
-    pub fn push(&mut self, threading: Threading, times: &FrameTimes) {
-        let zero = *self.zero.get_or_insert(times.marks.game[0]);
-        let at = |t: Instant| t.saturating_duration_since(zero).as_secs_f64() * 1e3;
-        let end = at(times.marks.end);
-        let last_ns = times.passes.last().map_or(0.0, |p| p.end_ns);
-        let on_host = |ns: f64| end - (last_ns - ns) * 1e-6;
+    pub fn push(&mut self, times: &FrameTimes) {
         if self.frames.len() == CAPACITY {
             self.frames.pop_front();
         }
-        let passes = times.passes.iter();
-        self.frames.push_back(Frame {
-            threading,
-            frame_ms: times.frame_ms,
-            game_ms: times.game_ms,
-            record_ms: times.record_ms + times.submit_ms,
-            wait_ms: times.wait_ms,
-            latency_ms: times.latency_ms,
-            game: times.marks.game.map(at),
-            record: times.marks.record.map(at),
-            end,
-            passes: passes.map(|p| (p.name, [p.begin_ns, p.end_ns].map(on_host))).collect(),
-        });
+        self.frames.push_back(times.clone());
     }
 
     /// Returns the frames, oldest first.
-    pub fn frames(&self) -> impl ExactSizeIterator<Item = &Frame> + DoubleEndedIterator {
+    pub fn frames(&self) -> impl ExactSizeIterator<Item = &FrameTimes> + DoubleEndedIterator {
         self.frames.iter()
     }
 
+    /// Returns the frame that ended last.
+    pub fn newest(&self) -> Option<&FrameTimes> {
+        self.frames.back()
+    }
+
     /// Returns the statistics of one value of each frame; `None` without frames.
-    pub fn summary(&self, value: impl Fn(&Frame) -> f64) -> Option<Summary> {
+    pub fn summary(&self, value: impl Fn(&FrameTimes) -> f64) -> Option<Summary> {
         Summary::of(&self.frames.iter().map(value).collect::<Vec<_>>())
     }
 
     /// Returns the median of every pass, in the order of their first appearance.
     pub fn passes(&self) -> Vec<PassTime> {
         let mut times: Vec<(&'static str, Vec<f64>)> = vec![];
-        for (name, [begin, end]) in self.frames.iter().flat_map(|f| &f.passes) {
-            match times.iter_mut().find(|(known, _)| known == name) {
-                Some((_, ms)) => ms.push(end - begin),
-                None => times.push((name, vec![end - begin])),
+        for pass in self.frames.iter().flat_map(|f| &f.passes) {
+            match times.iter_mut().find(|(known, _)| *known == pass.name) {
+                Some((_, ms)) => ms.push(pass.ms()),
+                None => times.push((pass.name, vec![pass.ms()])),
             }
         }
         let n_frames = self.frames.len() as f64;
@@ -103,6 +70,25 @@ impl Timeline {
         };
         times.into_iter().map(pass).collect()
     }
+}
+
+/// Returns the time from `zero` to `t`, ms.
+pub fn ms_after(zero: Instant, t: Instant) -> f64 {
+    t.saturating_duration_since(zero).as_secs_f64() * 1e3
+}
+
+/// Returns name, begin and end of a frame's passes on the device; none without timestamps.
+///
+/// The last pass is assumed to end with the frame, because the offset between the clocks of device
+/// and host is not measured here (`bench --trace` measures it).
+pub fn device_spans(
+    frame: &FrameTimes,
+    zero: Instant,
+) -> impl Iterator<Item = (&'static str, Span)> {
+    let end = ms_after(zero, frame.marks.end);
+    let last_ns = frame.passes.last().map_or(0.0, |p| p.end_ns);
+    let on_host = move |ns: f64| end - (last_ns - ns) * 1e-6;
+    frame.passes.iter().map(move |p| (p.name, [p.begin_ns, p.end_ns].map(on_host)))
 }
 
 #[cfg(test)]
@@ -142,16 +128,17 @@ mod tests {
     fn frames_share_one_time_line_and_device_passes_end_with_their_frame() {
         let zero = Instant::now();
         let mut line = Timeline::default();
-        line.push(Threading::Serial, &times(zero, 0, &[("grid", 5e6, 6e6), ("tiles", 6e6, 9e6)]));
-        line.push(Threading::Parallel, &times(zero, 1, &[("tiles", 100e6, 101e6)]));
-        let [first, second] = [0, 1].map(|i| line.frames().nth(i).unwrap().clone());
+        line.push(&times(zero, 0, &[("grid", 5e6, 6e6), ("tiles", 6e6, 9e6)]));
+        line.push(&times(zero, 1, &[("tiles", 100e6, 101e6)]));
+        let frame = |i: usize| line.frames().nth(i).unwrap();
+        let device = |i| device_spans(frame(i), zero).map(|(_, span)| span).collect::<Vec<_>>();
+        let host = |marks: [Instant; 2]| marks.map(|t| ms_after(zero, t));
         let near = |a: Span, b: Span| (a[0] - b[0]).abs() < 1e-6 && (a[1] - b[1]).abs() < 1e-6;
-        assert!(near(first.game, [0.0, 2.0]) && near(second.record, [12.0, 13.0]));
-        assert!(
-            near(first.passes[0].1, [5.0, 6.0]) && near(first.passes[1].1, [6.0, 9.0]),
-            "{first:?}"
-        );
-        assert!(near(second.passes[0].1, [18.0, 19.0]));
+        assert!(near(host(frame(0).marks.game), [0.0, 2.0]));
+        assert!(near(host(frame(1).marks.record), [12.0, 13.0]));
+        let first = device(0);
+        assert!(near(first[0], [5.0, 6.0]) && near(first[1], [6.0, 9.0]), "{first:?}");
+        assert!(near(device(1)[0], [18.0, 19.0]));
         assert_eq!(line.summary(|f| f.frame_ms).map(|s| (s.n, s.p50)), Some((2, 10.5)));
         let passes = line.passes();
         assert_eq!(
@@ -166,7 +153,7 @@ mod tests {
         let zero = Instant::now();
         let mut line = Timeline::default();
         assert!(line.summary(|f| f.frame_ms).is_none() && line.passes().is_empty());
-        (0..CAPACITY as u32 + 5).for_each(|i| line.push(Threading::Serial, &times(zero, i, &[])));
+        (0..CAPACITY as u32 + 5).for_each(|i| line.push(&times(zero, i, &[])));
         assert_eq!((line.frames().len(), line.frames().next().unwrap().frame_ms), (CAPACITY, 15.0));
     }
 }

@@ -7,16 +7,20 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::commands::{CaptureFormat, Command, Comparison, FLYING_KEYS, SHORTCUTS, help};
+use super::commands::{Command, Comparison, FLYING_KEYS, SHORTCUTS, help};
 use super::knobs::Knob;
 use super::playback::Playback;
+use crate::io::image::ImageKind;
 use crate::model::scene::Scene;
 use crate::viewer::fly_camera::{FlyCamera, Motion};
+use crate::viewer::shortcut::Shortcut;
 
 /// Settings that are drawn as B.
 #[derive(Debug, Clone)]
 pub struct Variant {
+    /// The scene with its knobs as they were.
     pub scene: Arc<Scene>,
+    /// Whether frames skip passes that they do not need.
     pub skips: bool,
 }
 
@@ -38,7 +42,7 @@ pub struct ViewState {
     /// Width and height of the window in pixels.
     pub size: [u32; 2],
     /// A picture to save.
-    pub capture: Option<CaptureFormat>,
+    pub capture: Option<ImageKind>,
     /// Whether panels are shown.
     pub has_panels: bool,
     /// The next frame's values are to be counted.
@@ -61,9 +65,13 @@ pub struct ViewState {
 /// Work that a command leaves to the window.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Response {
+    /// No work.
     Nothing,
+    /// Prints a message.
     Message(String),
+    /// Prints and copies the command that draws this view.
     PrintCommandLine,
+    /// Saves the view as a scene file.
     SaveScene,
 }
 
@@ -75,11 +83,8 @@ const TURN: f64 = std::f64::consts::FRAC_PI_2;
 impl ViewState {
     /// Starts at the scene's first frame and camera; `None` where the camera has no direction.
     pub fn new(scene: Arc<Scene>, skips: bool) -> Option<ViewState> {
-        let camera = &scene.camera;
-        let pose = camera.pose(scene.time.start_s)?;
-        let camera = FlyCamera::new(&pose, camera.up, camera.keys.first()?.target);
         Some(ViewState {
-            camera,
+            camera: FlyCamera::of_scene(&scene, DVec3::ZERO)?,
             playback: Playback::new(scene.time.n_frames),
             size: [scene.film.width, scene.film.height],
             scene,
@@ -110,8 +115,8 @@ impl ViewState {
     pub fn press(&mut self, key: &str) -> Response {
         if let Some((name, _)) = FLYING_KEYS.iter().find(|(name, _)| *name == key) {
             self.held_keys.insert(name);
-        } else if let Some(shortcut) = SHORTCUTS.iter().find(|s| s.key == key) {
-            return self.act(shortcut.command);
+        } else if let Some(command) = Shortcut::command_of(&SHORTCUTS, key) {
+            return self.act(command);
         }
         Response::Nothing
     }
@@ -208,7 +213,7 @@ impl ViewState {
 
     /// Takes the capture and the readback that were asked for, for a frame drawn at `version` of
     /// this state.
-    pub fn take_readbacks(&mut self, version: u64) -> (Option<CaptureFormat>, bool) {
+    pub fn take_readbacks(&mut self, version: u64) -> (Option<ImageKind>, bool) {
         if self.version != version {
             return (None, false);
         }
@@ -285,7 +290,7 @@ mod tests {
         );
         s.press("f12");
         s.press("escape");
-        assert!(s.capture == Some(CaptureFormat::Png) && s.is_closing);
+        assert!(s.capture == Some(ImageKind::Png) && s.is_closing);
     }
 
     #[test]

@@ -5,8 +5,11 @@ use super::super::fixtures::{editor, unit_box};
 use super::super::input::{Button, ModifierKeys};
 use super::super::settings::DisplayMode;
 use super::super::shortcuts::Chord;
+use glam::DVec3;
+
 use super::*;
 use crate::model::boxes::CloudBox;
+use crate::model::camera::Pose;
 use std::path::Path;
 
 const NONE: ModifierKeys = ModifierKeys { ctrl: false, shift: false };
@@ -23,7 +26,7 @@ fn controller_of(boxes: Vec<CloudBox>) -> EditorController {
     let target = DVec3::new(2.0, 0.0, 0.0);
     EditorController::new(
         Session::from_file(Path::new("b.dat"), boxes),
-        (&pose, DVec3::Y, target),
+        FlyCamera::new(&pose, DVec3::Y, target),
         area(),
         250.0,
     )

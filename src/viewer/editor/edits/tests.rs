@@ -2,21 +2,20 @@
 
 use glam::DVec3;
 
-use super::super::action::{Action, Edit, Select, Setting};
+use super::super::action::{Action, Edit, MirrorPlane, MirrorResult, Select, Setting};
 use super::super::axis::Axis;
 use super::super::document;
 use super::super::fixtures::{after, edited, editor, selected, unit_box};
 use super::super::grid_snap::GridSnap;
-use super::super::mirror::{MirrorPlane, MirrorResult};
-use super::super::refusal::Refusal;
 use super::super::selection::SelectionMode;
 use super::super::settings::ScalingAnchor;
+use super::super::snapshot::Snapshot;
 use super::super::state::Editor;
-use super::scaled;
+use super::scale;
 use crate::model::boxes::CloudBox;
 
 fn refused(editor: &Editor, edit: Edit) -> String {
-    editor.after(&Action::Edit(edit)).map(|_| ()).unwrap_err().0
+    editor.after(&Action::Edit(edit)).map(|_| ()).unwrap_err()
 }
 
 fn set(editor: &Editor, setting: Setting) -> Editor {
@@ -99,7 +98,10 @@ fn boxes_move_and_scale_about_their_middle() {
     let moved = edited(&e, Edit::MoveBy(DVec3::new(0.0, -1.5, 0.0)));
     assert_eq!(moved.boxes().iter().map(|b| b.center.y).collect::<Vec<_>>(), [-1.5, 0.0, -1.5]);
     // The bounds are −0.5 to 8.5 along x.
-    let scaled = scaled(e.document(), e.selection(), DVec3::new(0.5, 1.0, 3.0));
+    let (document, selection) = (e.shared_document(), e.selection().clone());
+    let mut scaled = Snapshot { document, selection };
+    scale(&mut scaled, DVec3::new(0.5, 1.0, 3.0));
+    let scaled = scaled.document;
     assert_eq!(scaled.boxes.iter().map(|b| b.center.x).collect::<Vec<_>>(), [2.0, 4.0, 6.0]);
     assert_eq!(scaled.boxes[2].extent, DVec3::new(0.5, 1.0, 3.0));
     assert_eq!((scaled.boxes[2].n_particles, scaled.boxes[2].radius_max), (12, 2.0));
@@ -173,7 +175,7 @@ fn values_that_a_box_file_cannot_hold_are_refused_in_one_sentence() {
     let wrong = Action::Select(Select::Boxes { boxes: vec![1, 3], mode: SelectionMode::Add });
     assert_eq!(
         e.after(&wrong).map(|_| ()),
-        Err(Refusal("box: expected a number below 3, found 3".to_owned()))
+        Err("box: expected a number below 3, found 3".to_owned())
     );
     assert!(e.after(&Action::Set(Setting::Snap(GridSnap { is_on: true, step: 0.0 }))).is_err());
     // Copies would exceed the largest number of boxes.

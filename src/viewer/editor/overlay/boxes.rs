@@ -13,8 +13,11 @@ use crate::viewer::editor::viewport::{FACES, corners};
 pub const MAX_DRAWN: usize = 4096;
 
 const GREY: Color = [150, 164, 188, 255];
+/// Colour of the active box.
 pub const RED: Color = [214, 52, 44, 255];
+/// Outline of selected boxes.
 pub const ORANGE: Color = [255, 150, 30, 255];
+/// Edges of boxes that the cloud shows between.
 pub const EDGE: Color = [196, 206, 222, 200];
 /// Alpha of the active box's faces where the cloud shows through.
 pub const TRANSLUCENT: u8 = 64;

@@ -35,13 +35,16 @@ pub enum Shape {
 /// Colour and width of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stroke {
+    /// Colour of the line.
     pub color: Color,
+    /// Width in pixels.
     pub width_px: f64,
 }
 
 /// Margin beyond the picture, so that outlines along its edge are not visible, points.
 pub const MARGIN_POINTS: f64 = 8.0;
 
+/// Outline of faces and handles.
 pub const OUTLINE: Color = [40, 46, 58, 255];
 
 /// Returns a colour with another alpha.
@@ -51,7 +54,9 @@ pub fn with_alpha([r, g, b, _]: Color, alpha: u8) -> Color {
 
 /// Shapes of one picture, back to front.
 pub struct Canvas<'a> {
+    /// The camera and the picture area.
     pub view: &'a Viewport,
+    /// The shapes so far, back to front.
     pub shapes: Vec<Shape>,
     /// Planes of the pyramid in view.
     sides: [DVec3; 5],

@@ -11,6 +11,7 @@ use crate::viewer::editor::state::Editor;
 pub const AXES: [Color; 3] = [[226, 70, 70, 255], [110, 190, 70, 255], [80, 130, 240, 255]];
 /// Colour of the handle that is dragged or hovered.
 pub const HIGHLIGHT: Color = [255, 226, 90, 255];
+/// Colour of the centre's handle and of labels.
 pub const CENTER: Color = [245, 245, 245, 255];
 const GRID: Color = [128, 136, 150, 70];
 

@@ -1,9 +1,12 @@
 //! Host and device on one time line, and the median time of each pass.
 
+use std::time::Instant;
+
 use egui::{Align2, Color32, FontId, Rect, Sense, Ui, pos2, vec2};
 
 use super::style::{DIM, GAME, PASSES, RECORD, WAIT, ms};
-use crate::viewer::scene_window::timeline::{Frame, PassTime, Span, Timeline};
+use crate::frame::{FrameTimes, Marks};
+use crate::viewer::scene_window::timeline::{PassTime, Span, Timeline, device_spans, ms_after};
 
 /// Number of frames on the time line.
 const N_FRAMES: usize = 4;
@@ -24,9 +27,10 @@ pub fn show(ui: &mut Ui, timeline: &Timeline) {
     let (area, _) = ui.allocate_exact_size(vec2(ui.available_width(), 3.0 * LANE), Sense::hover());
     // A clip rectangle of its own would be another draw, and a software device pays for each.
     let painter = ui.painter();
-    let begin = oldest.game[0];
-    let points_per_ms = f64::from(area.width() - NAMES) / (newest.end - begin).max(1e-3);
-    let x = |t: f64| area.left() + NAMES + ((t - begin) * points_per_ms) as f32;
+    let zero = oldest.marks.game[0];
+    let at = |t: Instant| ms_after(zero, t);
+    let points_per_ms = f64::from(area.width() - NAMES) / at(newest.marks.end).max(1e-3);
+    let x = |ms: f64| area.left() + NAMES + (ms * points_per_ms) as f32;
     let bar = |lane: usize, [from, to]: Span, color: Color32| {
         let y = area.top() + lane as f32 * LANE;
         let right = x(to).max(x(from) + 0.5);
@@ -39,11 +43,12 @@ pub fn show(ui: &mut Ui, timeline: &Timeline) {
     }
     let passes = timeline.passes();
     for frame in &frames {
-        bar(0, frame.game, GAME);
-        bar(1, frame.record, RECORD);
-        bar(2, [frame.record[1], frame.end], WAIT);
-        for (name, span) in &frame.passes {
-            bar(2, *span, pass_color(&passes, name));
+        let Marks { game, record, end } = frame.marks;
+        bar(0, game.map(at), GAME);
+        bar(1, record.map(at), RECORD);
+        bar(2, [record[1], end].map(at), WAIT);
+        for (name, span) in device_spans(frame, zero) {
+            bar(2, span, pass_color(&passes, name));
         }
     }
 }
@@ -51,15 +56,17 @@ pub fn show(ui: &mut Ui, timeline: &Timeline) {
 /// Adds a bar for each host step and each pass, as long as its median time.
 pub fn show_passes(ui: &mut Ui, timeline: &Timeline) {
     let passes = timeline.passes();
-    let host = |name, color, value: fn(&Frame) -> f64| {
+    let host = |name, color, value: fn(&FrameTimes) -> f64| {
         let p50_ms = timeline.summary(value)?.p50;
         Some((PassTime { name, p50_ms, share: 1.0 }, color))
     };
-    let mut rows: Vec<(PassTime, Color32)> =
-        [host("game step", GAME, |f| f.game_ms), host("recording", RECORD, |f| f.record_ms)]
-            .into_iter()
-            .flatten()
-            .collect();
+    let mut rows: Vec<(PassTime, Color32)> = [
+        host("game step", GAME, |f| f.game_ms),
+        host("recording", RECORD, |f| f.record_ms + f.submit_ms),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
     rows.extend(passes.iter().map(|p| (*p, pass_color(&passes, p.name))));
     let longest = rows.iter().map(|(p, _)| p.p50_ms).fold(1e-3, f64::max);
     for (PassTime { name, p50_ms, share }, color) in rows {

@@ -11,6 +11,7 @@ use crate::viewer::scene_window::knobs::Knob;
 use crate::viewer::scene_window::playback::Seek;
 use crate::viewer::scene_window::status::{ErrorStatus, ViewStatus};
 use crate::viewer::scene_window::view_state::ViewState;
+use crate::viewer::shortcut::Shortcut;
 
 /// Adds a button for each knob. A click sets the knob to its next value, as its key does.
 pub fn knobs(ui: &mut Ui, state: &ViewState, status: &ViewStatus, commands: &mut Vec<Command>) {
@@ -18,8 +19,8 @@ pub fn knobs(ui: &mut Ui, state: &ViewState, status: &ViewStatus, commands: &mut
         let mut row = |name: &str, value: &str, command: Command| {
             ui.label(name);
             let mut button = ui.add(Button::new(RichText::new(value).monospace()).small());
-            if let Some(s) = SHORTCUTS.iter().find(|s| s.command == command) {
-                button = button.on_hover_text(format!("{} ({})", s.description, s.key));
+            if let Some(text) = Shortcut::tooltip(&SHORTCUTS, command) {
+                button = button.on_hover_text(text);
             }
             if button.clicked() {
                 commands.push(command);
@@ -55,8 +56,8 @@ pub fn playback(ui: &mut Ui, state: &ViewState, status: &ViewStatus, commands: &
     if ui.add_enabled(i_last > 0, Slider::new(&mut i_frame, 0..=i_last)).changed() {
         commands.push(Command::Seek(Seek::To(i_frame)));
     }
-    if let Some(frame) = &status.last_frame {
-        let (time_s, n_shown, n) = (frame.time_s, frame.n_shown, frame.n_particles);
+    if let Some(frame) = status.timeline.newest() {
+        let (time_s, n_shown, n) = (frame.time_s, frame.n_shown(), state.scene.n_particles());
         ui.label(format!("{time_s:.3} s, {n_shown} of {n} particles drawn"));
     }
     ui.label(RichText::new(&status.device_name).color(DIM).small());
@@ -69,7 +70,7 @@ fn widen_slider(ui: &mut Ui) {
 
 /// Adds the passes of the last frame, with the reason why each ran or was skipped.
 pub fn plan(ui: &mut Ui, status: &ViewStatus) {
-    let Some(frame) = &status.last_frame else {
+    let Some(frame) = status.timeline.newest() else {
         ui.weak("no frame yet");
         return;
     };

@@ -19,7 +19,7 @@ pub fn show(ui: &mut Ui, timeline: &Timeline) {
     let rows = [
         ("frame", Some(frame)),
         ("game step", timeline.summary(|f| f.game_ms)),
-        ("recording", timeline.summary(|f| f.record_ms)),
+        ("recording", timeline.summary(|f| f.record_ms + f.submit_ms)),
         ("waiting", timeline.summary(|f| f.wait_ms)),
         ("latency", timeline.summary(|f| f.latency_ms)),
     ];

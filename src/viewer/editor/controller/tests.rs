@@ -4,12 +4,10 @@ use super::super::axis::Axis;
 use super::super::fixtures::{editor, unit_box};
 use super::super::input::{Button, ModifierKeys};
 use super::super::settings::DisplayMode;
-use super::super::shortcuts::Chord;
-use glam::DVec3;
-
 use super::*;
 use crate::model::boxes::CloudBox;
 use crate::model::camera::Pose;
+use glam::DVec3;
 use std::path::Path;
 
 const NONE: ModifierKeys = ModifierKeys { ctrl: false, shift: false };
@@ -24,12 +22,8 @@ fn controller_of(boxes: Vec<CloudBox>) -> EditorController {
     let position = DVec3::new(2.0, 0.0, 10.0);
     let pose = Pose { position, right: DVec3::X, up: DVec3::Y, forward: -DVec3::Z };
     let target = DVec3::new(2.0, 0.0, 0.0);
-    EditorController::new(
-        Session::from_file(Path::new("b.dat"), boxes),
-        FlyCamera::new(&pose, DVec3::Y, target),
-        area(),
-        250.0,
-    )
+    let session = Session::from_file(Path::new("b.dat"), boxes);
+    EditorController::new(session, FlyCamera::new(&pose, DVec3::Y, target), area(), 250.0)
 }
 
 /// Unit boxes at x = 0 and 4.

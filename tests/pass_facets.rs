@@ -158,11 +158,7 @@ fn a_wrong_shader_is_noticed() {
         ("include/shell.glsl", "float radius = 3.0 * sigma", "float radius = 3.0001 * sigma"),
         ("facets.comp", "group.i_region,", "i_group[i],"),
         ("facets.comp", "particles[i].color", "particles[0].color"),
-        (
-            "facets.comp",
-            "push.i_first_facet + i]",
-            "push.i_first_facet + (i + 1) % push.n_facets]",
-        ),
+        ("facets.comp", "push.i_first_facet + i]", "push.i_first_facet + (i + 1) % push.n_facets]"),
         ("include/density.glsl", "mix(low, high, f.x)", "mix(low, high, f.y)"),
     ];
     for (file, from, to) in mutations {

@@ -58,12 +58,7 @@ pub fn directions() -> [(DVec3, f64); 14] {
 /// Returns G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of the density ρ smoothed by a
 /// Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ A d). A = diag(1, a, 1) gives the sphere the blob's
 /// shape, so that the gradient is one in the space where the blob is a ball (§14).
-pub(super) fn gradient(
-    density: impl Fn(DVec3) -> f64,
-    p: DVec3,
-    sigma: f64,
-    aspect: f64,
-) -> (DVec3, f64) {
+pub fn gradient(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
     let axes = DVec3::new(1.0, aspect, 1.0);
     directions().iter().fold((DVec3::ZERO, 0.0), |(g, s), &(d, w)| {
         let density = w * density(p + GRADIENT_RADIUS_SIGMA * sigma * axes * d);

@@ -25,20 +25,19 @@ struct Window<'a> {
 
 impl Window<'_> {
     fn takes(&mut self, input: Input) {
-        let requests = self.controller.handle(&input);
+        let request = self.controller.handle(&input);
         let message = self.controller.message();
         assert_eq!(message.filter(|text| !text.starts_with("saved")), None, "{input:?}");
-        for request in requests {
-            let event = match request {
-                Request::ChooseToSave => SessionEvent::ChosenToSave(Some(self.path.to_owned())),
-                Request::Quit => {
-                    self.has_quit = true;
-                    continue;
-                }
-                request => perform(&request).unwrap_or_else(|| panic!("{request:?}")),
-            };
-            self.takes(Input::Event(event));
-        }
+        let event = match request {
+            None => return,
+            Some(Request::ChooseToSave) => SessionEvent::ChosenToSave(Some(self.path.to_owned())),
+            Some(Request::Quit) => {
+                self.has_quit = true;
+                return;
+            }
+            Some(request) => perform(&request).unwrap_or_else(|| panic!("{request:?}")),
+        };
+        self.takes(Input::Event(event));
     }
 
     fn key(&mut self, key: char, ctrl: bool) {

@@ -14,6 +14,7 @@ use nimbus::reference::facets::{
     gradient, smoothstep,
 };
 use nimbus::reference::generate::uniforms;
+use nimbus::reference::grid::sample;
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
 
 use crate::harness::Gpu;
@@ -253,7 +254,8 @@ impl Scene {
     pub fn normal_bound(&self, cells: &[f64], at: &Around, facet: &Facet) -> f64 {
         let center = self.centers()[facet.region as usize];
         let axes = DVec3::new(1.0, at.aspect, 1.0);
-        let (g, s) = gradient(&self.spec, cells, at.p, at.scale, at.aspect);
+        let density = |x| sample(&self.spec, cells, x);
+        let (g, s) = gradient(density, at.p, at.scale, at.aspect);
         // The sample's offset.
         let scale_error = at.scale_error * at.aspect.max(1.0) + at.scale * at.aspect_error;
         let astray = at.p_error + GRADIENT_RADIUS_SIGMA * scale_error;

@@ -1,7 +1,7 @@
 #version 460
 
 // Shows a picture that was composed near to far, or marks the pixels that are saturated, so that
-// later chunks skip them (docs/explanation/passes.md "chunks").
+// later chunks skip them (passes.md "chunks").
 // In: the composed picture, RGBA floats, rows from the top. Out: the pixel's colour; saturated
 // pixels alone where PICKS is 1.
 

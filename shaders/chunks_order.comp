@@ -4,7 +4,7 @@
 #include "each.glsl"
 
 // Reverses the sorted entries to near-to-far order and deals them to chunks of equal size
-// (docs/explanation/passes.md "chunks").
+// (passes.md "chunks").
 // In: n entries (key, particle), far to near. Out: the entries by chunk, and one indirect draw a
 // chunk. Exact: it only copies.
 

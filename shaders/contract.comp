@@ -7,11 +7,11 @@
 #include "sum.glsl"
 
 // Contracts the tensors T1 and T2 with the lights' energies and the materials' coefficients
-// (docs/explanation/model.md §7, §11 "contract").
+// (model.md §7, passes.md "contract").
 // In: facets, lights, regions, coefficients by column, T1 [light][row], T2 (tensor.glsl). Out:
 // irradiance I_d, I_i and radiance L1, L2 of every facet, linear RGB.
 // Law: I = pi sum E T, L = sum E c_b' C T over lights, bases and columns. Source: C (13)-(16).
-// Error bound: that of the sums, of magnitude sum |c_b| max|v_b| (§11 "sums").
+// Error bound: that of the sums, of magnitude sum |c_b| max|v_b| (passes.md "sums").
 
 // N_b: the number of basis functions.
 #ifndef N_BASES

@@ -5,7 +5,7 @@
 #define SCANNED 256
 #include "scan.glsl"
 
-// Scans the tiles' counts of kept particles (docs/explanation/passes.md "cull"). One workgroup;
+// Scans the tiles' counts of kept particles (passes.md "cull"). One workgroup;
 // each invocation owns a run of tiles. In: kept particles of each tile. Out: kept particles before
 // each tile, and the Kept record with the dispatch and draw sizes of the passes to come. Exact:
 // integers.

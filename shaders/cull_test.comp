@@ -5,7 +5,7 @@
 #include "cull.glsl"
 #include "one_subgroup.glsl"
 
-// Tests which drawn particles can show in any pixel (docs/explanation/passes.md "cull").
+// Tests which drawn particles can show in any pixel (passes.md "cull").
 // In: placed particles, their groups, the camera. Out: one bit a particle, and the number of kept
 // particles of each tile of 256.
 // Law: depth >= near, tau > 0, sigma >= the smallest size, and the silhouette's rectangle holds a

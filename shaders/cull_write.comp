@@ -6,7 +6,7 @@
 #include "each.glsl"
 
 // Writes the sort keys of the kept particles, in ascending index and without gaps
-// (docs/explanation/passes.md "cull"). In: cull_test's masks and cull_scan's offsets. Out: entries
+// (passes.md "cull"). In: cull_test's masks and cull_scan's offsets. Out: entries
 // (key, particle). Key: key.glsl.
 
 READS(1, uvec2, masks)

@@ -4,7 +4,7 @@
 #include "each.glsl"
 #include "functions.glsl"
 
-// Makes one lighting facet for each particle (docs/explanation/model.md §5, §11 "facets").
+// Makes one lighting facet for each particle (model.md §5, passes.md "facets").
 // In: placed particles, groups, the density grid (1/length). Out: facets with position, unit
 // normal, area and colour.
 // Law: the normal opposes the gradient of the smoothed density where that is well conditioned, else

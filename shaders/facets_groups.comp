@@ -4,8 +4,8 @@
 #include "each.glsl"
 #include "functions.glsl"
 
-// Makes one lighting facet for each run of particles in Morton order (docs/explanation/model.md §5,
-// §11 "facets"). In: placed particles, their Morton order, the runs. Out: facets, and the facet of
+// Makes one lighting facet for each run of particles in Morton order (model.md §5, passes.md
+// "facets"). In: placed particles, their Morton order, the runs. Out: facets, and the facet of
 // every particle. Law: the run counts as one blob of the members' mean position, spread and colour.
 // Means are taken about the first member, so that a run of one particle gives that particle's facet
 // to the bit.

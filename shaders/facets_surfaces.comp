@@ -4,7 +4,7 @@
 #include "each.glsl"
 
 // Makes the facets of the surfaces: each rectangle's grid, along u first, row by row along v
-// (docs/explanation/model.md §5, §11 "facets").
+// (model.md §5, passes.md "facets").
 // In: regions, the region of each facet. Out: facets with position, normal and area. Error: a few
 // roundings of f32.
 

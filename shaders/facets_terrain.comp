@@ -3,7 +3,7 @@
 #include "records.glsl"
 #include "each.glsl"
 
-// Moves the ground's facets to the place of the ground's origin (docs/explanation/model.md §16).
+// Moves the ground's facets to the place of the ground's origin (model.md §16).
 // In: facets relative to the origin. Out: facets relative to the lighting origin. Error: one
 // rounding.
 

@@ -4,7 +4,7 @@
 #include "each.glsl"
 #include "light.glsl"
 
-// Computes the first reflection toward the eye (docs/explanation/model.md §7, §11 "first").
+// Computes the first reflection toward the eye (model.md §7, passes.md "first").
 // In: facets, lights, transmittance [facet][light], regions, the lobe table. Out: irradiance I_d
 // and radiance L1 of every facet, linear RGB.
 // Law: L1 = K_d c I_d/pi + K_s sum E f S(w). Source: C (15).

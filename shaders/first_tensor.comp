@@ -5,7 +5,7 @@
 #include "light.glsl"
 
 // Computes T1, the first reflection by light and basis, without energies and materials
-// (docs/explanation/model.md §7, §11 "contract").
+// (model.md §7, passes.md "contract").
 // In: facets, lights, transmittance [facet][light], the table of basis functions. Out: T1
 // [light][row], row = basis and facet; cleared Lit records. Source: C (13)-(16).
 

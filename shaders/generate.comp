@@ -4,7 +4,7 @@
 #include "philox.glsl"
 #include "functions.glsl"
 
-// Generates the particles of boxes by bounded rejection (docs/explanation/model.md §1, §11
+// Generates the particles of boxes by bounded rejection (model.md §1, passes.md
 // "generate"). In: boxes, the group of each particle. Out: particles relative to their box's
 // centre, and the attempts that each took. Law and source: P (1)-(11), Fig. 1. Philox4x32-10 gives
 // each attempt's numbers from (seed, box, particle, attempt). Bound: positions lie in the box;

@@ -3,11 +3,11 @@
 #include "records.glsl"
 #include "functions.glsl"
 
-// Deposits each blob's mass into the grid's cells, a workgroup a blob (docs/explanation/model.md
-// §8, §11 "grid"). In: placed particles (lengths), kappa (1/length). Out: fixed-point sums of mass
-// by cell, 64 bits. Law: the Gaussian, cut at 3 sigma and normalised, integrated over each cell.
-// The fixed-point sums do not depend on the order of the atomics. Bound: half a quantum a deposit,
-// and erf_approx's error in the weights.
+// Deposits each blob's mass into the grid's cells, a workgroup a blob (model.md §8, passes.md
+// "grid"). In: placed particles (lengths), kappa (1/length). Out: fixed-point sums of mass by cell,
+// 64 bits. Law: the Gaussian, cut at 3 sigma and normalised, integrated over each cell. The
+// fixed-point sums do not depend on the order of the atomics. Bound: half a quantum a deposit, and
+// erf_approx's error in the weights.
 
 // The host asks for one subgroup, where barriers are cheap.
 #ifndef WORKGROUP

@@ -3,7 +3,7 @@
 #include "buffers.glsl"
 #include "each.glsl"
 
-// Converts the grid's fixed-point sums to density (docs/explanation/passes.md "grid").
+// Converts the grid's fixed-point sums to density (passes.md "grid").
 // In: 64-bit sums by cell. Out: density, extinction per unit length. Error: three roundings.
 
 layout(push_constant) uniform Push {

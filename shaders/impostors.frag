@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 
-// Draws a shell's picture as seen from elsewhere (docs/explanation/passes.md "impostors").
+// Draws a shell's picture as seen from elsewhere (passes.md "impostors").
 // In: the shell's picture, RGBA floats. Out: the pixel's colour.
 // Law: a homography gives the pixel's place in the shell's picture; Catmull-Rom cubics interpolate
 // between its texels.

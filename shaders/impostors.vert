@@ -3,7 +3,7 @@
 #include "strip.glsl"
 
 // Covers the rectangle where the shell shows anything, at the shell's depth
-// (docs/explanation/passes.md "impostors").
+// (passes.md "impostors").
 
 #include "impostors.glsl"
 

@@ -3,7 +3,7 @@
 #include "records.glsl"
 #include "each.glsl"
 
-// Splits the sorted entries into far ones and near ones (docs/explanation/passes.md "impostors").
+// Splits the sorted entries into far ones and near ones (passes.md "impostors").
 // In: entries (key, particle). Out: the entries twice, with NO_PARTICLE in place of the near ones
 // and of the far ones. Exact: it only copies.
 

@@ -6,7 +6,7 @@
 #include "functions.glsl"
 
 // Computes the particles of a disc at a frame's time, each in closed form of (seed, slot, time)
-// (docs/explanation/model.md §2).
+// (model.md §2).
 // In: the disc's record. Out: particles relative to their group's centre. Source: C §2.3.
 
 layout(push_constant) uniform Push {

@@ -3,7 +3,7 @@
 #include "records.glsl"
 #include "each.glsl"
 
-// Computes keys of a Morton order, region after region (docs/explanation/model.md §7, §11
+// Computes keys of a Morton order, region after region (model.md §7, passes.md
 // "morton"). In: facets or placed particles, and their regions' bounds. Out: entries (key, index);
 // the region's number is in the highest bits. NaN goes to cell 0.
 

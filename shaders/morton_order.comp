@@ -3,7 +3,7 @@
 #include "buffers.glsl"
 #include "each.glsl"
 
-// Extracts the indices of sorted entries: place to index (docs/explanation/passes.md "morton").
+// Extracts the indices of sorted entries: place to index (passes.md "morton").
 // Exact: it only copies.
 
 layout(push_constant) uniform Push { uint n_entries; } push;

@@ -5,7 +5,7 @@
 #include "functions.glsl"
 
 // Places particles for this frame: position, as it has grown, + its group's offset + the gusts'
-// displacement (docs/explanation/model.md §11 to §13).
+// displacement (passes.md "place", model.md §12, §13).
 // In: particles, groups, gust modes. Out: positions relative to the lighting origin, and sigma.
 // Error: a few roundings, and sine()'s.
 

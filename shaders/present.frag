@@ -1,7 +1,7 @@
 #version 460
 
 // Shows a picture on a display: over the background, tone-mapped, in sRGB, dithered; or two
-// pictures compared (docs/explanation/passes.md "present").
+// pictures compared (passes.md "present").
 // In: one or two pictures, premultiplied linear RGBA. Out: code values of 8 bits. Error: half a
 // code value, by dithering.
 

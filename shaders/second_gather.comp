@@ -4,9 +4,9 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 
-// Gathers the second reflection as radiance at once, without tensors (docs/explanation/model.md §7,
-// §11 "second"). A workgroup takes a block of receivers of one region and goes through the regions
-// that it can receive light from. In: facets, regions, lights, sources with their fluxes and cell
+// Gathers the second reflection as radiance at once, without tensors (model.md §7, passes.md
+// "second"). A workgroup takes a block of receivers of one region and goes through the regions that
+// it can receive light from. In: facets, regions, lights, sources with their fluxes and cell
 // samples. Out: irradiance I_i and radiance L2 of every facet, linear RGB, and a bound on cells
 // that stayed too wide. Law: I = sum over sources of Lambda G V. Source: C (16). Bound: pair_size
 // and theta limit the form factors' error; `unresolved` bounds the rest.
@@ -122,7 +122,7 @@ float nearest_gap(float gap, float turn) {
     return 0.5 * angle * angle;
 }
 
-// Adds a bound on what a cell that stayed too wide may change (docs/explanation/passes.md
+// Adds a bound on what a cell that stayed too wide may change (passes.md
 // "unresolved").
 void add_unresolved(
     uint i, LoadedSource source, SourceView view, Region emitter, Receiver receiver, float area

@@ -3,7 +3,7 @@
 #include "records.glsl"
 #include "each.glsl"
 
-// Merges sources into clusters, one height of the tree at a time (docs/explanation/model.md §7, §11
+// Merges sources into clusters, one height of the tree at a time (model.md §7, passes.md
 // "tree"). In: the clusters or facets below. Out: clusters with mean place, mean normal, radius,
 // flux and second moments. Error: that of plain sums over at most 4 children.
 

@@ -8,10 +8,10 @@
 #include "cell_samples.glsl"
 #include "iterations.glsl"
 
-// Makes facets the sources of the second reflection (docs/explanation/model.md §7, §11 "second").
+// Makes facets the sources of the second reflection (model.md §7, passes.md "second").
 // In: facets, lights, transmittance, regions. Out: what each facet sends diffusely, and by light
 // the flux that its lobe reflects and the light at its 4 x 4 points.
-// Law: Lambda of §11 "second". Bound: points are kept in 16 bits of their greatest.
+// Law: Lambda of passes.md "second". Bound: points are kept in 16 bits of their greatest.
 
 const float INV_PI = 0.318309886183791;
 

@@ -6,7 +6,7 @@
 #include "tensor.glsl"
 
 // Computes T2 of one light: the second reflection by basis of the receiver and column of the
-// emitters, without energies and materials (docs/explanation/model.md §7, §11 "contract").
+// emitters, without energies and materials (model.md §7, passes.md "contract").
 // In and out: as second_gather.comp, but T2 (tensor.glsl) in place of radiance. Blocks, pairings
 // and cells are those of second_gather.comp. Source: C (13)-(16).
 

@@ -4,7 +4,7 @@
 #include "sort.glsl"
 #include "one_subgroup.glsl"
 
-// Counts the digits of each tile's keys (docs/explanation/passes.md "sort"). In: entries (key,
+// Counts the digits of each tile's keys (passes.md "sort"). In: entries (key,
 // value). Out: table[digit][tile]. Exact: integers.
 
 layout(local_size_x = TILE_INVOCATIONS) in;

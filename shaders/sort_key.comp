@@ -5,7 +5,7 @@
 #include "each.glsl"
 
 // Computes the sort keys of the drawn particles from their view depth relative to the lighting
-// origin; ascending keys run far to near (docs/explanation/passes.md "sort").
+// origin; ascending keys run far to near (passes.md "sort").
 // In: placed particles; the first ones of each group are drawn. Out: entries (key, particle) in
 // ascending index. Error: one dot product.
 

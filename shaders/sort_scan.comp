@@ -6,7 +6,7 @@
 #include "scan.glsl"
 
 // Scans table[digit][tile] to an exclusive prefix sum in one workgroup, an invocation a digit
-// (docs/explanation/passes.md "sort"). Exact: integers.
+// (passes.md "sort"). Exact: integers.
 
 layout(local_size_x = 1 << DIGIT_BITS) in;
 

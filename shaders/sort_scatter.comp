@@ -5,7 +5,7 @@
 #include "one_subgroup.glsl"
 
 // Moves every entry to its place: the table's base for (digit, tile) plus its rank among its digit
-// inside the tile (docs/explanation/passes.md "sort").
+// inside the tile (passes.md "sort").
 // In: entries and the scanned table. Out: entries sorted by one digit; stable.
 
 layout(local_size_x = TILE_INVOCATIONS) in;

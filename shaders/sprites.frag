@@ -10,7 +10,7 @@ layout(binding = 8) uniform usamplerBuffer pool;
 #define SAMPLES_TEXTURE
 #include "texture.glsl"
 
-// Computes a thin Gaussian blob's opacity along the pixel's ray (docs/explanation/model.md §9, §11
+// Computes a thin Gaussian blob's opacity along the pixel's ray (model.md §9, passes.md
 // "sprites"). In: the blob from sprites.vert. Out: premultiplied colour and opacity, 1 - e^-tau.
 // Law: tau = sqrt(2 pi) kappa sigma e^(-b^2/2 sigma^2), b the ray's distance from the centre.
 

@@ -7,10 +7,10 @@
 #include "functions.glsl"
 #include "texture.glsl"
 
-// Draws a screen-aligned quad around each blob's silhouette, far to near (docs/explanation/model.md
-// §9, §11 "sprites"). In: sorted entries, placed particles, radiance of facets. Out: the quad, and
-// the blob for sprites.frag. Bound: the quad is widened by more than its rounding; the pixel's own
-// test decides.
+// Draws a screen-aligned quad around each blob's silhouette, far to near (model.md §9, passes.md
+// "sprites"). In: sorted entries, placed particles, radiance of facets. Out: the quad, and the blob
+// for sprites.frag. Bound: the quad is widened by more than its rounding; the pixel's own test
+// decides.
 
 #include "sprites.glsl"
 READS(0, uvec2, entries)

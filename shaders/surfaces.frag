@@ -6,7 +6,7 @@
 // 1: surfaces hide blobs and are not seen.
 layout(constant_id = 0) const uint DEPTH_ONLY = 0;
 
-// Intersects the pixel's ray with a rectangle (docs/explanation/passes.md "surfaces").
+// Intersects the pixel's ray with a rectangle (passes.md "surfaces").
 // In: the rectangle from surfaces.vert, radiance of facets. Out: depth near/z, and the radiance
 // there, interpolated between facets.
 

@@ -5,7 +5,7 @@
 #include "plane.glsl"
 #include "strip.glsl"
 
-// Draws a screen-aligned quad around the visible part of each rectangle (docs/explanation/passes.md
+// Draws a screen-aligned quad around the visible part of each rectangle (passes.md
 // "surfaces"). The fragment shader's own test decides which pixels the rectangle covers, so that
 // clipping and snapping of far corners do not.
 // In: regions, the camera. Out: the quad, and the rectangle's plane for surfaces.frag.

@@ -7,7 +7,7 @@
 layout(constant_id = 0) const uint DEPTH_ONLY = 0;
 
 // Intersects the pixel's ray with a triangle's plane, no farther out than the triangle reaches
-// (docs/explanation/model.md §16).
+// (model.md §16).
 // In: the triangle from terrain.vert. Out: depth near/z, and the radiance there, interpolated
 // between the corners.
 

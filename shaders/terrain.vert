@@ -4,7 +4,7 @@
 #include "camera.glsl"
 #include "plane.glsl"
 
-// Draws a cell of the ground: a strip of two triangles over four points (docs/explanation/model.md
+// Draws a cell of the ground: a strip of two triangles over four points (model.md
 // §16). The rasteriser decides which pixels they cover. The fragment shader intersects the pixel's
 // ray with the triangle's plane, which the first vertex of each triangle passes on. In: ground
 // facets relative to their origin, radiance. Out: the strip, and a plane and three radiances a

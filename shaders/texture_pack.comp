@@ -6,7 +6,7 @@
 #include "texture.glsl"
 #include "each.glsl"
 
-// Packs the fields into the pool that splats read (docs/explanation/passes.md "texture").
+// Packs the fields into the pool that splats read (passes.md "texture").
 // In: the fields' values. Out: texels with n at their four corners, of their own level and of the
 // next, 16 bits each, so that one fetch serves bilinear interpolation. Error: half a quantum,
 // 2^-13.

@@ -6,7 +6,7 @@
 #include "texture.glsl"
 
 // Transforms waves to the pool's fields: an inverse DFT along rows, then along columns
-// (docs/explanation/passes.md "texture").
+// (passes.md "texture").
 // In: Philox numbers by wave. Out: fields, of which 2t and 2t + 1 are the real and the imaginary
 // part of one transform. A workgroup transforms one row or column of one level.
 

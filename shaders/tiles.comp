@@ -13,7 +13,7 @@
 #endif
 
 // Composes splats near to far, a tile a workgroup, a run of pixels an invocation
-// (docs/explanation/passes.md "tiles"). In: splats, sorted pairs (bin, splat), the ranges of the
+// (passes.md "tiles"). In: splats, sorted pairs (bin, splat), the ranges of the
 // bins. Out: the picture, premultiplied, over the surfaces where there are any. Law: as sprites,
 // but near to far: C += (1 - A) a L, A += (1 - A) a. A pixel that lets less through than
 // push.saturated ends. Bound: (1 - A) of the radiance behind a saturated pixel; power_of_two()'s

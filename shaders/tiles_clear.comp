@@ -4,7 +4,7 @@
 #include "tiles.glsl"
 #include "each.glsl"
 
-// Clears the state of every pixel where one round is not enough (docs/explanation/passes.md
+// Clears the state of every pixel where one round is not enough (passes.md
 // "tiles"). Out: RGBA floats, all 0.
 
 layout(push_constant) uniform Push {

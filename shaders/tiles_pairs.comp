@@ -5,7 +5,7 @@
 #include "variants.glsl"
 #include "tiles.glsl"
 
-// Writes a pair for every bin that a splat of this round can reach (docs/explanation/passes.md
+// Writes a pair for every bin that a splat of this round can reach (passes.md
 // "tiles"). In: splats and their rectangles of tiles. Out: pairs: the bin and, above its number, a
 // bit for each of its tiles that the splat can reach; and the splat. In the order of splats. Bound:
 // conservative; distances are widened by 2^-10.

@@ -5,7 +5,7 @@
 #include "tiles.glsl"
 
 // Finds each bin's range of sorted pairs and deals its tiles to workgroups
-// (docs/explanation/passes.md "tiles"). The order of the ranges does not matter: no two share a
+// (passes.md "tiles"). The order of the ranges does not matter: no two share a
 // pixel. In: sorted pairs. Out: ranges (first pair, end, bin, tile bits), and the dispatch sizes of
 // tiles.comp. Exact: integers.
 

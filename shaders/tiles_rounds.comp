@@ -4,7 +4,7 @@
 #include "tiles.glsl"
 
 // Deals the blocks of splats, near to far, to rounds of as many blocks as the pairs' buffer has
-// room for (docs/explanation/passes.md "tiles"). One invocation: there are a few hundred blocks.
+// room for (passes.md "tiles"). One invocation: there are a few hundred blocks.
 // In: pairs of each block. Out: the rounds with their dispatch sizes. Exact: integers.
 
 layout(local_size_x = 1) in;

@@ -12,7 +12,7 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 #endif
 
-// Projects each blob to a splat, near to far, a block a workgroup (docs/explanation/passes.md
+// Projects each blob to a splat, near to far, a block a workgroup (passes.md
 // "tiles"). In: sorted entries, placed particles, radiance. Out: splats (the conic of the optical
 // depth on the screen), and the bins that each can reach. Bound: rectangles are widened as in
 // blob.glsl.

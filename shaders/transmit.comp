@@ -7,11 +7,11 @@
 #include "occlude.glsl"
 
 // Computes how much of every light arrives at every facet, past the surfaces and through the
-// density grid (docs/explanation/model.md §8, §11 "transmit").
+// density grid (model.md §8, passes.md "transmit").
 // In: facets, lights, regions, the density grid (1/length). Out: transmittance [facet][light], and
 // the clouds' share of it where the second reflection needs it.
 // Law: V = [nothing hides] e^{-(1-g) tau}, tau by midpoint samples of trilinear density.
-// Bound: of the march's sum, §11 "sums"; IN_PLANE for the surfaces.
+// Bound: of the march's sum, passes.md "sums"; IN_PLANE for the surfaces.
 
 // 1: the clouds' transmittance is also stored by itself.
 layout(constant_id = 0) const uint APART = 0;

@@ -4,7 +4,7 @@
 #include "each.glsl"
 #include "upsample.glsl"
 
-// Puts the blobs' smaller picture over the full one (docs/explanation/passes.md "upsample").
+// Puts the blobs' smaller picture over the full one (passes.md "upsample").
 // In: the small picture; with surfaces their picture and both depths. Out: the full picture. An
 // invocation draws a run of 4 N pixels of two rows, which have their taps in the same six rows of
 // small pixels.

@@ -9,6 +9,9 @@
 //! `viewer` shows scenes in windows; `farm` spreads work over machines; `cli` parses the command
 //! line. `reference` holds the f64 twin of every pass, written from the mathematics.
 
+#![warn(missing_docs)]
+#![warn(clippy::missing_errors_doc)]
+
 pub mod cli;
 pub mod error;
 pub mod farm;

@@ -1,5 +1,5 @@
 //! The predicted error of impostors, compared with exact projections of random shells after random
-//! moves and turns of the eye (docs/explanation/model.md §11 "impostors").
+//! moves and turns of the eye (docs/explanation/passes.md "impostors").
 
 use glam::{DQuat, DVec2, DVec3};
 use nimbus::model::impostor::{FarField, Shell, View};

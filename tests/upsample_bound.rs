@@ -1,4 +1,4 @@
-//! Bound on the change of a pixel by a low-resolution picture, model.md §11 "upsample": Lagrange's
+//! Bound on the change of a pixel by a low-resolution picture, passes.md "upsample": Lagrange's
 //! remainder, with the sixth derivatives bounded by majorant power series, and the steps at the
 //! blobs' edges. Random pictures keep it.
 

@@ -1,4 +1,4 @@
-// The light that arrives at each point of a cell (docs/explanation/passes.md "second"). Needs
+// The light that arrives at each point of a cell (passes.md "second"). Needs
 // cell_samples.glsl, reach.glsl, iterations.glsl.
 
 // Returns a lamp's falloff times cosine over one row of points. o: from the row's middle to the

@@ -1,4 +1,4 @@
-// A blob as the camera sees it; both draw paths start from it (docs/explanation/passes.md
+// A blob as the camera sees it; both draw paths start from it (passes.md
 // "sprites"). Needs records.glsl.
 
 #include "camera.glsl"
@@ -30,7 +30,7 @@ float weight_of(Drawn group, uint i) {
 }
 
 // An ellipsoid with an axis along y: values that follow from its aspect a and the camera
-// (docs/explanation/model.md §14).
+// (model.md §14).
 struct Shape {
     // The scene's y along the camera's right, up and forward.
     vec3 y;

@@ -1,5 +1,5 @@
 // A cell of a surface's facet seen at 4 x 4 points. Each point is the middle of a part, whose share
-// in light and shadow is found along straight edges (docs/explanation/passes.md "second"). Needs
+// in light and shadow is found along straight edges (passes.md "second"). Needs
 // light.glsl and occlude.glsl.
 
 // Places of the points along each half axis.

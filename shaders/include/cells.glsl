@@ -1,5 +1,5 @@
 // How a receiver sees one source: as a whole, or cell by cell where the source is too wide for its
-// distance (docs/explanation/model.md §7, §11 "second"). Needs gather.glsl.
+// distance (model.md §7, passes.md "second"). Needs gather.glsl.
 
 // A lobe reaches this many of its widths; beyond it is below e^-8 of its peak.
 const float LOBE_REACH = 4.0;

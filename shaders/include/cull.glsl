@@ -1,4 +1,4 @@
-// Constants that the kernels of `cull` share (docs/explanation/passes.md "cull").
+// Constants that the kernels of `cull` share (passes.md "cull").
 
 // Particles of a tile: eight words of a bit each.
 const uint TILE = 256;

@@ -1,4 +1,4 @@
-// Trilinear density between cell centres, 0 outside their hull (docs/explanation/passes.md
+// Trilinear density between cell centres, 0 outside their hull (passes.md
 // "sample"). Needs `Grid grid` in the push constants and `samplerBuffer density`.
 
 // 1: places and weights are doubles.

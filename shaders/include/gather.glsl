@@ -1,5 +1,5 @@
 // One receiver and one source: what is read, and the form factor between them
-// (docs/explanation/model.md §7, §11 "second"). Needs the buffers of second_gather.comp or
+// (model.md §7, passes.md "second"). Needs the buffers of second_gather.comp or
 // second_tensor.comp.
 
 const float PI_INVERSE = 0.318309886183791;

@@ -1,5 +1,5 @@
 // Tabulated lobes over t = (1 - cos gamma)^(1/4), gamma between the normal and the half vector
-// (docs/explanation/model.md §6). Needs `samplerBuffer table`, one lobe a row.
+// (model.md §6). Needs `samplerBuffer table`, one lobe a row.
 
 const uint N_NODES = 1025;
 

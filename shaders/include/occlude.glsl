@@ -1,5 +1,5 @@
 // Whether a surface's rectangle lies between two points, or before a light
-// (docs/explanation/model.md §7). Both of its sides occlude.
+// (model.md §7). Both of its sides occlude.
 
 // A point lies in a rectangle's plane where its distance is below this share of its distance from
 // the centre: the rounding of its coordinates (a few 2^-24). The rectangle does not hide such a

@@ -1,5 +1,5 @@
 // The surfaces of a pairing that may hide part of an emitting surface from one receiver. They are
-// found once, before the emitter's many sources (docs/explanation/passes.md "second"), and include
+// found once, before the emitter's many sources (passes.md "second"), and include
 // every surface that hides() would find.
 
 // Greatest number of listed occluders; where more remain, all of the pairing's occluders are looked

@@ -1,4 +1,4 @@
-// Whether light reaches a point past all surfaces (docs/explanation/passes.md "transmit"). Needs
+// Whether light reaches a point past all surfaces (passes.md "transmit"). Needs
 // light.glsl, occlude.glsl and regions.glsl; the surfaces are the first regions.
 
 // Whether no surface but the point's own hides the light from p.

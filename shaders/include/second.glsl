@@ -1,5 +1,5 @@
 // The buffers and functions that second_gather.comp and second_tensor.comp share
-// (docs/explanation/model.md §7, §11 "second").
+// (model.md §7, passes.md "second").
 // Needs records.glsl.
 
 #ifndef WORKGROUP

@@ -1,4 +1,4 @@
-// The facet on a blob's shell (docs/explanation/passes.md "facets"). Needs
+// The facet on a blob's shell (passes.md "facets"). Needs
 // records.glsl and functions.glsl.
 
 layout(push_constant) uniform Push {
@@ -15,7 +15,7 @@ WRITES(5, Facet, facets)
 
 #include "density.glsl"
 
-// 1: blobs may be ellipsoids (docs/explanation/model.md §14).
+// 1: blobs may be ellipsoids (model.md §14).
 #ifndef ELLIPSOIDS
 #define ELLIPSOIDS 0
 #endif

@@ -1,4 +1,4 @@
-// Stable radix sort, DIGIT_BITS bits a pass (docs/explanation/passes.md "sort"). A workgroup owns a
+// Stable radix sort, DIGIT_BITS bits a pass (passes.md "sort"). A workgroup owns a
 // tile of 1024 entries, each invocation a run of consecutive ones, so that order inside a tile is
 // the order of (invocation, iteration). Fewer invocations have fewer counters to clear and sum: the
 // host asks for one subgroup, 32 at most.

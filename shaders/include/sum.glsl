@@ -1,4 +1,4 @@
-// How the long sums of light are formed (docs/explanation/passes.md "sums"). SUM1 and SUM3 hold a
+// How the long sums of light are formed (passes.md "sums"). SUM1 and SUM3 hold a
 // sum, ADD adds to it and TOTAL returns it; plain sums of floats are the numbers themselves. Needs
 // GL_EXT_control_flow_attributes.
 

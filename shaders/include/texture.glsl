@@ -1,4 +1,4 @@
-// Textured splats, for every path that draws them (docs/explanation/model.md §9, §11 "texture").
+// Textured splats, for every path that draws them (model.md §9, passes.md "texture").
 // texture_sample_of() computes what a splat needs, once; texture_exponent() returns ln of the
 // factor on tau in a pixel. Needs records, functions and philox; pixels need SAMPLES_TEXTURE and
 // `usamplerBuffer pool`.

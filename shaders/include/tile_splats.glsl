@@ -1,5 +1,5 @@
 // How the invocations of a tile share the splats that they have found and loaded: by subgroup
-// operations, or by shared memory (docs/explanation/passes.md "tiles"). Needs the buffers of
+// operations, or by shared memory (passes.md "tiles"). Needs the buffers of
 // tiles.comp.
 
 // A splat as it lies in the buffers, by fours: a Splat, a SplatTexture where splats have textures,

@@ -1,4 +1,4 @@
-// Constants that the kernels of `tiles` share (docs/explanation/passes.md "tiles").
+// Constants that the kernels of `tiles` share (passes.md "tiles").
 
 // Splats of a block: what one workgroup of tiles_splat makes.
 const uint BLOCK = 256;

@@ -1,4 +1,4 @@
-// A full pixel's value from the blobs' smaller picture (docs/explanation/passes.md "upsample").
+// A full pixel's value from the blobs' smaller picture (passes.md "upsample").
 
 // Full pixels along a side of a small one.
 #ifndef N

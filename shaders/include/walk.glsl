@@ -1,5 +1,5 @@
 // How a receiver walks the sources of a pairing: wholes one by one, deferred ones cell by cell
-// (docs/explanation/passes.md "second"). main() is here, too. The includer defines three functions.
+// (passes.md "second"). main() is here, too. The includer defines three functions.
 // add_whole() adds a source as a whole.
 // add_cell() adds a cell; own: its light is found at its own points, not taken from its facet's.
 // add_unresolved() counts a cell that stayed too wide.

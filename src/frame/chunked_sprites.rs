@@ -1,5 +1,5 @@
 //! Blobs drawn near to far in chunks; between chunks, opaque pixels are excluded
-//! (docs/explanation/passes.md "chunks").
+//! (passes.md "chunks").
 
 use crate::error::{Error, Result};
 use crate::gpu::{

@@ -1,5 +1,5 @@
 //! The cache of an impostor layer: when the layer is drawn, when it is shown again, and at which
-//! depth it begins (docs/explanation/passes.md "impostors"). Its decisions follow from the packets
+//! depth it begins (passes.md "impostors"). Its decisions follow from the packets
 //! since the last reset alone.
 
 use glam::{DMat3, DVec2, DVec3, Vec3};

@@ -1,5 +1,5 @@
 //! The smaller picture that blobs are drawn into, and its upsampling over the full one
-//! (docs/explanation/passes.md "upsample").
+//! (passes.md "upsample").
 
 use super::blob_target::{BlobTarget, TargetSpec, n_chunks};
 use super::buffers::SceneBuffers;

@@ -1,5 +1,5 @@
 //! The layout of the light tensors T1 and T2 of a scene whose materials are edited
-//! (docs/explanation/passes.md "contract").
+//! (passes.md "contract").
 
 use super::features::{Tensors, has_glossy, has_second, is_glossy, is_lit, region_sizes};
 use super::gather_lists::region_pairings;

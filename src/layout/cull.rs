@@ -1,4 +1,4 @@
-//! The record by which `cull` passes on the number of kept particles (docs/explanation/passes.md
+//! The record by which `cull` passes on the number of kept particles (passes.md
 //! "cull").
 
 use crate::layout::record;

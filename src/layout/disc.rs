@@ -1,4 +1,4 @@
-//! The record of a disc of particles at a frame's time (docs/explanation/model.md §2).
+//! The record of a disc of particles at a frame's time (model.md §2).
 
 use glam::DVec3;
 

@@ -8,7 +8,7 @@ use crate::model::surface::Surface;
 use crate::model::terrain::{Terrain, TerrainFacet};
 
 record! {
-    /// A lighting facet (docs/explanation/model.md §5), position relative to the lighting origin.
+    /// A lighting facet (model.md §5), position relative to the lighting origin.
     pub struct FacetRecord {
         /// Centre, scene units.
         position: [f32; 3],
@@ -115,7 +115,7 @@ record! {
         lobe_width: f32,
         /// Greatest half width of its lobe over time.
         lobe_width_most: f32,
-        /// Its first column of the tensors (docs/explanation/passes.md "contract").
+        /// Its first column of the tensors (passes.md "contract").
         i_column: u32,
         /// Its first row of the tensors.
         i_row: u32,

@@ -83,7 +83,7 @@ impl LightRecord {
 }
 
 record! {
-    /// The density grid (docs/explanation/model.md §8).
+    /// The density grid (model.md §8).
     pub struct GridRecord {
         /// Low corner relative to the lighting origin.
         low: [f32; 3],

@@ -191,7 +191,7 @@ impl DrawnRecord {
 }
 
 record! {
-    /// The texture of a group's particles (docs/explanation/passes.md "texture").
+    /// The texture of a group's particles (passes.md "texture").
     pub struct TexturedRecord {
         /// Philox key of each particle's rotation and shift: the cloud's seed.
         seed: u32,

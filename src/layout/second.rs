@@ -1,4 +1,4 @@
-//! Records that the second reflection is gathered from (docs/explanation/model.md §7).
+//! Records that the second reflection is gathered from (model.md §7).
 
 use crate::layout::record;
 

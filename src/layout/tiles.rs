@@ -1,4 +1,4 @@
-//! Records that the kernels of `tiles` pass on (docs/explanation/passes.md "tiles").
+//! Records that the kernels of `tiles` pass on (passes.md "tiles").
 
 use crate::layout::record;
 
@@ -20,7 +20,7 @@ record! {
 }
 
 record! {
-    /// The texture of a splat (docs/explanation/passes.md "texture").
+    /// The texture of a splat (passes.md "texture").
     pub struct SplatTextureRecord {
         /// Rotation and shift from slopes to texels.
         turn: [f32; 4],

@@ -1,5 +1,5 @@
 //! The air that a scene's clouds form in, and the height where a parcel lifted from the ground
-//! becomes saturated (docs/explanation/model.md §4).
+//! becomes saturated (model.md §4).
 
 use super::moisture::{Level, Parcel, Vapour};
 

@@ -1,5 +1,5 @@
 //! Particles whose places are given by a file over time, such as those of a weather model between
-//! its steps (docs/explanation/model.md §15 "Time").
+//! its steps (model.md §15 "Time").
 
 use std::fmt::Debug;
 use std::sync::Arc;

@@ -12,8 +12,8 @@ use super::named::named;
 named! {
     /// Spacing of the lobes that the basis is made from over the range of exponents.
     pub enum Sampling {
-        /// Even spacing in ln n_s, each lobe of unit norm. If the range begins below 1, even in ln(1 +
-        /// n_s).
+        /// Even spacing in ln n_s, each lobe of unit norm. If the range begins below 1, even in
+        /// ln(1 + n_s).
         Log = "log",
         /// Even spacing in n_s, each lobe unscaled, as C has it.
         Uniform = "uniform",

@@ -38,7 +38,7 @@ pub struct Cloud {
 
 named! {
     /// Direction that a cloud's facets face where the density around them has none
-    /// (docs/explanation/passes.md "facets").
+    /// (passes.md "facets").
     pub enum Facing {
         /// Away from the cloud's centre; for a single cloud.
         Outward = "outward",

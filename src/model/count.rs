@@ -1,5 +1,5 @@
 //! Number of a cloud's particles that are drawn, by its distance and size: C (4)–(6),
-//! docs/explanation/model.md §3.
+//! model.md §3.
 
 /// Fraction of a particle below which nothing of a group is drawn: at distances over 14 a, some
 /// 3900 d₀. It keeps every factor within f32. With `conserve` less than this share of the group's

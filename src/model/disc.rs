@@ -1,4 +1,4 @@
-//! Particles from a disc, and their life: C §2.3, docs/explanation/model.md §2. A particle's state
+//! Particles from a disc, and their life: C §2.3, model.md §2. A particle's state
 //! is a closed form of (seed, slot, time), so that any frame can be computed alone.
 
 use glam::DVec3;

@@ -16,7 +16,7 @@ pub struct FrameState {
     pub time_s: f64,
     /// Pose of the camera.
     pub pose: Pose,
-    /// Lighting origin O: centre of the scene's bounds (docs/explanation/passes.md).
+    /// Lighting origin O: centre of the scene's bounds (passes.md).
     pub light_origin: DVec3,
     /// Density grid, relative to O.
     pub grid: GridSpec,

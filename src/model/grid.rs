@@ -1,6 +1,6 @@
 //! The density grid of model.md §8: cells over everything that attenuates light, relative to the
 //! lighting origin. Cells are cubes for round blobs, otherwise as flat as the mean blob
-//! (docs/explanation/model.md §14).
+//! (model.md §14).
 
 use glam::{DVec3, UVec3};
 
@@ -38,8 +38,8 @@ pub struct GridSpec {
 }
 
 impl GridSpec {
-    /// Returns the grid that covers `low`..`high`. Its cells are `aspect` times as high as wide, and
-    /// its longest axis has `n` of them, margin included.
+    /// Returns the grid that covers `low`..`high`. Its cells are `aspect` times as high as wide,
+    /// and its longest axis has `n` of them, margin included.
     pub fn fit(low: DVec3, high: DVec3, n: u32, aspect: f64) -> GridSpec {
         // Bounds without extent still need a cell; there is no other length to take than 1 unit.
         let shape = DVec3::new(1.0, aspect, 1.0);

@@ -1,5 +1,5 @@
 //! Growth of a cloud as a similarity about its own centre, in closed form of time
-//! (docs/explanation/model.md §13).
+//! (model.md §13).
 
 /// Least final scale. Beyond these two the particles would be specks, or cover the scene.
 pub const MIN_SCALE: f64 = 1e-3;

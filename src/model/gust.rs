@@ -1,5 +1,5 @@
 //! Gusts: frozen-spectrum kinematic turbulence that displaces a cloud's particles
-//! (docs/explanation/model.md §12; Kraichnan 1970, Fung et al. 1992). A closed form of time, so
+//! (model.md §12; Kraichnan 1970, Fung et al. 1992). A closed form of time, so
 //! that any frame can be computed alone.
 
 use std::f64::consts::TAU;

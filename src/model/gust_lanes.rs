@@ -1,4 +1,4 @@
-//! The gusts' displacement d(x, t) = Σ a sin(k·x + ω t + φ) (docs/explanation/model.md §12) for
+//! The gusts' displacement d(x, t) = Σ a sin(k·x + ω t + φ) (model.md §12) for
 //! [`LANES`] particles at once.
 //!
 //! The sine has no branch and no call, so that the compiler vectorises the loop over particles.

@@ -1,5 +1,5 @@
 //! Impostors: a picture of distant particles, reused from another view, with a bound on its error
-//! (docs/explanation/passes.md "impostors").
+//! (passes.md "impostors").
 
 use glam::{DMat3, DVec2, DVec3};
 

@@ -1,5 +1,5 @@
 //! Saturation, relative humidity and the lifted condensation level: C (1)–(3),
-//! docs/explanation/model.md §4.
+//! model.md §4.
 
 use super::named::named;
 

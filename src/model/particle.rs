@@ -18,7 +18,7 @@ pub struct Particle {
     pub position: DVec3,
     /// σ along x and z, scene units.
     pub sigma: f64,
-    /// Aspect: σ along y over σ along x and z; 1 for a ball (docs/explanation/model.md §14).
+    /// Aspect: σ along y over σ along x and z; 1 for a ball (model.md §14).
     pub aspect: f64,
     /// κ: peak extinction per unit length.
     pub kappa: f64,

@@ -1,5 +1,5 @@
 //! The low-resolution picture that blobs may be drawn into, and how its pixels lie under the full
-//! one's (docs/explanation/passes.md "upsample").
+//! one's (passes.md "upsample").
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! Width of the keys that particles are sorted by (docs/explanation/passes.md "sort").
+//! Width of the keys that particles are sorted by (passes.md "sort").
 
 /// Bits of the sort key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

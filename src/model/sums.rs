@@ -1,4 +1,4 @@
-//! Formation of the long sums of light (model.md §11 "sums").
+//! Formation of the long sums of light (passes.md "sums").
 
 use super::named::named;
 

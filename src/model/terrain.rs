@@ -1,5 +1,5 @@
 //! Ground under clouds: heights over columns, drawn as triangles between points and lit at the
-//! points (docs/explanation/model.md §16).
+//! points (model.md §16).
 
 use std::sync::Arc;
 

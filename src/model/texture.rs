@@ -1,4 +1,4 @@
-//! Selection of the texture pool's fields for a cloud's particles (docs/explanation/model.md §9).
+//! Selection of the texture pool's fields for a cloud's particles (model.md §9).
 
 /// Number of fields of the pool.
 pub const N_FIELDS: u32 = 8;

@@ -1,4 +1,4 @@
-//! Frustum test of groups of particles (docs/explanation/passes.md "visibility"). It errs towards
+//! Frustum test of groups of particles (passes.md "visibility"). It errs towards
 //! visible.
 
 use glam::{DVec2, DVec3};

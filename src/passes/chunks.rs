@@ -4,7 +4,7 @@
 //! entries, far to near, and their number; the picture that chunks are composed in (four floats a
 //! pixel). Out: the entries near to far and each chunk's draw call; depth 1 where a pixel's
 //! transmittance is below the bound; the composed picture over the target, premultiplied linear
-//! RGBA. Source: docs/explanation/passes.md "chunks". Error: f32 rounding a layer, one rounding to
+//! RGBA. Source: passes.md "chunks". Error: f32 rounding a layer, one rounding to
 //! the target's format, and the light behind opaque pixels.
 
 use crate::error::Result;

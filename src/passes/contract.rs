@@ -2,7 +2,7 @@
 //!
 //! In: T1, T2, the lights' energies, and the regions' materials as coefficients of the basis. Out:
 //! I_d, I_i, L1, L2 in `lit`. Law: L1 = Σ_l E_l Σ_b' c_b' T1, L2 = Σ_l E_l Σ_b' c_b' Σ_columns C
-//! T2. Source: C (13)–(16), docs/explanation/model.md §7, §11. Error: (columns + lights + bases)
+//! T2. Source: C (13)–(16), model.md §7, passes.md. Error: (columns + lights + bases)
 //! roundings of the sums of magnitudes; with another kind of sum, six roundings and the bound of
 //! that kind.
 

@@ -3,7 +3,7 @@
 //! In: placed particles, their extinction, the group of each, the drawn part of every group, the
 //! camera. Out: sort key and index of every kept particle in ascending index, and their number.
 //! Law: near plane, optical depth, bounding rectangle of the silhouette, smallest size. Source:
-//! docs/explanation/passes.md "cull". Error: none that a pixel shows; the error of a smallest size
+//! passes.md "cull". Error: none that a pixel shows; the error of a smallest size
 //! is bounded there.
 
 use super::blobs::{BlobVariant, BlobView, Depths, KeyPush};

@@ -6,7 +6,7 @@
 //! each particle of a run. Law: surfaces row by row. A particle's normal points against the
 //! gradient of the density smoothed to 2σ. Where that is ill conditioned, the normal is blended
 //! toward "away from the cloud's center". The position is p + 1.5 σ n. Source: C §2.4,
-//! docs/explanation/model.md §5, §11. Error: the normal's error grows as 1/(t·conditioning).
+//! model.md §5, passes.md. Error: the normal's error grows as 1/(t·conditioning).
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};

@@ -1,7 +1,7 @@
 //! first: computes the direct irradiance and the first reflection of every facet.
 //!
 //! In: facets, lights, transmittance, regions (materials). Out: I_d and L1, linear RGB. Law: L1 =
-//! K_d/π Σ E V max(0, n·ω), and the sky. Source: C (15), docs/explanation/model.md §7, §8, §11.
+//! K_d/π Σ E V max(0, n·ω), and the sky. Source: C (15), model.md §7, §8, passes.md.
 //! Error: a few ulp a light.
 
 use crate::error::Result;
@@ -86,7 +86,7 @@ record! {
 }
 
 /// The pipeline that fills T1: the first reflection by light and basis function, for `contract` to
-/// sum (docs/explanation/passes.md "contract").
+/// sum (passes.md "contract").
 pub struct FirstTensor {
     kernel: Kernel,
 }

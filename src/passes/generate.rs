@@ -2,7 +2,7 @@
 //!
 //! In: boxes (one a group), group of each particle. Out: particles relative to their box's center,
 //! and for each the number of attempts and whether it was folded back. Law: P (1)–(11) with Philox
-//! counters. Source: P §Shape modeling, docs/explanation/model.md §1. Error: reference/generate.rs
+//! counters. Source: P §Shape modeling, model.md §1. Error: reference/generate.rs
 //! derives the bound on position and radius; a decision nearer to a face than that bound may differ
 //! from f64.
 

@@ -2,7 +2,7 @@
 //!
 //! In: placed particles and their extinction. Out: density (extinction per length), cell (x, y, z)
 //! at x + n_x (y + n_y z). Law: mass-conserving separable deposit. Source:
-//! docs/explanation/model.md §8, §11. Error: at most 2.5e-6 of a weight, of which 3e-7 are from the
+//! model.md §8, passes.md. Error: at most 2.5e-6 of a weight, of which 3e-7 are from the
 //! formula of erf and the rest from rounding (1e-6 measured); and half a quantum of the fixed-point
 //! sum a deposit.
 

@@ -3,7 +3,7 @@
 //! In: sorted entries; an impostor layer (a picture, four floats a texel) and how pixels map to it.
 //! Out: the entries of far and near blobs; the layer under the near blobs, premultiplied linear
 //! RGBA in the film's format. Law: a homography through the plane of one depth, Catmull and Rom's
-//! cubic. Source: Harris & Lastra 2001, docs/explanation/passes.md. Error: positions to 1e-6 of the
+//! cubic. Source: Harris & Lastra 2001, passes.md. Error: positions to 1e-6 of the
 //! picture's extent, and the target's rounding; `model::impostor` predicts the error against the
 //! true view.
 

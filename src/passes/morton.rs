@@ -2,7 +2,7 @@
 //!
 //! In: positions, their regions, and the regions' bounds. Out: sort entries with 32-bit keys; of
 //! sorted entries, the index at each place. Law: the region in the high bits, the Morton code of
-//! the cell within the region's bounds below. Source: docs/explanation/model.md §7, §11. Error: a
+//! the cell within the region's bounds below. Source: model.md §7, passes.md. Error: a
 //! coordinate within some roundings of a cell's face may count to the adjacent cell.
 
 use crate::error::Result;

@@ -3,7 +3,7 @@
 //! In: particles relative to their groups, group of each, the groups' offsets, gust modes. Out:
 //! position relative to the lighting origin, and σ. Law: the place is s × position, plus the
 //! group's offset, plus the sum of a sin(k·x + phase) over the gust's waves; σ is scaled by s.
-//! Source: docs/explanation/model.md §11 to §13. Error: an ulp of the sums and of the scaled
+//! Source: passes.md "place", model.md §12, §13. Error: an ulp of the sums and of the scaled
 //! position; of each wave, |a| times 3.5 ulp of the sine and the argument's rounding.
 
 use crate::error::Result;

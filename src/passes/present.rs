@@ -3,7 +3,7 @@
 //! In: a picture's pixels as its target holds them, and a second picture to compare it with. Out:
 //! sRGB code values of 8 bits; black outside the picture. Law: over the background, times the
 //! exposure, tone map, sRGB, ordered dither, as PNG files are written; or the two pictures side by
-//! side, or their difference. Source: docs/explanation/passes.md "present". Error: 8e-6 of the
+//! side, or their difference. Source: passes.md "present". Error: 8e-6 of the
 //! greatest value, so that a code value differs only where the exact value is that close to the
 //! next; 11 more roundings for a difference.
 

@@ -2,7 +2,7 @@
 //!
 //! In: facets, regions, lights, the facets' light of each, the table of lobes, the density grid.
 //! Out: I_i and L2 in `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16),
-//! docs/explanation/model.md §7, §11. Error: that of the sum, see "sums" there.
+//! model.md §7, passes.md. Error: that of the sum, see "sums" there.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
@@ -293,7 +293,7 @@ impl Second {
 }
 
 /// The pipelines that fill T2: the second reflection by light, basis function of the receiver and
-/// column of the emitters, for `contract` to sum (docs/explanation/passes.md "contract").
+/// column of the emitters, for `contract` to sum (passes.md "contract").
 pub struct SecondTensor {
     gather: Gather,
 }

@@ -3,7 +3,7 @@
 //! In: placed particles, group of each, the drawn part of every group, the camera's forward axis.
 //! Out: key and particle in ascending key, equal keys in ascending index. Law: stable
 //! least-significant-digit radix sort, at most 8 or 9 bits a pass, keys of 16 or 32 bits. Source:
-//! docs/explanation/model.md §9, §11. Error: none in the sort; a key holds the depth to an ulp (32
+//! model.md §9, passes.md. Error: none in the sort; a key holds the depth to an ulp (32
 //! bits) or to 2⁻¹⁶ of the scene (16 bits).
 
 use super::blobs::{Depths, KeyPush};

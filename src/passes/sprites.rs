@@ -2,7 +2,7 @@
 //!
 //! In: sorted entries and the other buffers of blobs, and the depth of surfaces. Out: premultiplied
 //! linear RGBA in the target's format. Law: α = 1 − exp(−√(2π) κ σ e^{−b²/2σ²}), b the distance to
-//! the pixel's ray. Source: P §Rendering, docs/explanation/model.md §9, §11. Error: α to a few 1e-6
+//! the pixel's ray. Source: P §Rendering, model.md §9, passes.md. Error: α to a few 1e-6
 //! relative, and the target's rounding at each layer.
 
 use super::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};

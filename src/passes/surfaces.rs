@@ -2,7 +2,7 @@
 //!
 //! In: regions, lit facets. Out: linear RGBA in the target's format, and depth near/z. Law: L1 + L2
 //! where the pixel's ray meets the rectangle, interpolated between the facets' centers; the back is
-//! black. Source: docs/explanation/model.md §9, §11. Error: the position to 1e-6 of the rectangle's
+//! black. Source: model.md §9, passes.md. Error: the position to 1e-6 of the rectangle's
 //! distance over the cosine, the depth likewise, and the target's rounding.
 
 use crate::error::Result;

@@ -2,7 +2,7 @@
 //!
 //! In: regions, the points of the terrains, lit facets. Out: linear RGBA in the target's format,
 //! and depth near/z. Law: L1 + L2 where the pixel's ray meets the nearest triangle, interpolated
-//! linearly between its points; black from below. Source: docs/explanation/model.md §16. Error: the
+//! linearly between its points; black from below. Source: model.md §16. Error: the
 //! position to 1e-6 of the distance over the cosine, and the target's rounding. An edge pixel may
 //! show another triangle within 1/16 of a pixel, Vulkan's guarantee for the position of vertices.
 

@@ -3,7 +3,7 @@
 //! In: a seed. Out: the pool: for each field, level and texel the noise at the texel's four
 //! corners, of its level and of the next coarser one, 16 bits each. Law: waves of random phase,
 //! |F| ∝ |k|^−1.7, by an inverse fast Fourier transform. Source: P's pool of textures,
-//! docs/explanation/model.md §9, and "texture" of §11. Error: at most 1.3e-3 of the noise's unit
+//! model.md §9, and "texture" of passes.md. Error: at most 1.3e-3 of the noise's unit
 //! root mean square, 2e-5 root mean square, and half a quantum of 2⁻¹².
 
 use crate::error::Result;

@@ -1,9 +1,9 @@
 //! tiles: composes the blobs in compute shaders, a tile of pixels a workgroup.
 //!
 //! In: drawn particles far to near, their places, the facets' light. Out: the picture in a buffer,
-//! rows from the top, in the film's format. Law: that of `sprites` (docs/explanation/model.md §9,
-//! §11 "sprites", "tiles"), composed near to far in f32 and rounded once. Error: f32 rounding in
-//! each layer, one rounding to the format, and the light behind pixels whose transmittance is below
+//! rows from the top, in the film's format. Law: that of `sprites` (model.md §9, passes.md
+//! "sprites", "tiles"), composed near to far in f32 and rounded once. Error: f32 rounding in each
+//! layer, one rounding to the format, and the light behind pixels whose transmittance is below
 //! `saturated`.
 
 mod division;

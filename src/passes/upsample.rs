@@ -3,7 +3,7 @@
 //! In: the blobs alone in a smaller picture; the surfaces' full picture and the depth that the
 //! pixels of both pictures see. Out: the picture in a buffer, rows from the top, in the film's
 //! format. Law: Lagrange polynomials of degree five through 6 × 6 small pixels, fewer beside edges
-//! of depth, premultiplied "over" (docs/explanation/passes.md "upsample"). Error: about forty f32
+//! of depth, premultiplied "over" (passes.md "upsample"). Error: about forty f32
 //! roundings of the sum of the weights' magnitudes, and one rounding to the format.
 
 use crate::error::Result;

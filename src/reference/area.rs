@@ -1,4 +1,4 @@
-//! Light of reflections integrated over the areas of surfaces, model.md §11 "area reference": the
+//! Light of reflections integrated over the areas of surfaces, passes.md "area reference": the
 //! law that sums over pairs of facets approximate.
 //!
 //! In: surfaces with a material each, lights, blobs, facets of clouds. Out: radiance toward the eye

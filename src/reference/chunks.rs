@@ -1,4 +1,4 @@
-//! Sprites in chunks, model.md §11 "chunks": thin blobs composed near to far by blending each layer
+//! Sprites in chunks, passes.md "chunks": thin blobs composed near to far by blending each layer
 //! under the picture, in f64, with a bound on what a device may differ that blends in f32.
 //!
 //! In: blobs and eye relative to O, an order far to near. Out: the same picture as `sprites`.

@@ -1,4 +1,4 @@
-//! The sums of C (13)–(16) over the tensors, model.md §7 and §11 "contract".
+//! The sums of C (13)–(16) over the tensors, model.md §7 and passes.md "contract".
 //!
 //! In: T1 [light][row], T2 [light][column][row], the lights' energies, the columns' coefficients.
 //! Out: I_d and I_i (W m⁻²), L1 and L2 (W m⁻² sr⁻¹), RGB a facet.

@@ -1,4 +1,4 @@
-//! Culling of particles that no pixel shows, model.md §11 "cull". In: blobs and eye relative to O.
+//! Culling of particles that no pixel shows, passes.md "cull". In: blobs and eye relative to O.
 //! Out: whether each is kept.
 
 use glam::DVec3;

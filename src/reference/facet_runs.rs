@@ -1,5 +1,5 @@
-//! Facets of runs of particles, model.md §5 and §11 "facets": a run of particles in Morton order is
-//! merged to one blob, which has one facet.
+//! Facets of runs of particles, model.md §5 and passes.md "facets": a run of particles in Morton
+//! order is merged to one blob, which has one facet.
 //!
 //! In: the density grid, the placed blobs and the runs. Out: facets as in [`super::facets`], with
 //! their colours.

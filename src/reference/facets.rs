@@ -1,6 +1,6 @@
-//! Facets of cloud particles, model.md §5 and §11 "facets". A facet lies on its blob's shell. Its
-//! normal follows the density's gradient if that has a direction, and otherwise points away from
-//! the cloud's centre.
+//! Facets of cloud particles, model.md §5 and passes.md "facets". A facet lies on its blob's shell.
+//! Its normal follows the density's gradient if that has a direction, and otherwise points away
+//! from the cloud's centre.
 //!
 //! In: the density grid and the placed blobs. Out: positions relative to O, unit normals, areas in
 //! scene units².

@@ -1,4 +1,5 @@
-//! The first reflection, C (15) and §2.5 (2), diffuse basis only: model.md §7 and §11 "first".
+//! The first reflection, C (15) and §2.5 (2), diffuse basis only: model.md §7 and passes.md
+//! "first".
 //!
 //! In: positions and normals, transmittance [facet][light], lights relative to O. Out: irradiance
 //! (W m⁻²) and radiance L1 (W m⁻² sr⁻¹), RGB a facet.
@@ -45,7 +46,7 @@ pub fn radiance(
 /// ([`basis::evaluate`]'s tables).
 ///
 /// γ lies between the normal and the half vector of `toward` the light and `outgoing`. Lobes are 0
-/// for the sky, and where the eye is behind the facet (model.md §11 "contract").
+/// for the sky, and where the eye is behind the facet (passes.md "contract").
 pub fn responses(
     light: &Light,
     g: f64,

@@ -1,4 +1,5 @@
-//! Particles from boxes: P (1)–(11) and Fig. 1 in both forms, as in model.md §1 and §11 "generate".
+//! Particles from boxes: P (1)–(11) and Fig. 1 in both forms, as in model.md §1 and passes.md
+//! "generate".
 //!
 //! In: a box, its index within its cloud, the cloud's seed. Out: positions relative to the box's
 //! centre (scene units), radii before `radius_scale`, σ and κ after it. `rounding.rs` bounds what
@@ -121,7 +122,7 @@ pub fn decision_margin(v: DVec3, half: DVec3) -> f64 {
     out.max_element().abs()
 }
 
-/// Mirrors `v` at ±`half` until it lies between (model.md §11 "generate").
+/// Mirrors `v` at ±`half` until it lies between (passes.md "generate").
 pub fn fold(v: f64, half: f64) -> f64 {
     if half <= 0.0 {
         return 0.0;

@@ -1,6 +1,6 @@
-//! The density grid, model.md §8 and §11 "grid", "sample": blobs' mass deposited conservatively
-//! into cells and sampled trilinearly, and the closed form of the optical depth that the grid
-//! approximates.
+//! The density grid, model.md §8 and passes.md "grid", "sample": blobs' mass deposited
+//! conservatively into cells and sampled trilinearly, and the closed form of the optical depth that
+//! the grid approximates.
 //!
 //! Densities are extinction per unit length. Cell (x, y, z) is at index x + n_x (y + n_y z).
 

@@ -1,4 +1,4 @@
-//! An impostor's picture seen from another view, model.md §11 "impostors": the mapping of points,
+//! An impostor's picture seen from another view, passes.md "impostors": the mapping of points,
 //! resampling, and the partition of the sorted particles.
 //!
 //! In: pictures as [C_r, C_g, C_b, A], rows from the top; sorted entries. Out: the same.

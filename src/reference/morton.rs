@@ -1,4 +1,4 @@
-//! Keys of a Morton order within each region, model.md §7 and §11 "morton".
+//! Keys of a Morton order within each region, model.md §7 and passes.md "morton".
 
 use glam::DVec3;
 

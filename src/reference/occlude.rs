@@ -1,5 +1,5 @@
 //! Surfaces as rectangles, and whether they hide one point from another or a light from a point:
-//! model.md §11 "transmit".
+//! passes.md "transmit".
 
 use glam::{DVec2, DVec3};
 

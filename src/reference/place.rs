@@ -1,5 +1,5 @@
 //! Placement: from group-relative positions to positions relative to the lighting origin O,
-//! model.md §11 "Frames of reference", §12, §13. All in f64; the GPU rounds the offset once and the
+//! passes.md "Frames of reference", §12, §13. All in f64; the GPU rounds the offset once and the
 //! sum once.
 
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! A picture as a display shows it, model.md §11 "present".
+//! A picture as a display shows it, passes.md "present".
 //!
 //! In: premultiplied linear RGBA. Out: sRGB code values before they are rounded down: 255 times
 //! `Film::display`, plus the dither. Two pictures are shown side by side, or as their difference.

@@ -187,7 +187,7 @@ const BLOCK: u64 = 8;
 const LAST_PART: u32 = 11;
 
 /// Returns a bound on the error of a sum of `n` f32 numbers, formed as `sums` says and rounded to
-/// f32, as a share of the sum of their magnitudes (model.md §11 "sums").
+/// f32, as a share of the sum of their magnitudes (passes.md "sums").
 pub fn sum_error(sums: Sums, n: u64) -> f64 {
     let of = |u: f64| match sums.summation {
         Summation::Plain => roundings(n.saturating_sub(1), u),

@@ -1,4 +1,4 @@
-//! Sort keys by view depth and their stable order, model.md §11 "sort". Ascending keys run far to
+//! Sort keys by view depth and their stable order, passes.md "sort". Ascending keys run far to
 //! near.
 
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! Sprites, model.md §9 and §11 "sprites": thin blobs composed far to near with premultiplied
+//! Sprites, model.md §9 and passes.md "sprites": thin blobs composed far to near with premultiplied
 //! "over", in f64, with a bound on what a target of few bits may differ.
 //!
 //! In: blobs and eye relative to O, an order. Out: [row][column] of [C_r, C_g, C_b, A], row 0 at

@@ -1,5 +1,5 @@
-//! Drawing of surfaces, model.md §9 and §11 "surfaces": opaque rectangles, the nearest in every
-//! pixel, in f64.
+//! Drawing of surfaces, model.md §9 and passes.md "surfaces": opaque rectangles, the nearest in
+//! every pixel, in f64.
 //!
 //! In: rectangles and eye relative to O, radiance of every facet (W m⁻² sr⁻¹, RGB). Out:
 //! [row][column] of colour and view depth, row 0 at the top.

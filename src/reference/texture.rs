@@ -1,5 +1,5 @@
-//! The pool of textures and the part of it that a splat shows: model.md §9, §11 "texture". The
-//! fields are sums of waves term by term, not fast transforms.
+//! The pool of textures and the part of it that a splat shows: model.md §9, passes.md "texture".
+//! The fields are sums of waves term by term, not fast transforms.
 //!
 //! In: a seed; a particle. Out: n at every texel of every level; ln of the factor on τ.
 

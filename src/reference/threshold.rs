@@ -1,4 +1,4 @@
-//! Layers that a threshold and a smallest size omit from a picture, model.md §11 "threshold" and
+//! Layers that a threshold and a smallest size omit from a picture, passes.md "threshold" and
 //! "cull", in f64. In: blobs and eye relative to O. Out: number and optical depth of the omitted
 //! layers of every pixel.
 

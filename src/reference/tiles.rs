@@ -1,4 +1,4 @@
-//! Sprites in tiles, model.md §11 "tiles": thin blobs composed near to far, in f64, with a bound on
+//! Sprites in tiles, passes.md "tiles": thin blobs composed near to far, in f64, with a bound on
 //! what f32 in that order may differ.
 //!
 //! In: blobs and eye relative to O, an order far to near. Out: the same picture as `sprites`.

@@ -1,5 +1,5 @@
 //! Transmittance from every facet to every light: past the surfaces and through the density grid,
-//! model.md §8 and §11 "transmit".
+//! model.md §8 and passes.md "transmit".
 //!
 //! In: grid, rectangles, facets and lights, all relative to O. Out: [facet][light], dimensionless.
 

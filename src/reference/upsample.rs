@@ -1,4 +1,4 @@
-//! Composition of the blobs' low-resolution picture over the full one, model.md §11 "upsample", in
+//! Composition of the blobs' low-resolution picture over the full one, passes.md "upsample", in
 //! f64.
 //!
 //! In: the small picture, of blobs alone; with surfaces their picture, and near/z of small and full

@@ -35,7 +35,7 @@ impl View {
         (tan * f64::from(self.width) / f64::from(self.height), tan)
     }
 
-    /// Returns b²/2σ² where a sprite of central optical depth `tau` ends (model.md §11
+    /// Returns b²/2σ² where a sprite of central optical depth `tau` ends (passes.md
     /// "threshold"). If it is not positive nothing is drawn.
     pub fn cut(&self, tau: f64) -> f64 {
         // Without a threshold the logarithm is infinite, or NaN for 0/0, which `min` ignores.
@@ -43,7 +43,7 @@ impl View {
     }
 
     /// Returns by how much a blob's σ exceeds the smallest drawn width, `c` its offset from the
-    /// eye; if negative the blob is not drawn (model.md §11 "cull"). The second value bounds a
+    /// eye; if negative the blob is not drawn (passes.md "cull"). The second value bounds a
     /// device's error, with `depth` as in [`super::composite::Rounding`].
     pub fn above_smallest(&self, blob: &Blob, c: DVec3, depth: f64) -> (f64, f64) {
         let width = self.smallest * self.pixel();

@@ -1,4 +1,4 @@
-//! The volume that sprites approximate, model.md §11 "volume": emission and absorption of
+//! The volume that sprites approximate, passes.md "volume": emission and absorption of
 //! overlapping Gaussian blobs along every pixel's ray, in f64, with an error estimate.
 //!
 //! In: blobs and eye relative to O, a radiance a blob, the background. Out: [C_r, C_g, C_b, A] a
@@ -20,7 +20,7 @@ use piece::{RayBlob, RayIntegral, RayIntegrator};
 pub struct Pixel {
     /// Premultiplied colour and alpha.
     pub color: [f64; 4],
-    /// Estimated error of the radiance, greatest channel (model.md §11 "volume").
+    /// Estimated error of the radiance, greatest channel (passes.md "volume").
     pub error: f64,
 }
 

@@ -138,7 +138,7 @@ fn direction(angle: f64) -> [f32; 2] {
     [angle.sin() as f32, angle.cos() as f32]
 }
 
-/// Evaluates the half vector's gap of docs/explanation/model.md §6 for pairs of directions (ax, az,
+/// Evaluates the half vector's gap of model.md §6 for pairs of directions (ax, az,
 /// bx, bz) about the normal z, and with the directions exchanged.
 fn gaps(
     ctx: &mut StressContext,

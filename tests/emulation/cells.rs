@@ -1,5 +1,5 @@
-//! Light from a facet by its cells, and from cells by 4 × 4 points: model.md §11 "second",
-//! *Closely*.
+//! Light from a facet by its cells, and from cells by 4 × 4 points: passes.md "second",
+//! *Refinement*.
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! Clusters of facets that send light as one: model.md §11 "tree".
+//! Clusters of facets that send light as one: passes.md "tree".
 
 use std::f64::consts::FRAC_1_PI;
 use std::ops::Range;

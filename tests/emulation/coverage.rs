@@ -1,6 +1,6 @@
-//! Coverage of a cell's parts by a rectangle: model.md §11 "second", *Edges*. Five functions,
-//! linear over the cell, are positive behind the rectangle and within its edges; each acts as a
-//! ramp over a part.
+//! Coverage of a cell's parts by a rectangle: passes.md "second", *Edges at a point*. Five
+//! functions, linear over the cell, are positive behind the rectangle and within its edges; each
+//! acts as a ramp over a part.
 
 use glam::{DVec2, DVec3};
 

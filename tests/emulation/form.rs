@@ -1,4 +1,4 @@
-//! Form factors and lobes: model.md §11 "second", *Form*.
+//! Form factors and lobes: passes.md "second", *Form factor*.
 
 use std::f64::consts::FRAC_1_PI;
 

@@ -1,4 +1,4 @@
-//! Emulation of the pass `second`: its own approximation of C (16) in f64, model.md §7, §11
+//! Emulation of the pass `second`: its own approximation of C (16) in f64, model.md §7, passes.md
 //! "second" and "tree". A running bound tells how far an f32 evaluation may differ.
 //!
 //! The law itself is `nimbus::reference::area::AreaScene::second`, an integral over the facets. The

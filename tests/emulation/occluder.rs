@@ -1,5 +1,5 @@
-//! Shadows of rectangles on balls, and the rectangles that can matter: model.md §11 "second",
-//! *Rims*.
+//! Shadows of rectangles on balls, and the rectangles that can matter: passes.md "second",
+//! *Shadow edges*.
 
 use std::f64::consts::SQRT_2;
 

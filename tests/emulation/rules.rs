@@ -1,4 +1,4 @@
-//! Rules of the second reflection's approximation (model.md §7, §11 "second"): when a pair of
+//! Rules of the second reflection's approximation (model.md §7, passes.md "second"): when a pair of
 //! facets, or a cluster, is taken as one and when it is divided. The shaders declare the same
 //! numbers, and `tests/layout.rs` compares them.
 

@@ -1,4 +1,4 @@
-//! Light that a facet receives from the lights and sends on, and the shadows on it: model.md §11
+//! Light that a facet receives from the lights and sends on, and the shadows on it: passes.md
 //! "second".
 
 use std::f64::consts::PI;

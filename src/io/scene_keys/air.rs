@@ -1,4 +1,4 @@
-//! Table `[air]`, and the heights of clouds' bases in it (docs/explanation/model.md §4).
+//! Table `[air]`, and the heights of clouds' bases in it (model.md §4).
 
 use super::key::{Keys, keys, read_table};
 use super::spec::{Spec, choice, flag, number, one_of};

@@ -1,4 +1,4 @@
-//! Keys of a `[[cloud]]` whose particles come from a disc (docs/explanation/model.md §2).
+//! Keys of a `[[cloud]]` whose particles come from a disc (model.md §2).
 
 use super::air::{BASE, Base, read_base};
 use super::key::{Keys, keys};

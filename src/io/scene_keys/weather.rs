@@ -1,4 +1,4 @@
-//! Keys of a `[[cloud]]` whose particles come from a weather file (docs/explanation/model.md §15).
+//! Keys of a `[[cloud]]` whose particles come from a weather file (model.md §15).
 
 use std::sync::Arc;
 

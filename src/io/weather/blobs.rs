@@ -1,4 +1,4 @@
-//! Blobs of one step of a weather file as particles (docs/explanation/model.md §15).
+//! Blobs of one step of a weather file as particles (model.md §15).
 
 use glam::DVec3;
 use sha2::{Digest, Sha256};

@@ -1,5 +1,5 @@
 //! Particles of a weather file at any time, interpolated between steps that are near enough
-//! (docs/explanation/model.md §15 "Time").
+//! (model.md §15 "Time").
 
 use std::fmt;
 use std::sync::Arc;

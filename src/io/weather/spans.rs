@@ -1,5 +1,5 @@
 //! Blobs of a weather file between two steps. A span is made once, ahead of its use by a thread
-//! (docs/explanation/model.md §15 "Time").
+//! (model.md §15 "Time").
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;

@@ -1,5 +1,5 @@
 //! Output of WRF: the meaning of its variables, and a step of them as a grid with extinction
-//! (docs/explanation/model.md §15).
+//! (model.md §15).
 
 use std::path::{Path, PathBuf};
 
@@ -145,8 +145,8 @@ fn list(names: &[&str]) -> String {
     }
 }
 
-/// Returns the shape and the number of steps of P, which has a value for each cell, from the lengths
-/// of its dimensions.
+/// Returns the shape and the number of steps of P, which has a value for each cell, from the
+/// lengths of its dimensions.
 fn shape_of(lengths: &[u64]) -> Checked<(Shape, usize)> {
     let [n_steps, nz, ny, nx] = *lengths else {
         return Err(format!(

@@ -1,5 +1,5 @@
 //! Temperature, humidity and density of air, with the formulas and constants of wrf-python (NCAR),
-//! docs/explanation/model.md §15.
+//! model.md §15.
 
 use crate::model::moisture::{Saturation, Vapour};
 

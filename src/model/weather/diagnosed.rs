@@ -1,5 +1,5 @@
 //! Clouds diagnosed from relative humidity where a file has no cloud water,
-//! docs/explanation/model.md §15. Outputs label them "diagnosed".
+//! model.md §15. Outputs label them "diagnosed".
 
 use super::air::{
     EPSILON, GRAVITY, HEAT_CAPACITY, R_DRY, dry_density, relative_humidity, saturation_ratio,

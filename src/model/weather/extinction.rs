@@ -1,5 +1,5 @@
 //! Extinction of droplets and crystals in m⁻¹ from their mixing ratios, by geometric optics of
-//! spheres, docs/explanation/model.md §15.
+//! spheres, model.md §15.
 
 use crate::model::moisture::T0_K;
 

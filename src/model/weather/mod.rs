@@ -1,5 +1,5 @@
 //! Clouds of a weather model as plain arrays: from pressure, temperature and mixing ratios on WRF's
-//! grid to extinction in m⁻¹, and from extinction to blobs (docs/explanation/model.md §15). No
+//! grid to extinction in m⁻¹, and from extinction to blobs (model.md §15). No
 //! files: `io::weather` reads them.
 //!
 //! Arrays are ordered as in the files: level by level from the ground, each level row by row from

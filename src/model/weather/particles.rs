@@ -1,5 +1,5 @@
 //! Blobs for cells: how many each cell gets, where they lie, and the extinction that preserves the
-//! cell's mass (docs/explanation/model.md §15).
+//! cell's mass (model.md §15).
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,7 +15,7 @@ pub const THIN: f64 = 1e-3;
 /// Number of blobs for each of which one blob may serve thin columns.
 pub const AFFORDED: usize = 10;
 /// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other,
-/// narrower ones leave gaps (errors: docs/explanation/model.md §15).
+/// narrower ones leave gaps (errors: model.md §15).
 pub const SPREAD: f64 = 0.45;
 /// Additional distance of the centres from a cell's edge, σ_xy. Thick clouds then leak less into
 /// clear columns, and the loss between two cloudy cells is small.

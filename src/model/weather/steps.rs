@@ -2,7 +2,7 @@
 
 /// Longest interval that is interpolated, s. Blobs on fixed seeds are off by half of their spread
 /// between steps 10 minutes apart, and by three quarters between steps 3 hours apart
-/// (docs/explanation/model.md §15).
+/// (model.md §15).
 pub const LONGEST_INTERPOLATED_S: f64 = 600.0;
 
 const SECONDS_A_DAY: f64 = 86_400.0;
@@ -84,10 +84,10 @@ pub fn first_out_of_order(times_s: &[f64]) -> Option<usize> {
     times_s.windows(2).position(|w| !is_later(w)).map(|i| i + 1)
 }
 
-/// Returns the step before `t_s`, of steps at rising `times_s`, and the weight of the step after it;
-/// the step itself has the rest. Steps at most [`LONGEST_INTERPOLATED_S`] apart are interpolated
-/// linearly; otherwise the earlier one counts. The first step stands for all earlier times, the last
-/// for all later ones. `None` without steps or for NaN.
+/// Returns the step before `t_s`, of steps at rising `times_s`, and the weight of the step after
+/// it; the step itself has the rest. Steps at most [`LONGEST_INTERPOLATED_S`] apart are
+/// interpolated linearly; otherwise the earlier one counts. The first step stands for all earlier
+/// times, the last for all later ones. `None` without steps or for NaN.
 pub fn between(times_s: &[f64], t_s: f64) -> Option<(usize, f64)> {
     if times_s.is_empty() || t_s.is_nan() {
         return None;

@@ -17,7 +17,7 @@ use crate::reference::occlude::{Rectangle, Source};
 impl AreaScene<'_> {
     /// Returns L2 toward the unit vector `toward`, and I_i, with error estimates.
     ///
-    /// *Source*: C (16); model.md §7, §11 "area reference".
+    /// *Source*: C (16); model.md §7, passes.md "area reference".
     pub fn second(&self, at: &Receiver, toward: DVec3, accuracy: &Accuracy) -> Estimate {
         let (mut regions, mut cells) = (Vec::new(), Vec::new());
         for (i_surface, rectangle) in self.rectangles.iter().enumerate() {

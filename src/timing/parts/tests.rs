@@ -19,7 +19,8 @@ fn mode(threading: &str, p50_ms: f64) -> Mode {
     let of = Summary::of(&[p50_ms]);
     let mode = json!({
         "threading": threading, "skip": true, "simulate": "gpu", "frames": N_ROUNDS * N_FRAMES,
-        "warm_up": N_WARM_UP, "blocks": N_ROUNDS, "impostors_reused": 0, "passes": [], "image_hash": "ab".repeat(32),
+        "warm_up": N_WARM_UP, "blocks": N_ROUNDS, "impostors_reused": 0, "passes": [],
+        "image_hash": "ab".repeat(32),
     });
     let mode: Mode = serde_json::from_value(mode).unwrap();
     Mode { frame_ms: of.map(|of| Measured { of, p50_low: None, p50_high: None }), ..mode }
@@ -98,7 +99,8 @@ fn part(range: Range<usize>) -> Part {
     let rows = rows.collect();
     let run = json!({
         "schema": Run::SCHEMA, "nimbus": "0.1.0", "revision": "0123456789ab",
-        "date": "2024-02-29T12:34:56Z", "command": ["nimbus", "bench", "a.toml"], "scene_hash": "ab".repeat(32), "scene": {},
+        "date": "2024-02-29T12:34:56Z", "command": ["nimbus", "bench", "a.toml"],
+        "scene_hash": "ab".repeat(32), "scene": {},
         "device": {
             "name": "llvmpipe", "driver": "Mesa", "api": "1.3.230", "type": "cpu",
             "uuid": "00".repeat(16),

@@ -55,7 +55,7 @@ impl Document {
     ///
     /// The particles of a box follow from the cloud's seed, the index of the box, and the box.
     /// Their places relative to the box's centre do not depend on that centre
-    /// (docs/explanation/model.md §1). A box that only moves keeps its particles. A deleted box
+    /// (model.md §1). A box that only moves keeps its particles. A deleted box
     /// changes the indices of the later ones.
     pub fn regenerated_since(&self, before: &Document) -> Vec<usize> {
         let is_kept = |i: &usize| {

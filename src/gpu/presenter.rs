@@ -154,11 +154,6 @@ impl PresentQueue {
     /// Returns an image's place in the swapchain; none where the window system has none yet.
     fn acquire(&self, i_slot: usize) -> PresentResult<Option<usize>> {
         let (timeout, ready) = (ACQUIRE_TIMEOUT.as_nanos() as u64, self.ready[i_slot]);
-        // The layer's synchronization validation (1.4.309) loses an acquire that runs while another
-        // thread submits, and reports WRITE_AFTER_PRESENT at the next present of the image
-        // (KhronosGroup/Vulkan-ValidationLayers#8576). Vulkan allows both calls at once, so only a
-        // validated run takes the queue's lock here.
-        let _queue = self.shared.instance.vulkan.has_validation.then(|| self.shared.lock_queue());
         match unsafe { self.loader.acquire_next_image(self.raw, timeout, ready, vk::Fence::null()) }
         {
             // A suboptimal image is presented all the same: its semaphore is signalled.

@@ -147,12 +147,29 @@ unsafe extern "system" fn on_message(
                 |s: Option<&CStr>| s.map_or_else(String::new, |s| s.to_string_lossy().into());
             let id = text(data.message_id_name_as_c_str());
             let message = text(data.message_as_c_str());
-            // Newer layers name the rule beside the message instead of in it.
-            let is_named = message.contains(&id);
-            deliver(objects, if is_named { message } else { format!("{id}: {message}") });
+            if !is_error_of_layer(&id, &message) {
+                // Newer layers name the rule beside the message instead of in it.
+                let is_named = message.contains(&id);
+                deliver(objects, if is_named { message } else { format!("{id}: {message}") });
+            }
         }
     }
     vk::FALSE
+}
+
+/// Returns whether a message is a known error of the layer: two presents of one swapchain image are
+/// said to conflict.
+///
+/// Layers from 1.4.304 to 1.4.357 at least report this if one thread submits while another acquires
+/// and presents (KhronosGroup/Vulkan-ValidationLayers issues 8576, 10586 and 13117). The order of
+/// the two presents needs no semaphore of ours: an image can be presented again only once
+/// vkAcquireNextImageKHR has returned it, and another rule reports a present of an image that was
+/// not acquired (VUID-VkPresentInfoKHR-pImageIndices-01430). So the message never tells of a fault
+/// of the program. A conflict of drawing with a present has another text, and is not left out.
+fn is_error_of_layer(id: &str, message: &str) -> bool {
+    id == "SYNC-HAZARD-WRITE-AFTER-PRESENT"
+        && message.starts_with("vkQueuePresentKHR(): ")
+        && message.contains("previously written by another vkQueuePresentKHR")
 }
 
 fn deliver(objects: &[vk::DebugUtilsObjectNameInfoEXT<'_>], message: String) {
@@ -165,5 +182,25 @@ fn deliver(objects: &[vk::DebugUtilsObjectNameInfoEXT<'_>], message: String) {
     match owner {
         Some(owner) => owner.push(message),
         None => all.iter().for_each(|receiver| receiver.push(message.clone())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_error_of_layer;
+
+    #[test]
+    fn only_a_conflict_of_two_presents_is_left_out() {
+        let id = "SYNC-HAZARD-WRITE-AFTER-PRESENT";
+        let presents = "vkQueuePresentKHR(): WRITE_AFTER_PRESENT hazard detected. \
+            vkQueuePresentKHR presents swapchain image 2 (VkImage 0x60000000006 from \
+            VkSwapchainKHR 0x30000000003), which was previously written by another \
+            vkQueuePresentKHR command.";
+        assert!(is_error_of_layer(id, presents));
+        assert!(!is_error_of_layer("SYNC-HAZARD-PRESENT-AFTER-WRITE", presents));
+        let drawing = "vkQueueSubmit2(): WRITE_AFTER_PRESENT hazard detected. vkCmdBlitImage \
+            writes to resource, which was previously written by vkQueuePresentKHR.";
+        assert!(!is_error_of_layer(id, drawing));
+        assert!(!is_error_of_layer(id, &presents.replace("another vkQueuePresentKHR", "a copy")));
     }
 }

@@ -159,6 +159,10 @@ fn row(
     if n != n_expected {
         return Err(format!("expected {n_expected} fields as in the header, found {n}: cut off?"));
     }
+    // Checked here, because a deserializer of one field does not know its column.
+    for (name, field) in header.iter().zip(line).filter(|(name, _)| is_time(name)) {
+        parse_time(field).map_err(|what| format!("{name}: {what}"))?;
+    }
     let mut row: FrameRow = line.deserialize(Some(header)).map_err(|cause| {
         let csv::ErrorKind::Deserialize { err, .. } = cause.kind() else {
             return cause.to_string();
@@ -170,6 +174,10 @@ fn row(
     row.pass_ms =
         passes.iter().map(|(i, _)| parse_time(&line[*i])).collect::<std::result::Result<_, _>>()?;
     Ok(row)
+}
+
+fn is_time(column: &str) -> bool {
+    column.ends_with("_ms") || column == "time_s"
 }
 
 fn parse_time(field: &str) -> std::result::Result<Option<f64>, String> {
@@ -252,7 +260,8 @@ mod tests {
             ("image_hash", "hash", "no column image_hash"),
             (",serial,true", ",serial,maybe", "line 2: skip: "),
             ("4000000000", "-1", "line 3: frame: "),
-            (",0.3,0abc", ",NaN,0abc", "line 3: expected a finite time"),
+            (",0.3,0abc", ",NaN,0abc", "line 3: gpu_first_ms: expected a finite time"),
+            (",14.5,", ",x,", "line 2: wait_ms: expected a finite time, found \"x\""),
             (
                 ",0.3,0abc",
                 ",0.3",

@@ -13,7 +13,7 @@ const DIFF: &str = "docs/tutorial/flatten.diff";
 const PROGRAM: &str = "nimbus-tutorial";
 
 /// Files and folders that the build and its tests need.
-const NEEDED: [&str; 10] = [
+const NEEDED: [&str; 11] = [
     "Cargo.toml",
     "Cargo.lock",
     "build.rs",
@@ -21,6 +21,7 @@ const NEEDED: [&str; 10] = [
     "shaders",
     "tests",
     "benches",
+    "scenes",
     "docs",
     "ARCHITECTURE.md",
     "CHANGELOG.md",
@@ -62,7 +63,9 @@ fn patched_copy() -> PathBuf {
     git.env("GIT_CEILING_DIRECTORIES", env!("CARGO_TARGET_TMPDIR")).current_dir(&copied);
     run(git.arg("apply").arg(Path::new(ROOT).join(DIFF)));
     let manifest = fs::read_to_string(copied.join("Cargo.toml")).expect("a manifest");
-    let named = manifest.replacen("[package]", "[package]\nautobins = false", 1);
+    let own = format!("default-run = \"{PROGRAM}\"\nautobins = false");
+    let named = manifest.replacen("default-run = \"nimbus\"", &own, 1);
+    assert!(named != manifest, "Cargo.toml names no default program");
     let program = format!("\n[[bin]]\nname = \"{PROGRAM}\"\npath = \"src/main.rs\"\n");
     fs::write(copied.join("Cargo.toml"), named + &program).expect("a manifest");
     copied

@@ -115,6 +115,9 @@ fn shrink(mut args: Vec<String>) -> Vec<String> {
         let words: Vec<&str> = command.split(' ').collect();
         name.len() >= words.len() && words.iter().zip(&name).all(|(word, arg)| word == arg)
     };
+    if is_named("stress") {
+        args.push("functions/division".to_owned());
+    }
     let Some((command, options)) = SMALL.iter().find(|(command, _)| is_named(command)) else {
         return args;
     };

@@ -57,7 +57,7 @@ pub enum Command {
     /// Draw one frame to a PNG or EXR file
     ///
     /// With --reference the frame is drawn in f64 on the processor, without a Vulkan device and
-    /// without shaders (model.md §9). There are four references, each without an
+    /// without shaders (docs/explanation/model.md §9). There are four references, each without an
     /// approximation of the one before it.
     ///
     /// "thin" draws the same sprites as the device, sorted by exact depth; it differs from the
@@ -174,7 +174,7 @@ pub enum Command {
     ///
     /// Extinction is 3/2 q ρ/(ρ_x r_x), summed over cloud water (10 µm droplets), ice (30 µm) and
     /// snow (100 µm), without rain and graupel. If a file has none of the three, clouds are
-    /// diagnosed from relative humidity, and the output says so (model.md §15).
+    /// diagnosed from relative humidity, and the output says so (docs/explanation/model.md §15).
     ///
     /// P, PB, T, PH, PHB and the attributes DX and DY are required; notes name what else is
     /// missing. Mixing ratios that are negative, NaN or a fill value are counted and taken as 0; in

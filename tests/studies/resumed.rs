@@ -75,7 +75,7 @@ fn a_resumed_study_measures_nothing_twice() {
     fs::write(tiny.path("out/study.json"), "{\"schema\": 99}").expect("study.json");
     assert_eq!(
         tiny.refused(&[&SHORT[..], &OUT, &["--resume"]].concat()),
-        "out/study.json: a study of schema 99; this nimbus reads 1"
+        "out/study.json: study.json of schema 99; this nimbus reads 1"
     );
     let output = tiny.run(&[&SHORT[..], &["--resume"]].concat());
     assert!(

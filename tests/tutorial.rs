@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
-const DIFF: &str = "docs/tutorial/flatten.diff";
+const DIFF: &str = "docs/tutorial/shrink.diff";
 
 /// Name of the program that the copy builds, so that it does not replace the one under test.
 const PROGRAM: &str = "nimbus-tutorial";
 
 /// Files and folders that the build and its tests need.
-const NEEDED: [&str; 11] = [
+const NEEDED: [&str; 10] = [
     "Cargo.toml",
     "Cargo.lock",
     "build.rs",
@@ -24,7 +24,6 @@ const NEEDED: [&str; 11] = [
     "scenes",
     "docs",
     "ARCHITECTURE.md",
-    "CHANGELOG.md",
 ];
 
 /// Copies a file or folder. Binary data of tests and pages stays where it is.
@@ -102,19 +101,24 @@ fn the_pages_name_the_size_of_the_diff() {
 #[test]
 fn the_example_builds_passes_its_test_and_draws() {
     let copied = patched_copy();
-    let tests = cargo(&copied, &["--test", "pass_flatten", "--test", "architecture"]);
-    assert_eq!(tests.matches("test result: ok").count(), 2, "{tests}");
-    assert!(cargo(&copied, &["--lib", "flatten"]).contains("1 passed"));
+    // Its own test, and those that name every pass, shader or key.
+    const TESTS: [&str; 4] = ["pass_shrink", "architecture", "layout", "scene_keys"];
+    let tests = cargo(&copied, &TESTS.map(|name| ["--test", name]).concat());
+    assert_eq!(tests.matches("test result: ok").count(), TESTS.len(), "{tests}");
+    let modes = cargo(&copied, &["--test", "modes", "a_still_scene"]);
+    assert!(modes.contains("1 passed"), "{modes}");
+    let units = cargo(&copied, &["--lib", "--", "reference::shrink", "frame::plan"]);
+    assert!(units.contains("test result: ok") && !units.contains("running 0 tests"), "{units}");
 
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("the target folder");
     let program = target.join("release").join(PROGRAM);
     let dir = tempfile::tempdir().expect("a folder");
     let scene = Path::new(ROOT).join("scenes/hello.toml");
     let plan = |factor: &str| {
-        let set = format!("draw.flatten={factor}");
+        let set = format!("draw.shrink={factor}");
         run(Command::new(&program).args(["inspect", "--plan", "--set", &set]).arg(&scene))
     };
-    assert!(plan("1.0").contains("draw.flatten is 1") && !plan("0.5").contains("draw.flatten is"));
+    assert!(plan("1.0").contains("draw.shrink is 1") && !plan("0.5").contains("draw.shrink is"));
 
     let picture = |name: &str, options: &[&str]| {
         let path = dir.path().join(name);
@@ -123,15 +127,20 @@ fn the_example_builds_passes_its_test_and_draws() {
         run(command.args(["--set", "cloud.0.texture=\"none\""]).args(options).arg("-o").arg(&path));
         path
     };
-    let flat = ["--set", "draw.flatten=0.5"];
-    let flattened = picture("flat.exr", &flat);
-    let thin = picture("thin.exr", &[&flat[..], &["--reference", "thin"]].concat());
+    let small = ["--set", "draw.shrink=0.5"];
+    let shrunk = picture("small.exr", &small);
+    let thin = picture("thin.exr", &[&small[..], &["--reference", "thin"]].concat());
     let rmse = |a: &Path, b: &Path| -> f64 {
         let json = run(Command::new(&program).arg("compare").args([a, b]).arg("--json"));
         let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
         json["metrics"]["rmse"].as_f64().expect("a number")
     };
     // Half floats are off by 2⁻¹¹ of a layer's value, which layers over it shrink.
-    assert!(rmse(&flattened, &thin) < 2e-3);
-    assert!(rmse(&flattened, &picture("tall.exr", &[])) > 2e-2);
+    assert!(rmse(&shrunk, &thin) < 2e-3);
+    assert!(rmse(&shrunk, &picture("large.exr", &[])) > 2e-2);
+    // Skipping changes nothing, also where a later frame skips the pass.
+    let later = [&small[..], &["--frame", "2"]].concat();
+    let skipped = picture("skipped.exr", &later);
+    let all = picture("all.exr", &[&later[..], &["--no-skip"]].concat());
+    assert!(fs::read(skipped).expect("a picture") == fs::read(all).expect("a picture"));
 }

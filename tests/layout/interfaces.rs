@@ -51,7 +51,7 @@ pub const RECORDS: [Record; 25] = [
 /// An element is a record's name or the bytes of a plain element. `T` stands for texels of four
 /// words, `F` for texels of one float, `-` for a buffer that only the other shader reads.
 #[rustfmt::skip]
-pub const INTERFACES: [(&str, &[Field], &str); 49] = [
+pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("chunks.frag", chunks::Push::FIELDS, "T"),
     ("chunks.vert", &[], ""),
     ("chunks_order.comp", chunks::OrderPush::FIELDS, "8 Kept 8 16"),

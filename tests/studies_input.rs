@@ -14,7 +14,7 @@ use tiny::{OUT, SHORT, Tiny, study};
 #[test]
 fn faulty_arguments_are_refused_before_any_work() {
     let tiny = Tiny::new();
-    let knobs: [(&[&str], &str); 15] = [
+    let knobs: [(&[&str], &str); 18] = [
         (
             &["draw.cutoff"],
             "--knob draw.cutoff: no `=`; expected KEY=VALUE,VALUE,… such as draw.cutoff=2,3,4",
@@ -42,8 +42,18 @@ fn faulty_arguments_are_refused_before_any_work() {
         (&["draw.path=pen"], "--knob draw.path=pen: `draw.path`: unknown value `pen`; known here:"),
         (
             &["cloud.3.seed=1"],
-            "--knob cloud.3.seed=1: `cloud`: expected a number from 0 to 0, or *, found `3`",
+            "--knob cloud.3.seed: changes what is asked for, and not how it is computed; a cloud's \
+             knobs are `particles` and `gust_waves`",
         ),
+        (
+            &["cloud.3.gust_waves=1"],
+            "--knob cloud.3.gust_waves=1: `cloud`: expected a number from 0 to 0, or *, found `3`",
+        ),
+        (
+            &["surface.0.center=[0,0,0]"],
+            "--knob surface.0.center: changes what is asked for, and not how it is computed",
+        ),
+        (&["air.humidity=0.5"], "--knob air.humidity: changes what is asked for"),
         (
             &["size=8x8"],
             "--knob size: pictures of several sizes cannot be compared with one reference",

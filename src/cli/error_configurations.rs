@@ -47,33 +47,43 @@ pub fn axes(args: &ErrorArgs, options: &SceneArgs, scene: &Scene) -> Result<Vec<
     Ok(axes)
 }
 
-/// Returns why a key is not a knob of a study.
+/// Returns why a key is not a knob of a study. Keys that the scene does not know pass: loading the
+/// scene reports them.
 fn refusal(key: &str) -> Option<&'static str> {
-    /// Keys of what is drawn, beside the tables `light` and `material`.
-    const CONTENT: [&str; 8] = [
+    /// Keys of `film`, `lighting` and `draw` that say what is drawn, and tables as a whole.
+    const CONTENT: [&str; 9] = [
         "film.background",
         "film.exposure",
         "film.tone_map",
         "lighting.forward",
+        "lighting",
         "draw.particles",
         "draw.texture_seed",
         "draw.error",
         "draw",
     ];
-    let table = key.split('.').next().unwrap_or_default().trim();
-    if key == SIZE_KEY {
-        Some(ONE_SIZE)
-    } else if key.starts_with("draw.impostor") {
-        Some("a frame alone, as it is compared, is drawn without; bench --sweep times them")
-    } else if CONTENT.contains(&key) || ["light", "material"].contains(&table) {
-        Some("changes what is asked for, or nothing that is compared, and not how it is computed")
-    } else if ["title", "time", "threads", "camera", "phase"].contains(&table) {
-        Some(
+    const IS_CONTENT: &str =
+        "changes what is asked for, or nothing that is compared, and not how it is computed";
+    let last = key.rsplit('.').next().unwrap_or_default().trim();
+    match key.split('.').next().unwrap_or_default().trim() {
+        _ if key == SIZE_KEY => Some(ONE_SIZE),
+        "draw" if last.starts_with("impostor") => Some(
+            "a frame alone, as it is compared, is drawn without; bench --sweep times them",
+        ),
+        "film" | "lighting" | "draw" => CONTENT.contains(&key).then_some(IS_CONTENT),
+        "surface" => (last != "subdivide").then_some(
+            "changes what is asked for, and not how it is computed; a surface's knob is `subdivide`",
+        ),
+        "cloud" => (!["particles", "gust_waves"].contains(&last)).then_some(
+            "changes what is asked for, and not how it is computed; a cloud's knobs are \
+             `particles` and `gust_waves`",
+        ),
+        "light" | "material" | "air" => Some(IS_CONTENT),
+        "title" | "time" | "threads" | "camera" | "phase" => Some(
             "changes no picture, or which picture it is; expected a key of film, lighting, draw, \
              cloud or surface",
-        )
-    } else {
-        None
+        ),
+        _ => None,
     }
 }
 

@@ -30,7 +30,8 @@ fn program() -> String {
     if let Ok(chosen) = std::env::var("CHROME") {
         return chosen;
     }
-    let names = ["chromium", "chromium-browser", "google-chrome-stable", "google-chrome", "chrome"];
+    // On Ubuntu, chromium-browser is a script that only asks the user to install a snap.
+    let names = ["chromium", "google-chrome-stable", "google-chrome", "chrome", "chromium-browser"];
     let folders: Vec<_> =
         std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
     let found =

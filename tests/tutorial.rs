@@ -49,6 +49,15 @@ fn run(command: &mut Command) -> String {
     out
 }
 
+/// Waits until no other run of this test uses the copy's folder. Two clones may share a target
+/// folder.
+fn lock() -> fs::File {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("tutorial.lock");
+    let file = fs::File::create(path).expect("a lock file");
+    rustix::fs::flock(&file, rustix::fs::FlockOperation::LockExclusive).expect("a lock");
+    file
+}
+
 /// Copies the sources and applies the diff. The program of the copy has a name of its own.
 fn patched_copy() -> PathBuf {
     let copied = Path::new(env!("CARGO_TARGET_TMPDIR")).join("tutorial");
@@ -100,6 +109,7 @@ fn the_pages_name_the_size_of_the_diff() {
 
 #[test]
 fn the_example_builds_passes_its_test_and_draws() {
+    let _lock = lock();
     let copied = patched_copy();
     // Its own test, and those that name every pass, shader or key.
     const TESTS: [&str; 4] = ["pass_shrink", "architecture", "layout", "scene_keys"];

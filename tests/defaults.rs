@@ -41,7 +41,8 @@ fn errors(args: &[&str], knobs: &[&str]) -> Vec<(String, f64)> {
 
 /// The rows of a study: the unchanged scene and each value of each knob.
 fn n_rows(knobs: &[&str]) -> usize {
-    1 + Axis::parse_all("--knob", knobs).unwrap().iter().map(|axis| axis.values.len()).sum::<usize>()
+    let n_values = |knob: &&str| Axis::parse("--knob", knob).unwrap().values.len();
+    1 + knobs.iter().map(n_values).sum::<usize>()
 }
 
 /// The cheaper values that are as near as the default: complaints.

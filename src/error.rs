@@ -114,7 +114,7 @@ impl Error {
 
     /// Returns an [`Error::Io`].
     pub fn io(path: &Path, cause: impl fmt::Display) -> Self {
-        Error::Io { path: path.to_owned(), what: cause.to_string() }
+        Error::Io { path: path.to_owned(), what: cause_text(&cause.to_string()) }
     }
 
     /// Returns [`Error::Transient`] for a failure that may pass later or on another node (a full
@@ -141,12 +141,12 @@ impl Error {
     }
 
     fn transient(path: &Path, cause: &io::Error) -> Self {
-        Error::Transient { what: format!("{}: {cause}", path.display()) }
+        Error::Transient { what: format!("{}: {}", path.display(), cause_text(&cause.to_string())) }
     }
 
     /// Returns an [`Error::Vulkan`].
     pub fn vulkan(call: impl Into<String>, cause: impl fmt::Display) -> Self {
-        Error::Vulkan { call: call.into(), what: cause.to_string() }
+        Error::Vulkan { call: call.into(), what: cause_text(&cause.to_string()) }
     }
 
     /// Returns an [`Error::Limit`].
@@ -197,6 +197,43 @@ impl Error {
     }
 }
 
+/// Causes that the system names by a number, and what to do.
+const REMEDIES: [(&str, &str); 4] = [
+    (
+        "Permission denied (os error 13)",
+        "permission denied: this user may not read or write here; \
+      choose another place, or change the permissions",
+    ),
+    ("Operation not permitted (os error 1)", "not permitted for this user; choose another place"),
+    ("Read-only file system (os error 30)", "the file system is read-only; choose another place"),
+    (
+        "No space left on device (os error 28)",
+        "no space left on the device; make room, or choose \
+      another place",
+    ),
+];
+
+/// Returns the cause of an error for a user: with what to do, without the names of temporary files,
+/// the places in a library's source, and the system's numbers.
+fn cause_text(cause: &str) -> String {
+    let mut text = cause.to_owned();
+    for (named, remedy) in REMEDIES {
+        text = text.replace(named, remedy);
+    }
+    // Crate `tempfile` adds the path of the temporary file.
+    if let Some((before, path)) = text.split_once(" at path \"") {
+        let after = path.split_once('"').map_or("", |(_, after)| after);
+        text = format!("{before}{after}");
+    }
+    if let Some((before, number)) = text.split_once(" (os error ")
+        && let Some((digits, after)) = number.split_once(')')
+        && digits.chars().all(|c| c.is_ascii_digit())
+    {
+        text = format!("{before}{after}");
+    }
+    text
+}
+
 /// The system's number for an I/O error, the same on every Unix.
 const EIO: i32 = 5;
 
@@ -219,3 +256,28 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn causes_say_what_to_do_and_name_nothing_internal() {
+        for (number, says) in [
+            (13, "choose another place"),
+            (30, "read-only"),
+            (28, "make room"),
+            (2, "No such file or directory"),
+            (20, "Not a directory"),
+        ] {
+            let cause = io::Error::from_raw_os_error(number);
+            let long = format!("cannot be written: {cause} at path \"/tmp/.a.png.x1.tmp\"");
+            for text in [cause.to_string(), long] {
+                let message = Error::io(Path::new("a.png"), text).to_string();
+                assert!(message.starts_with("a.png: ") && message.contains(says), "{message}");
+                assert!(!message.contains("os error") && !message.contains(".tmp"), "{message}");
+            }
+        }
+        assert_eq!(cause_text("a (os error x) b"), "a (os error x) b");
+    }
+}

@@ -176,7 +176,7 @@ fn bench_scene(
     if !args.json {
         print(args, path, &run, &cases, &outcome)?;
         if args.plot {
-            output::text(&bench_plot::text(&run, &table.rows, context.color)?)?;
+            output::painted(&bench_plot::text(&run, &table.rows, context.color)?)?;
         }
     }
     if let Some(file) = &args.trace {

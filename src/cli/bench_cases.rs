@@ -52,7 +52,8 @@ pub fn bench_cases(args: &BenchArgs, path: &Path, options: &SceneArgs) -> Result
             all.extend(cases(at, &point, args.frames, loops));
         }
     }
-    Ok(BenchCases { cases: of_part(args, all)?, scene_hash, resolved })
+    let cases = of_part(args, all)?.into_iter().map(Case::with_figure).collect::<Result<_>>()?;
+    Ok(BenchCases { cases, scene_hash, resolved })
 }
 
 /// Returns the cases of `--part` after the first of all; all cases without `--part`.

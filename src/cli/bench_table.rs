@@ -3,10 +3,12 @@
 use std::path::Path;
 
 use super::bench_remarks::{
-    clocks_line, drawn_line, latency_line, ms, overlap_lines, skipping_line, spread_lines,
+    clocks_line, drawn_line, empty_line, latency_line, missing_lines, ms, overlap_lines,
+    skipping_line, spread_lines, still_line, still_lines,
 };
 use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
+use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::names::loop_name;
 use crate::timing::records::{Block, Case, Measured, Mode, Ratio, Run};
 
@@ -31,6 +33,7 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
         blocks_line(run),
         if run.interrupted { "; INTERRUPTED: what was finished" } else { "" }
     );
+    out += &still_lines(run);
     if run.cases.len() > 1 {
         out += &format!("{}\n{}\n", table(&case_rows(run)), table(&pass_by_case_rows(run)));
     }
@@ -48,7 +51,7 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
             "{n_same} of {n_told} cases gave the same last frame in all their blocks, to the byte\n"
         );
     }
-    out + &clocks_line(&run.clocks)
+    out + &missing_lines(run) + &clocks_line(&run.clocks)
 }
 
 const DIFFER: &str = "THE LAST FRAMES DIFFER between the blocks\n";
@@ -63,10 +66,13 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
         out += &table(&rows);
         out.push('\n');
     }
+    if case.is_still() {
+        return out + &still_line(case) + &last_frame_lines(case, same);
+    }
     if let Some(ratio) = case.ratio {
         let interval = match ratio.low.zip(ratio.high) {
             Some((low, high)) => format!("95 % interval {low:.3} to {high:.3}"),
-            None => "too few frames for an interval".to_owned(),
+            None => format!("an interval needs {N_FRAMES_NEEDED} timed frames of each loop"),
         };
         out += &format!("parallel / serial = {:.3} ({interval})\n", ratio.parallel_by_serial);
     }
@@ -74,7 +80,13 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
     out += &case.overlap.as_ref().map_or(String::new(), |overlap| overlap_lines(overlap, case));
     out += &latency_line(case).unwrap_or_default();
     out += &drawn_line(case).unwrap_or_default();
-    out += &case.skipping.as_ref().map_or(String::new(), skipping_line);
+    out += &empty_line(case).unwrap_or_default();
+    out + &last_frame_lines(case, same)
+}
+
+/// Returns what skipping saved, and the remarks on the last frames.
+fn last_frame_lines(case: &Case, same: Option<bool>) -> String {
+    let mut out = case.skipping.as_ref().map_or(String::new(), skipping_line);
     out += &case.counts.map_or(String::new(), |counts| format!("last frame: {}\n", counts.text()));
     out += match same {
         Some(true) => "the last frames of all blocks are the same, to the byte\n",
@@ -198,7 +210,9 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
     for case in &run.cases {
         let reached = case.overlap.and_then(|o| o.reached);
         let saved = case.skipping.map(|s| s.gpu_no_skip_ms - s.gpu_ms);
-        for mode in case.modes.iter().filter(|m| m.frames > 0) {
+        // In a case that stands still the loops that skip draw nothing.
+        let is_still = case.is_still() && case.figure_mode().is_some();
+        for mode in case.modes.iter().filter(|m| m.frames > 0 && !(is_still && m.skip)) {
             let is_parallel =
                 mode.threading == "parallel" && case.modes.iter().all(|m| m.skip <= mode.skip);
             let mut row = columns(case);
@@ -238,7 +252,7 @@ fn low_rows(case: &Case) -> Vec<Vec<String>> {
         "1 % of the time",
         "sd / mean",
     ]);
-    for mode in case.modes.iter() {
+    for mode in figure_first(case) {
         let (Some(frame), Some(lows)) = (&mode.frame_ms, &mode.frame_lows) else { continue };
         let rates = [fps(frame.of.p50), lows.p99_fps, lows.slowest_mean_fps, lows.slowest_time_fps];
         let mut row = vec!["frame".to_owned(), mode.name()];
@@ -247,6 +261,13 @@ fn low_rows(case: &Case) -> Vec<Vec<String>> {
         rows.push(row);
     }
     rows
+}
+
+/// Returns the loops of a case, the one with its figure first.
+fn figure_first(case: &Case) -> impl Iterator<Item = &Mode> {
+    let figure = case.figure_mode();
+    let is_figure = move |m: &&Mode| figure.is_some_and(|figure| std::ptr::eq(figure, *m));
+    figure.into_iter().chain(case.modes.iter().filter(move |m| !is_figure(m)))
 }
 
 /// Returns the median of each time with its 95 % interval, and the spread of the times.
@@ -265,11 +286,16 @@ fn time_rows(case: &Case) -> Vec<Vec<String>> {
         ("gpu", |m| m.gpu_ms),
         ("latency", |m| m.latency_ms),
     ] {
-        // The loop without skipping only shows the times that skipping is measured by.
+        // The loop without skipping only shows the times that skipping is measured by, unless it is
+        // the figure.
         let is_shown = |m: &&Mode| {
-            m.skip || what == "frame" || what == "gpu" || case.modes.iter().all(|m| !m.skip)
+            m.skip
+                || case.is_still()
+                || what == "frame"
+                || what == "gpu"
+                || case.modes.iter().all(|m| !m.skip)
         };
-        for mode in case.modes.iter().filter(is_shown) {
+        for mode in figure_first(case).filter(is_shown) {
             let Some(m) = of(mode) else { continue };
             let s = m.of;
             let mut row = vec![what.to_owned(), mode.name(), s.n.to_string(), ms(s.p50)];

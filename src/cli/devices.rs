@@ -5,7 +5,7 @@ use serde_json::json;
 use super::args::DevicesArgs;
 use super::output;
 use crate::error::{Error, Result};
-use crate::gpu::{DeviceInfo, Instance};
+use crate::gpu::{DeviceInfo, Instance, no_permission};
 
 /// Runs `nimbus devices`.
 ///
@@ -20,7 +20,9 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
         let list: Vec<_> = devices.iter().map(|d| to_json(d, i_used)).collect();
         output::object(&list)?;
     } else {
-        output::text(&devices.iter().map(|d| describe(d, i_used)).collect::<String>())?;
+        let advice = no_permission().map_or(String::new(), |advice| format!("note: {advice}\n"));
+        let all: String = devices.iter().map(|d| describe(d, i_used)).collect();
+        output::text(&(all + &advice))?;
     }
     let used = used?;
     if args.verbose {

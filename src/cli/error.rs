@@ -44,7 +44,7 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         load_study(&args.scene, &args.options, args.plain, args.frame)?;
     let film = scene.film;
     let axes = axes(args, &options, &scene)?;
-    let (gpu, clocks) = open_for_study(&options, &scene)?;
+    let (gpu, clocks) = open_for_study(&options, &scene, time_s)?;
     if args.options.verbose {
         print_sizes(&scene, None);
     }
@@ -125,7 +125,7 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
     }
     output::text(&error_table::report(study))?;
     if args.plot {
-        output::text(&output::chart_text(&charts::error::chart(study), color)?)?;
+        output::painted(&output::chart_text(&charts::error::chart(study), color)?)?;
     }
     Ok(())
 }

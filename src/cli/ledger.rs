@@ -36,7 +36,7 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
             args.reflections
         )));
     }
-    let (gpu, clocks) = open_for_study(&options, scene)?;
+    let (gpu, clocks) = open_for_study(&options, scene, time_s)?;
     let made = Provenance::now(Ledger::SCHEMA, &args.scene, &loaded, gpu.device.info(), clocks);
     if let Some(out) = &args.out {
         prepare_out_dir(out, true)?;

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
+use crate::io::plain_text::{plain, plain_json};
 use crate::report::charts::Chart;
 use crate::studies::figure::Figure;
 
@@ -15,7 +16,7 @@ use crate::studies::figure::Figure;
 pub fn error(error: &Error, color: ColorChoice) {
     let is_colored = is_colored(color, &std::io::stderr());
     let label = if is_colored { "\x1b[1;31merror:\x1b[0m" } else { "error:" };
-    eprintln!("{label} {error}");
+    eprintln!("{label} {}", plain(&error.to_string()));
 }
 
 fn is_colored(color: ColorChoice, stream: &impl IsTerminal) -> bool {
@@ -47,11 +48,20 @@ pub fn write_chart(path: &Path, chart: &impl Chart) -> Result<()> {
     write_atomic(path, |file| file.write_all(svg.as_bytes()))
 }
 
-/// Prints text to stdout. A closed pipe (`| head`) is not an error.
+/// Prints text to stdout, with characters that a terminal would obey escaped. A closed pipe
+/// (`| head`) is not an error.
 ///
 /// # Errors
 /// Fails if stdout cannot be written.
 pub fn text(text: &str) -> Result<()> {
+    painted(&plain(text))
+}
+
+/// Prints charts of [`chart_text`] to stdout, whose only control characters are their colours.
+///
+/// # Errors
+/// Fails if stdout cannot be written.
+pub fn painted(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(fail(e)),
@@ -103,7 +113,8 @@ pub fn object<T: Serialize + ?Sized>(object: &T) -> Result<()> {
 /// # Errors
 /// Fails if the value cannot be serialized.
 pub fn json_text<T: Serialize + ?Sized>(object: &T) -> Result<String> {
-    Ok(serde_json::to_string_pretty(object).map_err(fail)? + "\n")
+    let json = serde_json::to_string_pretty(object).map_err(fail)?;
+    Ok(format!("{}\n", plain_json(&json)))
 }
 
 fn csv_text(writer: csv::Writer<Vec<u8>>) -> Result<String> {

@@ -4,11 +4,11 @@ use serde_json::{Value, json};
 
 use super::args::RenderArgs;
 use super::progress::spinner;
-use super::scene::{check_time, device_choice, load, print_notes, print_sizes};
+use super::scene::{check_time, device_choice, load, print_notes, print_sizes, print_unseen};
 use super::{output, render_reference};
 use crate::error::Result;
 use crate::frame::plan::Pass;
-use crate::frame::{Counts, Rendered, Stage};
+use crate::frame::{Counts, DrawnFrame, Rendered, Stage};
 use crate::io::image::{self, ImageKind, image_hash};
 use crate::model::film::FilmFormat;
 use crate::model::scene::Scene;
@@ -43,6 +43,7 @@ fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
     let rgba = stage.renderer.image()?;
     drop(drawing);
     print_notes(&mut stage, &args.options)?;
+    print_unseen(&stage.scene, DrawnFrame::of(time_s, &rendered), &rgba, quiet)?;
 
     let device = device_record(stage.info());
     if args.options.verbose {

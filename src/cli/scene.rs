@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::args::SceneArgs;
 use crate::error::{Error, Result};
 use crate::frame::limits::{self, advice};
-use crate::frame::{DeviceChoice, GpuContext, Stage, light_notes};
+use crate::frame::{DeviceChoice, DrawnFrame, GpuContext, Stage, light_notes, unseen};
 use crate::inspect::basis::basis_warnings;
 use crate::io::bounds::{GREATEST, is_carried_place, shortest};
 use crate::io::scene_file::{self, LoadedScene};
@@ -111,14 +111,22 @@ pub fn load_study(path: &Path, args: &SceneArgs, plain: bool, i_frame: u32) -> R
 }
 
 /// Opens the device of a study, checks that it has room for the scene, and measures its clocks.
+/// Warns if nothing can be seen at the time of the frame that is compared.
 ///
 /// # Errors
 /// Fails if there is no such device, or the scene does not fit on it.
-pub fn open_for_study(args: &SceneArgs, scene: &Scene) -> Result<(GpuContext, Clocks)> {
+pub fn open_for_study(
+    args: &SceneArgs,
+    scene: &Scene,
+    time_s: f64,
+) -> Result<(GpuContext, Clocks)> {
     let gpu = GpuContext::open(&device_choice(args))?;
     limits::check(scene, gpu.device.limits())?;
     let mut player = gpu.player(scene.clone(), true)?;
     let clocks = clocks_record(gpu.device.info(), &mut player.renderer)?;
+    let packet = player.game.step_at(0, time_s)?;
+    let frame = DrawnFrame::of(time_s, &player.renderer.step(packet)?);
+    print_unseen(scene, frame, &player.renderer.image()?, args.quiet)?;
     drop(player);
     Ok((gpu, clocks))
 }
@@ -188,6 +196,17 @@ pub fn print_notes(stage: &mut Stage, args: &SceneArgs) -> Result<()> {
         for note in light_notes(stage)? {
             eprintln!("warning: {note}");
         }
+    }
+    Ok(())
+}
+
+/// Warns if nothing of a scene can be seen in a picture, with the reason.
+///
+/// # Errors
+/// Fails if the scene has no state at the time of the frame.
+pub fn print_unseen(scene: &Scene, frame: DrawnFrame, rgba: &[f32], quiet: bool) -> Result<()> {
+    if let Some(note) = unseen(scene, frame, rgba)?.filter(|_| !quiet) {
+        eprintln!("warning: {note}");
     }
     Ok(())
 }

@@ -48,6 +48,11 @@ impl Plan {
         self.decision(pass).run
     }
 
+    /// Returns whether every pass is skipped: the picture of the last frame is shown again.
+    pub fn runs_nothing(&self) -> bool {
+        !Pass::ALL.into_iter().any(|pass| self.runs(pass))
+    }
+
     /// Returns whether only the eye has changed, so that receivers without a lobe keep their light.
     pub fn view_only(&self) -> bool {
         self.view_only

@@ -4,6 +4,7 @@ use std::ffi::CStr;
 
 use ash::{ext, khr, vk};
 
+use super::advice::no_driver;
 use super::call::Call;
 use super::instance::Instance;
 use crate::error::{Error, Result};
@@ -106,11 +107,11 @@ impl DeviceInfo {
         Ok(physical.into_iter().enumerate().map(describe).collect())
     }
 
-    /// Chooses the device named by `choice` (an index, or part of a name), else the best one:
-    /// discrete, then integrated, virtual, CPU.
+    /// Chooses the device named by `choice` (digits are an index, other text is part of one name),
+    /// else the best one: discrete, then integrated, virtual, CPU.
     ///
     /// # Errors
-    /// No device matches, or the named one is unusable. The message lists the devices.
+    /// No device matches, several do, or the named one is unusable. The message lists the devices.
     pub fn choose(devices: Vec<DeviceInfo>, choice: Option<&str>) -> Result<DeviceInfo> {
         let names: Vec<String> =
             devices.iter().map(|d| format!("{}: {}", d.index, d.name)).collect();
@@ -120,28 +121,31 @@ impl DeviceInfo {
             let rank = |d: &DeviceInfo| KINDS.iter().position(|kind| *kind == d.kind).unwrap_or(9);
             let usable = devices.into_iter().filter(|d| d.unusable.is_none());
             return usable.min_by_key(rank).ok_or_else(|| {
-                let what = format!(
-                    "no usable Vulkan 1.3 device (found: {names}); tools/bootstrap installs a \
-                     software one"
-                );
+                let what = format!("no usable Vulkan 1.3 device (found: {names}); {}", no_driver());
                 Error::vulkan("device choice", what)
             });
         };
-        // An empty text is part of every name, and hardly meant: a script's unset variable.
-        let is_named = |d: &&DeviceInfo| {
-            !text.is_empty() && d.name.to_lowercase().contains(&text.to_lowercase())
-        };
-        // Names hold numbers too ("4090"), so that a number need not be an index.
-        let has_index = |d: &&DeviceInfo| text.parse() == Ok(d.index);
-        let found = devices.iter().find(has_index).or_else(|| devices.iter().find(is_named));
-        match found {
-            Some(DeviceInfo { name, unusable: Some(why), .. }) => {
+        match &named(&devices, text)[..] {
+            [DeviceInfo { name, unusable: Some(why), .. }] => {
                 Err(Error::vulkan("device choice", format!("{name}: {why}")))
             }
-            Some(device) => Ok(device.clone()),
-            None => Err(Error::usage(format!(
-                "--device \"{text}\": expected an index or a part of a name; found: {names}"
-            ))),
+            [device] => Ok((*device).clone()),
+            [] => {
+                let no_index = if is_index(text) { "no device has this index; " } else { "" };
+                Err(Error::usage(format!(
+                    "--device \"{text}\": {no_index}expected an index or a part of a name; found: \
+                     {names}"
+                )))
+            }
+            several => {
+                let all: Vec<String> =
+                    several.iter().map(|d| format!("{}: {}", d.index, d.name)).collect();
+                Err(Error::usage(format!(
+                    "--device \"{text}\" is part of {} names ({}); expected the index of one",
+                    several.len(),
+                    all.join(", ")
+                )))
+            }
         }
     }
 
@@ -228,6 +232,24 @@ impl DeviceInfo {
     }
 }
 
+/// Whether a text is an index: names hold numbers, too ("LLVM 15", "256 bits", "4090"), but digits
+/// alone never mean a name.
+fn is_index(text: &str) -> bool {
+    !text.is_empty() && text.chars().all(|c| c.is_ascii_digit())
+}
+
+/// Returns the devices that a text names: by its index, by its whole name, or by a part of it.
+fn named<'a>(devices: &'a [DeviceInfo], text: &str) -> Vec<&'a DeviceInfo> {
+    if is_index(text) {
+        return devices.iter().filter(|d| text.parse() == Ok(d.index)).collect();
+    }
+    let (text, lower) = (text.to_lowercase(), |d: &DeviceInfo| d.name.to_lowercase());
+    let whole: Vec<&DeviceInfo> = devices.iter().filter(|d| lower(d) == text).collect();
+    // An empty text is part of every name, and hardly meant: a script's unset variable.
+    let is_part = |d: &&DeviceInfo| !text.is_empty() && lower(d).contains(&text);
+    if whole.is_empty() { devices.iter().filter(is_part).collect() } else { whole }
+}
+
 /// Returns the reason why nimbus cannot use a device, where there is one.
 fn unusable(
     instance: &ash::Instance,
@@ -297,6 +319,8 @@ fn text<E>(chars: std::result::Result<&CStr, E>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     fn device(index: usize, name: &str, kind: &'static str) -> DeviceInfo {
@@ -324,16 +348,48 @@ mod tests {
         let chosen = |choice| DeviceInfo::choose(devices(), choice).map(|d| d.index);
         assert_eq!(chosen(None), Ok(1));
         assert_eq!(chosen(Some("0")), Ok(0));
-        assert_eq!(chosen(Some("4090")), Ok(1));
+        assert_eq!(chosen(Some("RTX 4090")), Ok(1));
         assert_eq!(chosen(Some("GEFORCE")), Ok(1));
-        // 1 is an index although it stands in both names.
+        // 1 is an index although it stands in a name.
         assert_eq!(chosen(Some("1")), Ok(1));
-        assert_eq!(chosen(Some("15")), Ok(0));
-        for wrong in ["", "  ", "7", "Radeon"] {
+        assert_eq!(chosen(Some(" 01 ")), Ok(1));
+        for wrong in ["", "  ", "7", "15", "4090", "99999999999999999999", "-1", "Radeon"] {
             let error = chosen(Some(wrong)).expect_err(wrong);
             assert_eq!(error.exit_code(), 2);
             let message = error.to_string();
             assert!(message.contains("0: llvmpipe (LLVM 15), 1: GeForce RTX 4090"), "{message}");
+        }
+        let twins = || vec![device(0, "H100", "discrete"), device(1, "H100 PCIe", "discrete")];
+        assert_eq!(DeviceInfo::choose(twins(), Some("h100")).map(|d| d.index), Ok(0));
+        let error = DeviceInfo::choose(twins(), Some("100")).map(|d| d.index);
+        assert!(error.expect_err("an index").to_string().contains("no device has this index"));
+        let error = DeviceInfo::choose(twins(), Some("H1")).map(|d| d.index).expect_err("two");
+        assert!(error.to_string().contains("2 names (0: H100, 1: H100 PCIe)"), "{error}");
+        assert_eq!(error.exit_code(), 2);
+    }
+
+    proptest! {
+        /// Digits choose by index alone; other text chooses the only device with that part of a
+        /// name, and otherwise no device.
+        #[test]
+        fn no_device_is_chosen_by_chance(
+            names in prop::collection::vec("[A-Ca-c0-2 ]{1,6}", 0..4),
+            text in "[A-Ca-c0-3 ]{0,3}",
+        ) {
+            let all = || -> Vec<DeviceInfo> {
+                names.iter().enumerate().map(|(i, name)| device(i, name, "discrete")).collect()
+            };
+            let found = DeviceInfo::choose(all(), Some(&text)).map(|d| d.index);
+            let wanted = text.trim().to_lowercase();
+            if is_index(&wanted) {
+                let index = wanted.parse().expect("a short number");
+                prop_assert_eq!(found.ok(), Some(index).filter(|i| *i < names.len()));
+            } else if let Ok(i) = found {
+                let is_like = |name: &&String| name.to_lowercase().contains(&wanted);
+                prop_assert!(is_like(&&names[i]) && !wanted.is_empty());
+                let is_whole = names[i].to_lowercase() == wanted;
+                prop_assert!(is_whole || names.iter().filter(is_like).count() == 1);
+            }
         }
     }
 }

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::{ext, vk};
 
+use super::advice::{PACKAGES, no_driver};
 use super::call::Call;
 use super::validation::{self, Messages};
 use crate::error::{Error, Result};
@@ -77,19 +78,18 @@ impl VulkanInstance {
     fn new(has_validation: bool, surface: &[&'static CStr]) -> Result<VulkanInstance> {
         // SAFETY: the loader is a trusted system library; it is kept open as long as anything made
         // from it.
-        let entry = unsafe { ash::Entry::load() }.map_err(|e| {
-            Error::vulkan(
-                "loading libvulkan",
-                format!("{e}; is the Vulkan loader installed? (tools/bootstrap)"),
-            )
+        let entry = unsafe { ash::Entry::load() }.map_err(|_| {
+            let what = format!("there is no Vulkan loader (libvulkan); {PACKAGES}");
+            Error::vulkan("loading libvulkan", what)
         })?;
         let offered = unsafe { entry.enumerate_instance_extension_properties(None) }
             .of_call("vkEnumerateInstanceExtensionProperties", "")?;
         let has = |name: &CStr| offered.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         if let Some(missing) = surface.iter().find(|name| !has(name)) {
             let what = format!(
-                "the Vulkan loader lacks {}: no driver here presents to windows",
-                missing.to_string_lossy()
+                "no Vulkan driver here presents to windows ({} is missing); {}",
+                missing.to_string_lossy(),
+                no_driver()
             );
             return Err(Error::vulkan("window extensions", what));
         }
@@ -106,7 +106,12 @@ impl VulkanInstance {
             false => {
                 let info = info.enabled_extension_names(&extensions);
                 // SAFETY: `info` and all it points to live until the call returns.
-                unsafe { entry.create_instance(&info, None) }.of_call("vkCreateInstance", "")?
+                let made = unsafe { entry.create_instance(&info, None) };
+                if made.as_ref().err() == Some(&vk::Result::ERROR_INCOMPATIBLE_DRIVER) {
+                    let what = format!("there is no Vulkan driver; {}", no_driver());
+                    return Err(Error::vulkan("vkCreateInstance", what));
+                }
+                made.of_call("vkCreateInstance", "")?
             }
         };
         let surface_extensions = surface.to_vec();

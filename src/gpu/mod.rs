@@ -5,6 +5,7 @@
 //! pipeline's reads and writes are reflected from its SPIR-V, and the recorder derives the barriers
 //! from them.
 
+mod advice;
 mod barriers;
 mod buffer;
 mod buffers;
@@ -35,6 +36,7 @@ mod swapchain;
 mod timer;
 mod validation;
 
+pub use advice::no_permission;
 pub use barriers::Barriers;
 pub use buffer::{Buffer, MemoryUsage, storage_bytes};
 pub use buffers::{BufferSpec, DeclaredBuffer, buffers};

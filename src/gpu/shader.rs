@@ -20,11 +20,13 @@ impl Sources {
     /// Replaces texts by those that `dir` holds, for `--shaders DIR`.
     ///
     /// # Errors
-    /// `dir` is no folder, holds none of the shaders, or cannot be read.
+    /// `dir` is no folder, holds none of the shaders or a shader that nimbus does not have, or
+    /// cannot be read.
     pub fn with_dir(mut self, dir: &Path) -> Result<Sources> {
         if !dir.is_dir() {
             return Err(Error::io(dir, "expected a folder of shaders"));
         }
+        self.refuse_unknown(dir)?;
         let mut n_found = 0;
         for (name, text) in &mut self.0 {
             let path = dir.join(name);
@@ -39,6 +41,55 @@ impl Sources {
             return Err(Error::io(dir, what));
         }
         Ok(self)
+    }
+
+    /// Refuses a folder with a file that looks like a shader and is none of nimbus's: it would be
+    /// ignored, and the built-in one would be used in its place.
+    fn refuse_unknown(&self, dir: &Path) -> Result<()> {
+        for folder in ["", "include/"] {
+            let Ok(entries) = std::fs::read_dir(dir.join(folder)) else { continue };
+            let mut names: Vec<String> = entries
+                .flatten()
+                .filter(|entry| entry.path().is_file())
+                .map(|entry| format!("{folder}{}", entry.file_name().to_string_lossy()))
+                .filter(|name| !self.0.contains_key(name))
+                .collect();
+            names.sort();
+            for name in names {
+                let near = self.nearest(&name);
+                if near.is_some() || is_shader(&name) {
+                    let near = near.map_or(String::new(), |near| format!("; did you mean {near}?"));
+                    let what = format!("nimbus has no such shader, and would ignore it{near}");
+                    return Err(Error::io(&dir.join(name), what));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the shader whose name is nearest to `name`, which is none: at most two edits away,
+    /// or the same in another folder or with another extension.
+    fn nearest(&self, name: &str) -> Option<&str> {
+        let parts = |name: &str| {
+            let file = name.rsplit('/').next().unwrap_or(name).to_lowercase();
+            let stem = file.split('.').next().unwrap_or_default().to_owned();
+            (file, stem)
+        };
+        let (file, stem) = parts(name);
+        // Copies that editors keep beside a file.
+        if file.starts_with(['.', '#']) || file.ends_with('~') || file.contains(".sw") {
+            return None;
+        }
+        let distance = |known: &&str| {
+            let (known, known_stem) = parts(known);
+            let n = strsim::osa_distance(&file, &known);
+            if known_stem == stem && is_shader(name) { n.min(1) } else { n }
+        };
+        self.names()
+            .map(|known| (distance(&known), known))
+            .filter(|(n, _)| *n <= 2)
+            .min()
+            .map(|(_, known)| known)
     }
 
     /// Adds a text, or replaces the one of that name.
@@ -87,6 +138,14 @@ impl Sources {
         *text = replaced;
         is_changed
     }
+}
+
+/// Whether a file's extension is that of a shader.
+fn is_shader(name: &str) -> bool {
+    const EXTENSIONS: [&str; 9] =
+        ["comp", "vert", "frag", "glsl", "geom", "tesc", "tese", "mesh", "hlsl"];
+    let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension).to_lowercase();
+    EXTENSIONS.contains(&extension.as_str())
 }
 
 /// How SPIR-V is optimised.
@@ -229,6 +288,36 @@ fn write_cached(path: &Path, words: &[u32]) -> std::io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_misspelt_shader_is_refused_with_the_nearest_name() {
+        let sources = || {
+            Sources::embedded(&[("first.comp", "a"), ("sort.comp", "b"), ("include/key.glsl", "c")])
+        };
+        let told = |name: &str| {
+            let dir = tempfile::tempdir().expect("a folder");
+            std::fs::create_dir(dir.path().join("include")).expect("a folder");
+            std::fs::write(dir.path().join("sort.comp"), "b").expect("a file");
+            std::fs::write(dir.path().join(name), "a").expect("a file");
+            sources().with_dir(dir.path()).map(drop).map_err(|e| e.to_string())
+        };
+        for (wrong, near) in [
+            ("frist.comp", "first.comp"),
+            ("first.com", "first.comp"),
+            ("First.comp", "first.comp"),
+            ("first.glsl", "first.comp"),
+            ("key.glsl", "include/key.glsl"),
+            ("include/kye.glsl", "include/key.glsl"),
+            ("include/first.comp", "first.comp"),
+        ] {
+            let message = told(wrong).expect_err(wrong);
+            assert!(message.contains(&format!("did you mean {near}?")), "{wrong}: {message}");
+        }
+        assert!(told("of-another-project.comp").expect_err("unknown").ends_with("ignore it"));
+        for fine in ["first.comp", "README.md", ".first.comp.swp", "first.comp~", "notes.txt"] {
+            assert_eq!(told(fine), Ok(()), "{fine}");
+        }
+    }
 
     #[test]
     fn replace_ignores_white_space() {

@@ -76,7 +76,7 @@ pub(super) fn create_instance(
         .of_call("vkEnumerateInstanceLayerProperties", "")?;
     if !layers.iter().any(|l| l.layer_name_as_c_str() == Ok(LAYER)) {
         let what = "VK_LAYER_KHRONOS_validation is not installed (Debian: \
-            vulkan-validationlayers; tools/bootstrap)";
+            vulkan-validationlayers)";
         return Err(Error::vulkan("validation", what));
     }
     let of_layer = unsafe { entry.enumerate_instance_extension_properties(Some(LAYER)) }

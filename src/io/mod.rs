@@ -16,6 +16,7 @@ mod document;
 pub mod folder;
 pub mod image;
 pub mod particle_file;
+pub mod plain_text;
 pub mod scene_file;
 pub mod scene_keys;
 pub mod scene_view;

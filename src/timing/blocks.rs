@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use super::attachments::CasePicture;
 use super::cases::{Case, Loop};
 use crate::error::{Error, Result};
-use crate::frame::{Counts, FrameTimes, Renderer, Stage, light_notes};
+use crate::frame::{Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen_on};
 use crate::gpu::hex;
 use crate::io::image::display_bytes;
 use crate::model::scene::{Draw, Scene};
@@ -62,7 +62,7 @@ pub struct Outcome {
     pub samples: Vec<Sample>,
     /// All blocks, in the order in which they ran.
     pub blocks: Vec<Block>,
-    /// Warnings about the light of the last frame of a case.
+    /// Warnings about the last frame of a case: its light, and whether anything can be seen.
     pub notes: Vec<String>,
     /// The settings that "auto" chose for drawing, with the reasons.
     pub chosen: Vec<String>,
@@ -191,6 +191,10 @@ impl Bench<'_> {
         let image_hash = if is_stopped() { None } else { Some(image_hash(&mut stage.renderer)?) };
         self.outcome.blocks.push(Block { i_case: block.i_case, of: block.of, image_hash });
         if block.is_last {
+            let last = self.outcome.samples.last().map(|s| &s.times);
+            let last = last.map(|t| DrawnFrame { time_s: t.time_s, n_shown: t.n_kept });
+            let unseen = last.map(|frame| unseen_on(stage, frame)).transpose()?.flatten();
+            self.outcome.notes.extend(unseen.iter().map(named));
             self.outcome.notes.extend(light_notes(stage)?.iter().map(named));
             let counts = Counts::new(&mut stage.renderer, &stage.device, &stage.scene)?;
             self.outcome.counts.insert(block.i_case, counts);

@@ -3,6 +3,8 @@
 use std::sync::Arc;
 
 use super::names::{Setting, case_name, loop_name, sweep_text};
+use crate::error::Result;
+use crate::frame::is_still;
 use crate::io::scene_file::{LoadedScene, Phase};
 use crate::model::scene::{Scene, Threading};
 
@@ -66,6 +68,19 @@ pub struct Case {
 }
 
 impl Case {
+    /// Adds a loop without skipping if nothing moves and there is none: otherwise every time would
+    /// be that of a frame in which nothing is drawn.
+    ///
+    /// # Errors
+    /// Fails if the scene has no state at the time of a frame.
+    pub fn with_figure(mut self) -> Result<Case> {
+        let frames = self.i_first..self.i_first.saturating_add(self.n_frames);
+        if self.loops.iter().all(|of| of.skip) && is_still(&self.scene, frames)? {
+            self.loops.push(Loop { skip: false, ..self.loops[0] });
+        }
+        Ok(self)
+    }
+
     /// Returns the phase and the point of the sweep in words; empty if there is neither.
     pub fn name(&self) -> String {
         case_name(self.phase.as_deref().unwrap_or_default(), &sweep_text(&self.sweep))

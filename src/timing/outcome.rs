@@ -17,7 +17,7 @@ use crate::model::scene::{Impostors, Simulate, Threading};
 
 /// Returns the device time of all passes in ms; 0 if none had to run, None without timestamps.
 fn gpu_ms(times: &FrameTimes) -> Option<f64> {
-    let is_timed = !times.passes.is_empty() || !Pass::ALL.into_iter().any(|p| times.plan.runs(p));
+    let is_timed = !times.passes.is_empty() || times.plan.runs_nothing();
     // The sum of nothing is -0.
     is_timed.then(|| times.passes.iter().map(|p| p.ms()).sum::<f64>() + 0.0)
 }
@@ -82,7 +82,7 @@ impl Outcome {
         let serial = timed(Loop { threading: Threading::Serial, skip });
         let parallel = timed(Loop { threading: Threading::Parallel, skip });
         let unskipped = case.loops.iter().copied().find(|of| skip && !of.skip);
-        records::Case {
+        let mut record = records::Case {
             phase: case.phase.clone(),
             sweep: case.sweep.clone(),
             scene_hash: case.scene_hash.clone(),
@@ -94,7 +94,10 @@ impl Outcome {
             overlap: serial.as_ref().and_then(|serial| overlap(serial, parallel.as_ref())),
             counts: self.counts.get(&i).copied(),
             skipping: unskipped.and_then(|unskipped| self.skipping(i, case, unskipped)),
-        }
+            figure: None,
+        };
+        record.figure = record.figure_mode().map(Mode::name);
+        record
     }
 
     fn skipping(&self, i: usize, case: &Case, unskipped: Loop) -> Option<Skipping> {
@@ -165,6 +168,7 @@ impl Outcome {
             latency_ms: timed.measured(|t| Some(t.latency_ms)),
             queue_depth: (!depths.is_empty()).then(|| mean(&depths)),
             drawn: drawn.map(|s| [s.min, s.mean, s.max]),
+            empty_frames: Some(timed.frames().filter(|t| t.plan.runs_nothing()).count()),
             impostors_reused: timed.frames().filter(|t| is_impostor_reused(t)).count(),
             passes: Pass::ALL.map(|p| pass_record(p, &timed, unskipped.as_ref())).to_vec(),
             image_hash: self.image_hash(i, of).map(str::to_owned),

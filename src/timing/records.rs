@@ -102,12 +102,29 @@ pub struct Case {
     /// Counts of odd values in its last frame; null if the case did not run to its end.
     #[serde(default)]
     pub counts: Option<Counts>,
+    /// Name of the loop whose times are the figure of the case: the first loop, or, if nothing
+    /// moves, the one without skipping. Null if that loop has no timed frame.
+    #[serde(default)]
+    pub figure: Option<String>,
 }
 
 impl Case {
     /// Returns phase and sweep in words; empty if there is neither.
     pub fn name(&self) -> String {
         case_name(self.phase.as_deref().unwrap_or_default(), &sweep_text(&self.sweep))
+    }
+
+    /// Returns whether nothing moves: at least half of the timed frames of a loop that skips drew
+    /// nothing, so that the loop's median is the time of an empty frame.
+    pub fn is_still(&self) -> bool {
+        self.modes.iter().any(Mode::is_mostly_empty)
+    }
+
+    /// Returns the loop whose times are the figure of the case, as `figure` names it. Results of
+    /// earlier versions do not name one.
+    pub fn figure_mode(&self) -> Option<&Mode> {
+        let is_still = self.is_still();
+        self.modes.iter().find(|m| m.frames > 0 && !(is_still && m.skip))
     }
 }
 
@@ -172,6 +189,10 @@ pub struct Mode {
     pub queue_depth: Option<f64>,
     /// Least, mean and greatest number of particles drawn in a frame.
     pub drawn: Option<[f64; 3]>,
+    /// Timed frames that skipped every pass, so that the picture of an earlier frame was shown
+    /// again. Null in results of versions that did not count them.
+    #[serde(default)]
+    pub empty_frames: Option<usize>,
     /// Frames that showed distant particles from the impostors of an earlier frame.
     pub impostors_reused: usize,
     /// One record a pass.
@@ -187,6 +208,15 @@ impl Mode {
     /// Returns the name of the loop.
     pub fn name(&self) -> String {
         loop_name(&self.threading, self.skip)
+    }
+
+    /// Returns whether at least half of the timed frames drew nothing.
+    pub fn is_mostly_empty(&self) -> bool {
+        let none_ran = || !self.passes.is_empty() && self.passes.iter().all(|p| p.n_run == 0);
+        let all_or_none = || if none_ran() { self.frames } else { 0 };
+        self.skip
+            && self.frames > 0
+            && 2 * self.empty_frames.unwrap_or_else(all_or_none) >= self.frames
     }
 
     /// Returns "case: loop"; the loop alone for a case without a name.

@@ -44,12 +44,18 @@ pub fn open_window(
 /// # Errors
 /// There is no display, or it cannot be opened.
 pub fn event_loop<T: 'static>(alternative: &str) -> Result<EventLoop<T>> {
-    EventLoop::with_user_event().build().map_err(|why| {
+    // The cause names places in a library's source, and nothing that DISPLAY does not say.
+    EventLoop::with_user_event().build().map_err(|_| {
         let problem = match std::env::var("DISPLAY") {
-            Ok(name) if !name.is_empty() => format!("the display {name} cannot be opened"),
-            _ => "there is no display: DISPLAY is not set".to_owned(),
+            Ok(name) if !name.is_empty() => format!(
+                "the display {name} cannot be opened: no X server answers there, or it does not \
+                 let this user in (over ssh, `ssh -X` forwards a display)"
+            ),
+            _ => "there is no display: DISPLAY is not set; run nimbus in a desktop session, over \
+                  `ssh -X`, or by `xvfb-run`"
+                .to_owned(),
         };
-        Error::vulkan("opening a window", format!("{problem} ({why}); {alternative}"))
+        Error::vulkan("opening a window", format!("{problem}; {alternative}"))
     })
 }
 

@@ -8,8 +8,8 @@ use super::amounts::Amounts;
 use super::cell_visits::CellVisits;
 use super::layers::Layers;
 use crate::error::Result;
-use crate::frame::plan::{Pass, Plan, Skipping, plan};
-use crate::frame::{Game, SceneFeatures, Tensors};
+use crate::frame::plan::Pass;
+use crate::frame::plan_of_frame;
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::picture::FrameReference;
@@ -84,24 +84,10 @@ impl FrameAmounts {
     fn new(scene: &Scene, i_frame: u32) -> Result<FrameAmounts> {
         let parts = Parts::new(scene, scene.time.at(i_frame))?;
         let first = parts.where_run(|_| true);
-        let plan = plan_of(scene, i_frame)?;
+        let plan = plan_of_frame(scene, i_frame)?;
         let next = plan.map_or(first, |plan| parts.where_run(|pass| plan.runs(pass)));
         Ok(FrameAmounts { first, next })
     }
-}
-
-/// Returns the passes that a frame runs after its neighbour; none where they depend on values that
-/// the host reads back while frames are drawn.
-fn plan_of(scene: &Scene, i_frame: u32) -> Result<Option<Plan>> {
-    if scene.is_animated() {
-        return Ok(None);
-    }
-    let scene = Arc::new(scene.exact().into_owned());
-    let mut game = Game::new(scene.clone(), None);
-    let i_last = i_frame.max(1) - 1;
-    let (last, next) = (game.step(i_last)?, game.step(i_last + 1)?);
-    let features = SceneFeatures::new(&scene, Tensors::Needless);
-    Ok(Some(plan(&features, Skipping::new(true), Some(&last), &next)))
 }
 
 /// Returns the amount of making a scene's textures once.

@@ -5,7 +5,7 @@
 use toml::de::DeValue;
 
 use super::depth::{MAX_DOTS, too_deep};
-use super::suggest::shown;
+use super::suggest::{did_you_mean, shown};
 use super::tree::{Document, Entry, Node, Origin, TOO_DEEP, TOO_LARGE, Table, Value, convert};
 use crate::error::Result;
 
@@ -49,15 +49,17 @@ fn parse_value(text: &str, origin: Origin) -> std::result::Result<Node, String> 
     match DeValue::parse(text) {
         Ok(value) => convert(&value, &|_| origin).map_err(|_| TOO_LARGE.to_owned()),
         Err(_) if is_word(text) => Ok(Node { origin, value: Value::String(text.to_owned()) }),
-        Err(e) => Err(format!("the value is no TOML: {}", e.message())),
+        Err(e) => Err(format!(
+            "the value is no TOML: {}; expected a value such as 3, [1, 2, 3], true or \"text\"",
+            e.message()
+        )),
     }
 }
 
-/// Returns whether a text is a name or a file name. Text with TOML's own punctuation was meant as
-/// TOML and is reported as such.
+/// Returns whether a text is a name, a file name or another text without TOML's own punctuation.
+/// Text with it was meant as TOML and is reported as such.
 pub fn is_word(text: &str) -> bool {
-    text.chars()
-        .all(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ':' | '/' | '\\' | ' '))
+    !text.chars().any(|c| c.is_control() || "[]{}\"'=#".contains(c))
 }
 
 /// Puts `value` at `segments[i..]` below `node`. An error says which segment the tree does not
@@ -84,16 +86,31 @@ pub fn put(
             let item = item.ok_or_else(|| match n {
                 0 => format!("`{}` is empty", here()),
                 _ => format!(
-                    "`{}`: expected a number from 0 to {}, or *, found `{}`",
+                    "`{}`: expected a number from 0 to {}, or *, found `{}`{}",
                     here(),
                     n - 1,
-                    shown(segment)
+                    shown(segment),
+                    numbered(&segments[..i], segment, &segments[i + 1..])
                 ),
             })?;
             put(item, segments, i + 1, value)
         }
         other => Err(format!("`{}` is no table: {}", here(), other.describe())),
     }
+}
+
+/// Returns the path with the number that is missing before `segment`, or that a coordinate has.
+fn numbered(before: &[&str], segment: &str, after: &[&str]) -> String {
+    if segment.parse::<usize>().is_ok() {
+        return String::new();
+    }
+    let (i_axis, rest) = match ["x", "y", "z"].iter().position(|axis| axis == &segment) {
+        Some(i) => (i, after.to_vec()),
+        None => (0, [&[segment], after].concat()),
+    };
+    let number = i_axis.to_string();
+    let path = [before, &[number.as_str()], &rest].concat().join(".");
+    format!("; write `{}`", shown(&path))
 }
 
 fn put_in_table(
@@ -106,7 +123,9 @@ fn put_in_table(
     if !table.contains_key(segments[i])
         && segments.get(i + 1).is_some_and(|next| *next == "*" || next.parse::<usize>().is_ok())
     {
-        return Err(format!("the scene has no `{}`", shown(&segments[..=i].join("."))));
+        let known: Vec<&str> = table.keys().map(String::as_str).collect();
+        let near = did_you_mean(segments[i], &known);
+        return Err(format!("the scene has no `{}`{near}", shown(&segments[..=i].join("."))));
     }
     let empty =
         || Entry { key_origin: origin, node: Node { origin, value: Value::Table(Table::new()) } };

@@ -5,7 +5,7 @@ use std::fmt;
 
 use serde_json::{Map, Value as Json};
 
-use super::suggest::{list, shown, suggestion};
+use super::suggest::{did_you_mean, list, shown};
 use super::tree::{Document, Node, Origin, Source, Table, Value};
 use crate::error::{Error, Place, Result};
 
@@ -52,13 +52,22 @@ impl<'a> Section<'a> {
             let what = format!(
                 "unknown key `{}`{} known here: {}",
                 self.name(&shown(key)),
-                suggestion(key, &known),
+                self.suggestion(key, &known),
                 list(&known)
             );
             return Err(self.source.fault(entry.key_origin, what));
         }
         self.known = known;
         Ok(())
+    }
+
+    /// Returns the nearest known name to an unknown key, or else where such a key is.
+    fn suggestion(&self, key: &str, known: &[&str]) -> String {
+        let near = did_you_mean(key, known);
+        if !near.is_empty() {
+            return near;
+        }
+        (self.source.hint)(&self.name(key)).map_or(";".to_owned(), |hint| format!("; {hint};"))
     }
 
     /// Returns the resolved table.
@@ -111,6 +120,15 @@ impl<'a> Section<'a> {
     pub fn missing(&self, key: &str, expected: impl fmt::Display) -> Error {
         let what = format!("missing key `{}`: expected {expected}", self.name(key));
         Error::scene(self.place(key), what)
+    }
+
+    /// Returns how a value of the key is written where the key stands: in the file, or as an
+    /// argument of `--set`.
+    pub fn assignment(&self, key: &str, value: &str) -> String {
+        match self.value(key).map(|node| node.origin) {
+            Some(Origin::Override(_)) => format!("{}={value}", self.name(key)),
+            _ => format!("{key} = {value}"),
+        }
     }
 
     fn name(&self, key: &str) -> String {

@@ -1,6 +1,8 @@
 //! Words of an input in messages: shortened, listed, and with the nearest known name to a mistyped
 //! one.
 
+use crate::io::plain_text::is_harmful;
+
 /// Returns the known name nearest to `typed` (Levenshtein distance, with a swap of neighbours as
 /// one edit), if it is within a third of its length. One edit is always near enough, so that `x1`
 /// still finds `x`.
@@ -10,7 +12,23 @@ fn nearest<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
     let scored =
         known.iter().map(|name| (strsim::osa_distance(&typed, &name.to_lowercase()), *name));
     let allowed = |name: &str| (name.chars().count() / 3).max(1);
-    scored.filter(|(n, name)| *n <= allowed(name)).min_by_key(|(n, _)| *n).map(|(_, name)| name)
+    let near = scored.filter(|(n, name)| *n <= allowed(name)).min_by_key(|(n, _)| *n);
+    near.map(|(_, name)| name).or_else(|| of_same_word(&typed, known))
+}
+
+/// Returns the only known name that shares a whole word with `typed`, such as `fov_y_deg` for
+/// `fov`.
+fn of_same_word<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
+    const SHORTEST: usize = 3;
+    let words = |name: &str| -> Vec<String> {
+        let words = name.split(['_', '-', ' ']).filter(|word| word.len() >= SHORTEST);
+        words.map(str::to_lowercase).collect()
+    };
+    let of_typed = words(typed);
+    let shares = |name: &&&str| words(name).iter().any(|word| of_typed.contains(word));
+    let mut all = known.iter().filter(shares);
+    let first = all.next();
+    first.filter(|_| all.next().is_none()).copied()
 }
 
 /// Returns `; did you mean …?` with the nearest known name, or nothing.
@@ -34,7 +52,7 @@ pub fn shown(word: &str) -> String {
             shown.push('…');
             break;
         }
-        if c.is_control() { shown.extend(c.escape_debug()) } else { shown.push(c) }
+        if is_harmful(c) { shown.extend(c.escape_debug()) } else { shown.push(c) }
     }
     shown
 }
@@ -73,6 +91,9 @@ mod tests {
         assert_eq!(nearest("heigth", &["width", "height"]), Some("height"));
         assert_eq!(nearest("Width", &["width", "height"]), Some("width"));
         assert_eq!(nearest("banana", &["width", "height"]), None);
+        assert_eq!(nearest("fov", &["near", "fov_y_deg"]), Some("fov_y_deg"));
+        assert_eq!(nearest("step", &["start_s", "step_s"]), Some("step_s"));
+        assert_eq!(nearest("gust", &["gust_length", "gust_waves"]), None);
         assert_eq!(nearest("", &[]), None);
         assert_eq!(nearest(&"x".repeat(1 << 20), &["x"]), None);
     }

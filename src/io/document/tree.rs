@@ -35,7 +35,12 @@ pub struct Source {
     pub text: String,
     /// `--set` arguments as typed.
     pub overrides: Vec<String>,
+    /// Where an unknown key may belong.
+    pub hint: Hint,
 }
+
+/// Returns a sentence about the keys that may be meant by the unknown key of this path.
+pub type Hint = fn(&str) -> Option<String>;
 
 /// Origin of a key or a value. Lines and columns are found only for a message, because a tree has
 /// an origin for every value.
@@ -94,7 +99,8 @@ impl Document {
     /// # Errors
     /// When the text is no TOML, with the place.
     pub fn parse(text: String, path: &Path) -> Result<Document> {
-        let source = Source { path: path.to_owned(), text, overrides: Vec::new() };
+        let (path, overrides) = (path.to_owned(), Vec::new());
+        let source = Source { path, text, overrides, hint: |_| None };
         if let Some(offset) = too_deep(&source.text) {
             return Err(source.fault(Origin::File(offset), TOO_DEEP));
         }

@@ -15,6 +15,7 @@ mod motion;
 mod particle_count;
 mod phases;
 mod picture;
+mod right_form;
 mod spec;
 mod surfaces;
 mod weather;
@@ -81,6 +82,36 @@ pub fn tables() -> Vec<Table> {
     }
     tables.push(table("[[phase]]", &[phases::PHASE]));
     tables
+}
+
+/// Keys that are often looked for under another name, and what to do.
+const OTHER_NAMES: [(&[&str], &str); 9] = [
+    (&["count", "n", "n_particles", "number"], "`draw.particles` sets the number of particles"),
+    (&["size", "resolution"], "`film.width` and `film.height` set the size, as --size does"),
+    (&["fov", "angle"], "`camera.fov_y_deg` sets the field of view"),
+    (&["pos", "eye", "from", "origin"], "`position` sets the place"),
+    (&["look_at", "lookat", "to", "center", "centre"], "`camera.target` sets the direction"),
+    (&["color", "colour", "albedo", "diffuse"], "`kd` of a [[material]] sets its colour"),
+    (&["energy", "power", "brightness"], "`irradiance` or `intensity` sets a light's strength"),
+    (&["density", "opacity", "kappa", "extinction"], "`optical_depth` sets the density of a cloud"),
+    (&["fps", "dt", "duration"], "`time.step_s` and `time.frames` set the times of frames"),
+];
+
+/// Returns where a key that is unknown at this path may belong.
+pub(super) fn hint(path: &str) -> Option<String> {
+    let name = path.rsplit('.').next()?;
+    let tables = tables();
+    let has = |table: &&Table| table.keys.iter().any(|key| key.name == name);
+    let of_same_name: Vec<&Table> = tables.iter().filter(has).collect();
+    let other = OTHER_NAMES.iter().find(|(names, _)| names.contains(&name)).map(|(_, text)| *text);
+    match (&of_same_name[..], other) {
+        (_, Some(text)) => Some(text.to_owned()),
+        ([], None) => None,
+        ([first, ..], None) => Some(match first.name.as_str() {
+            "" => format!("`{name}` stands before every table"),
+            table => format!("`{name}` is a key of {table}"),
+        }),
+    }
 }
 
 /// A scene and its by-products.

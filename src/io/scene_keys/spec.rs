@@ -6,6 +6,7 @@ use std::fmt::Display;
 use glam::DVec3;
 use serde_json::{Value as Json, json};
 
+use super::right_form::{readings, toml_text};
 use crate::error::Result;
 use crate::io::bounds::{Bounds, IntegerBounds};
 use crate::io::document::section::Section;
@@ -81,11 +82,20 @@ impl<T: 'static> Spec<T> {
         let given = s.value(key).map(|node| &node.value).or(self.default.as_ref());
         let value = given.ok_or_else(|| s.missing(key, &self.expected))?;
         let (value, json) = (self.parse)(value).map_err(|wrong| match wrong {
-            Wrong::Value(what) => s.fault(key, what),
-            Wrong::Item(i, what) => s.fault_of_item(key, i, what),
+            Wrong::Value(what) => s.fault(key, what + &self.right_form(s, key, value)),
+            Wrong::Item(i, what) => s.fault_of_item(key, i, what + &self.right_form(s, key, value)),
         })?;
         s.record(key, json);
         Ok(value)
+    }
+
+    /// Returns how to write what was probably meant by a value of the wrong kind; empty if no other
+    /// reading of the value is one that the key takes.
+    fn right_form(&self, s: &Section, key: &str, value: &Value) -> String {
+        let meant = readings(value).into_iter().find(|other| (self.parse)(other).is_ok());
+        meant
+            .and_then(|other| toml_text(&other))
+            .map_or_else(String::new, |text| format!("; write `{}`", s.assignment(key, &text)))
     }
 
     /// Describes the type for the reference.

@@ -8,6 +8,7 @@ use super::medium::{CELL, INK, MUTED, Medium, PAPER};
 use super::plot_area::{Canvas, MarkerFill, draw_marker};
 use super::text_canvas::{TextCanvas, sgr_of};
 use crate::error::{Error, Result};
+use crate::io::plain_text::is_harmful;
 
 /// A rectangle of a chart that shows a text when it is pointed at or focused.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,7 +105,7 @@ pub trait Chart {
             draw().map_err(fault)?
         };
         // XML has no representation of control characters.
-        text.retain(|c| !c.is_control() || c == '\n');
+        text.retain(|c| !is_harmful(c) || c == '\n');
         Ok(with_tooltips(text, &self.title(), &tooltips))
     }
 
@@ -123,7 +124,7 @@ pub trait Chart {
             drawn.map_err(fault)?;
         }
         // Text of a file must not send commands to the terminal.
-        let plain = |text: &str| text.replace(char::is_control, "");
+        let plain = |text: &str| text.replace(is_harmful, "");
         let mut out = format!("{}\n", plain(&self.title()));
         let legend = self.legend();
         let mut last_line = None;
@@ -215,7 +216,7 @@ pub fn escape_markup(text: &str) -> String {
             '"' => out += "&quot;",
             '\'' => out += "&#39;",
             '\n' | '\t' => out.push(c),
-            c if c.is_control() || matches!(c, '\u{FFFE}' | '\u{FFFF}') => {}
+            c if is_harmful(c) || matches!(c, '\u{FFFE}' | '\u{FFFF}') => {}
             c => out.push(c),
         }
     }

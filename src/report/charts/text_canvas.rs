@@ -11,6 +11,7 @@ use plotters_backend::{
 };
 
 use super::medium::{CELL, NEUTRAL_COLORS, SERIES_COLORS};
+use crate::io::plain_text::is_harmful;
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
@@ -56,7 +57,7 @@ impl TextCanvas {
 
     fn glyph(&mut self, (column, row): (i32, i32), glyph: char, color: BackendColor) {
         if let Some(cell) = self.cell(column, row) {
-            let glyph = if glyph.is_control() { '\u{FFFD}' } else { glyph };
+            let glyph = if is_harmful(glyph) { '\u{FFFD}' } else { glyph };
             (cell.glyph, cell.rgb) = (Some(glyph), color.rgb);
         }
     }

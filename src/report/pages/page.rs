@@ -6,6 +6,7 @@ use super::figure::color_rules;
 use super::source::{Results, Source, comparable_pairs};
 use super::{bench, comparison, error, ledger};
 use crate::error::Result;
+use crate::io::plain_text::plain_markup;
 
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -69,7 +70,7 @@ pub fn page(sources: &[Source]) -> Result<String> {
             }
         }
     };
-    Ok(markup.into_string())
+    Ok(plain_markup(&markup.into_string()).into_owned())
 }
 
 fn section(source: &Source) -> Result<(&'static str, Markup)> {

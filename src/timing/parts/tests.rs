@@ -44,6 +44,7 @@ fn case(k: usize, ms: f64) -> Case {
         overlap: None,
         skipping: None,
         counts: None,
+        figure: None,
     }
 }
 

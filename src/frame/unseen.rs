@@ -1,0 +1,204 @@
+//! Pictures in which nothing can be seen, with the reason as far as it can be found.
+
+use glam::DVec3;
+
+use super::renderer::Rendered;
+use super::stage::Stage;
+use crate::error::Result;
+use crate::model::film::Film;
+use crate::model::frame_state::FrameState;
+use crate::model::scene::Scene;
+
+/// A difference of display values that no 8-bit picture shows: half a step.
+const HALF_STEP: f64 = 0.5 / 255.0;
+
+/// A frame, as far as the reason for an empty picture depends on it.
+#[derive(Debug, Clone, Copy)]
+pub struct DrawnFrame {
+    /// Time of the scene, in seconds.
+    pub time_s: f64,
+    /// Particles that the drawing pass was given; `None` if this is not known.
+    pub n_shown: Option<u32>,
+}
+
+impl DrawnFrame {
+    /// Returns the frame at `time_s` with the counts of its render step.
+    pub fn of(time_s: f64, rendered: &Rendered) -> DrawnFrame {
+        DrawnFrame { time_s, n_shown: rendered.n_kept }
+    }
+}
+
+/// Returns a sentence that says that nothing of `scene` can be seen in a picture of linear,
+/// premultiplied pixels, and why; none if a pixel differs from the background.
+///
+/// # Errors
+/// Fails if the scene has no state at the time of the frame.
+pub fn unseen(scene: &Scene, frame: DrawnFrame, rgba: &[f32]) -> Result<Option<String>> {
+    if shows_something(&scene.film, rgba) {
+        return Ok(None);
+    }
+    let reason = reason(scene, frame, rgba)?;
+    Ok(Some(format!("nothing can be seen in the picture: {reason}")))
+}
+
+/// Returns [`unseen`] for the last frame that a stage has drawn.
+///
+/// # Errors
+/// Fails if the picture cannot be read back.
+pub fn unseen_on(stage: &mut Stage, frame: DrawnFrame) -> Result<Option<String>> {
+    let rgba = stage.renderer.image()?;
+    unseen(&stage.scene, frame, &rgba)
+}
+
+/// Returns whether a pixel is displayed in another colour than the background's.
+fn shows_something(film: &Film, rgba: &[f32]) -> bool {
+    let empty = film.display(DVec3::ZERO, 0.0);
+    rgba.chunks_exact(4).any(|pixel| {
+        let [r, g, b, a] = [pixel[0], pixel[1], pixel[2], pixel[3]].map(f64::from);
+        let is_empty = [r, g, b, a] == [0.0; 4];
+        // NaN differs from every colour.
+        !is_empty
+            && !((film.display(DVec3::new(r, g, b), a) - empty).abs().max_element() < HALF_STEP
+                && [r, g, b, a].iter().all(|v| v.is_finite()))
+    })
+}
+
+fn reason(scene: &Scene, frame: DrawnFrame, rgba: &[f32]) -> Result<String> {
+    let has_solids = scene.n_solids() > 0;
+    if scene.n_particles() == 0 && !has_solids {
+        return Ok("the scene has no particles, surfaces or terrain; add a [[cloud]]".to_owned());
+    }
+    let densest = rgba.chunks_exact(4).map(|pixel| pixel[3]).fold(0.0, f32::max);
+    if densest > 0.0 {
+        return Ok(if f64::from(densest) < 4.0 * HALF_STEP {
+            format!(
+                "the clouds are nearly transparent: the densest pixel hides {densest:.1e} of the \
+                 background; a greater `optical_depth`, or extinction in a particle list, makes \
+                 them denser"
+            )
+        } else {
+            "what is drawn has the colour of the background; [[light]], `film.exposure` and \
+             `film.background` set the two"
+                .to_owned()
+        });
+    }
+    if let Some(reason) = outside(scene, frame.time_s)? {
+        return Ok(reason);
+    }
+    let small = "all particles are too small or too thin to show in a pixel; `draw.smallest`, \
+        `draw.threshold` and `draw.particles` leave particles out";
+    Ok(match frame.n_shown {
+        Some(0) if !has_solids => small.to_owned(),
+        _ => "what is in view is transparent; a greater `optical_depth`, or extinction in a \
+              particle list, makes clouds denser"
+            .to_owned(),
+    })
+}
+
+/// Returns how all regions lie outside the view, if they do.
+fn outside(scene: &Scene, time_s: f64) -> Result<Option<String>> {
+    let groups = scene.groups();
+    let pose = FrameState::at(scene, &groups, time_s)?.pose;
+    let all = scene.region_bounds(&groups, time_s, scene.draw.cutoff);
+    // Greatest value of a linear function over a box.
+    let most = |n: DVec3, (low, high): &(DVec3, DVec3)| {
+        let (middle, half) = (0.5 * (*low + *high) - pose.position, 0.5 * (*high - *low));
+        n.dot(middle) + n.abs().dot(half)
+    };
+    let [x, y, z] = pose.position.to_array();
+    let eye = format!("camera.position [{x}, {y}, {z}]");
+    if all.iter().all(|b| most(pose.forward, b) < scene.camera.near) {
+        return Ok(Some(format!(
+            "the camera looks away: everything lies behind {eye}; `camera.target` sets the \
+             direction"
+        )));
+    }
+    let tan_y = (0.5 * scene.camera.fov_y_rad).tan();
+    let tan_x = tan_y * f64::from(scene.film.width) / f64::from(scene.film.height);
+    let (f, right, up) = (pose.forward, pose.right, pose.up);
+    let sides = [tan_x * f - right, tan_x * f + right, tan_y * f - up, tan_y * f + up];
+    let is_outside = |b: &(DVec3, DVec3)| {
+        most(f, b) < scene.camera.near || sides.iter().any(|side| most(*side, b) < 0.0)
+    };
+    Ok(all.iter().all(is_outside).then(|| {
+        format!(
+            "the camera looks past the scene: everything lies outside the field of view from \
+             {eye}; `camera.target` sets the direction, `camera.fov_y_deg` the width"
+        )
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::io::scene_file;
+
+    fn scene(set: &[&str]) -> Scene {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
+        let set: Vec<String> = set.iter().map(|s| (*s).to_owned()).collect();
+        scene_file::load(&path, &set, None).expect("a scene").scene
+    }
+
+    fn told(scene: &Scene, n_shown: Option<u32>, rgba: &[f32]) -> Option<String> {
+        unseen(scene, DrawnFrame { time_s: 0.0, n_shown }, rgba).expect("a camera")
+    }
+
+    proptest! {
+        /// One pixel that differs by a step of the display is enough; pixels below half a step of
+        /// it are not.
+        #[test]
+        fn a_picture_is_empty_if_no_pixel_shows(i in 0usize..64, v in 0.05f32..10.0, dim in 0.0f32..1e-6) {
+            let scene = scene(&["film.background=[0,0,0]"]);
+            let mut rgba = vec![dim; 4 * 64];
+            let text = told(&scene, Some(9), &rgba).expect("nothing shows");
+            prop_assert!(text.starts_with("nothing can be seen in the picture: "));
+            rgba[4 * i + i % 3] = v;
+            prop_assert_eq!(told(&scene, Some(9), &rgba), None);
+        }
+
+        /// A camera that looks away from the cloud by more than a right angle has it behind itself;
+        /// one that looks at it does not.
+        #[test]
+        fn a_camera_that_looks_away_is_named(turn in -1.2f64..1.2, lift in -1.0f64..1.0) {
+            let aim = |sign: f64| {
+                let at = |base: f64, d: f64| base + sign * 10.0 * d;
+                let (s, c) = turn.sin_cos();
+                let pose = scene(&[]).camera.keys[0];
+                let f = (pose.target - pose.position).normalize();
+                let right = f.cross(DVec3::Y).normalize();
+                let d = (c * f + s * right + 0.2 * lift * DVec3::Y).normalize();
+                let p = pose.position;
+                let to = [at(p.x, d.x), at(p.y, d.y), at(p.z, d.z)];
+                format!("camera.target=[{}, {}, {}]", to[0], to[1], to[2])
+            };
+            let away = told(&scene(&[&aim(-1.0)]), Some(0), &[0.0; 4]).expect("nothing shows");
+            prop_assert!(away.contains("looks away"), "{}", away);
+            let toward = told(&scene(&[&aim(1.0)]), Some(0), &[0.0; 4]).expect("nothing shows");
+            prop_assert!(!toward.contains("looks away"), "{}", toward);
+        }
+    }
+
+    #[test]
+    fn every_reason_is_named() {
+        let hello = scene(&[]);
+        let none = [0.0; 4];
+        let of = |scene: &Scene, n, rgba: &[f32]| told(scene, n, rgba).expect("nothing shows");
+        assert!(of(&hello, Some(0), &none).contains("too small"));
+        assert!(of(&hello, Some(9), &none).contains("is transparent"));
+        assert!(of(&hello, None, &none).contains("is transparent"));
+        let thin = [0.0, 0.0, 0.0, 1e-4];
+        assert!(of(&scene(&["film.background=[0,0,0]"]), None, &thin).contains("nearly"));
+        let black = [0.0, 0.0, 0.0, 1.0];
+        let dark = scene(&["film.background=[0,0,0]"]);
+        assert!(of(&dark, None, &black).contains("colour of the background"));
+        let mut bare = hello.clone();
+        bare.clouds.clear();
+        assert!(of(&bare, None, &none).contains("no particles"));
+        // A number that is not finite is another fault, with a warning of its own.
+        assert_eq!(told(&hello, None, &[f32::NAN, 0.0, 0.0, 0.0]), None);
+    }
+}

@@ -4,6 +4,8 @@
 #[cfg(feature = "window")]
 #[path = "harness/display.rs"]
 mod display;
+#[path = "docs/help.rs"]
+mod help;
 #[path = "harness/markdown.rs"]
 mod markdown;
 
@@ -150,6 +152,11 @@ fn words(text: &str) -> Vec<String> {
 
 /// Runs the commands of one page, in order, in a folder of their own.
 fn run_page(page: &Path) -> Vec<String> {
+    run_lines(&page.display().to_string(), markdown::shell_lines(&read(page)))
+}
+
+/// Runs lines of a shell in a folder of their own. Returns what failed.
+fn run_lines(page: &str, lines: Vec<String>) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for name in ["scenes", "shaders"] {
         std::os::unix::fs::symlink(Path::new(ROOT).join(name), folder.path().join(name))
@@ -158,7 +165,7 @@ fn run_page(page: &Path) -> Vec<String> {
     #[cfg(feature = "window")]
     let display = display::Display::open();
     let mut failures = Vec::new();
-    for line in markdown::shell_lines(&read(page)) {
+    for line in lines {
         let mut command = match line.strip_prefix("tools/nimbus ") {
             Some(rest) => {
                 let mut command = Command::new(env!("CARGO_BIN_EXE_nimbus"));
@@ -178,10 +185,27 @@ fn run_page(page: &Path) -> Vec<String> {
             command.current_dir(folder.path()).stdin(Stdio::null()).output().expect("it runs");
         if !output.status.success() {
             let said = String::from_utf8_lossy(&output.stderr).into_owned();
-            failures.push(format!("{}: {line}: {}\n{said}", page.display(), output.status));
+            failures.push(format!("{page}: {line}: {}\n{said}", output.status));
+        }
+        // Examples compare two things that differ.
+        let differs = |args: &[String]| {
+            let [a, b] = [&args[1], &args[2]].map(|name| fs::read(folder.path().join(name)).ok());
+            let [c, d] = [&args[1], &args[2]].map(|name| scene_hash(&folder.path().join(name)));
+            a.zip(b).is_some_and(|(a, b)| a != b) || c.zip(d).is_some_and(|(c, d)| c != d)
+        };
+        let args = line.strip_prefix("tools/nimbus ").map(words).unwrap_or_default();
+        if args.first().is_some_and(|name| name == "compare") && args.len() > 2 && !differs(&args) {
+            failures.push(format!("{page}: {line}: the two do not differ"));
         }
     }
     failures
+}
+
+/// Returns the hash of the scene of a bench's results.
+fn scene_hash(folder: &Path) -> Option<String> {
+    let text = fs::read_to_string(folder.join("run.json")).ok()?;
+    let run: serde_json::Value = serde_json::from_str(&text).ok()?;
+    run["scene_hash"].as_str().map(str::to_owned)
 }
 
 #[test]

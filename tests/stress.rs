@@ -64,8 +64,27 @@ fn every_case_is_explained() {
             assert!(names.contains(word), "docs/explanation/stability.md names {word}");
         }
     }
+    // The list of families fits a screen, and so does that of each family.
     let (code, stdout, _) = stress(&["--list"]);
-    assert!(code == Some(0) && names.iter().all(|name| stdout.contains(name)));
+    let fits = |text: &str| {
+        text.lines().count() <= 50 && text.lines().all(|line| line.chars().count() <= 80)
+    };
+    assert!(code == Some(0) && fits(&stdout), "{stdout}");
+    let mut families: Vec<&str> = cases().iter().map(nimbus::stress::Case::family).collect();
+    families.dedup();
+    for family in families {
+        let n = cases().iter().filter(|c| c.family() == family).count();
+        let row = stdout.lines().find(|line| line.split_whitespace().next() == Some(family));
+        let row = row.unwrap_or_else(|| panic!("{family} is missing: {stdout}"));
+        assert_eq!(row.split_whitespace().nth(1), Some(n.to_string().as_str()), "{row}");
+        let (code, of_family, _) = stress(&["--list", family]);
+        assert!(code == Some(0) && fits(&of_family), "{of_family}");
+        for case in cases().iter().filter(|c| c.family() == family) {
+            assert!(of_family.contains(case.name), "{} is missing: {of_family}", case.name);
+        }
+    }
+    let (_, one, _) = stress(&["--list", "functions/division"]);
+    assert!(one.contains("allowed: 2.5 ulp"), "{one}");
 }
 
 #[test]

@@ -195,18 +195,18 @@ pub fn missing_lines(run: &Run) -> String {
             lines.push(line);
         }
     };
+    let lacks_interval = |m: &Mode| m.frame_ms.is_some_and(|m| m.p50_low.is_none());
+    let few = run.modes().filter(|(_, m)| lacks_interval(m) && m.frames < N_FRAMES_NEEDED);
+    if let Some(least) = few.map(|(_, m)| m.frames).min() {
+        add(format!(
+            "low, high: - : an interval needs {N_FRAMES_NEEDED} timed frames of a loop, found \
+             {least}; --frames or --repeat gives more"
+        ));
+    }
     for (case, mode) in run.modes() {
-        let lacks_interval = mode.frame_ms.is_some_and(|m| m.p50_low.is_none());
         if mode.frames == 0 {
             add(format!("{}: no timed frame: the run ended before", mode.name_in(case)));
-        } else if lacks_interval && mode.frames < N_FRAMES_NEEDED {
-            add(format!(
-                "low, high: - : an interval needs {N_FRAMES_NEEDED} timed frames, {} has {}; \
-                 --frames or --repeat gives more",
-                mode.name(),
-                mode.frames
-            ));
-        } else if lacks_interval {
+        } else if lacks_interval(mode) && mode.frames >= N_FRAMES_NEEDED {
             add("low, high: - : the times differ too much for an interval".to_owned());
         }
         if mode.frames > 0 && mode.gpu_ms.is_none() {

@@ -24,8 +24,7 @@ const SCHEMA_VERSION: u32 = 1;
 pub fn run(args: &StressArgs) -> Result<()> {
     let chosen = chosen(&args.cases)?;
     if args.list {
-        let text = |c: &Case| format!("{}\n    {}\n    allowed: {}\n", c.name, c.what, c.bound);
-        return output::text(&chosen.iter().map(text).collect::<String>());
+        return output::text(&list(args, &chosen));
     }
     let choice = DeviceChoice {
         device: args.device.clone(),
@@ -61,6 +60,54 @@ pub fn run(args: &StressArgs) -> Result<()> {
     })?;
     context.close()?;
     if interrupted { Err(Error::Interrupted) } else { judged(&done) }
+}
+
+/// Returns the families with a line each, the cases of one family with a line each, or all about
+/// single cases.
+fn list(args: &StressArgs, chosen: &[Case]) -> String {
+    let families: Vec<&[Case]> = chosen.chunk_by(|a, b| a.family() == b.family()).collect();
+    if args.cases.is_empty() {
+        let mut rows = header(["family", "cases", "for example"]);
+        rows.extend(families.iter().filter_map(|cases| {
+            let first = cases.first()?;
+            let (family, n) = (first.family().to_owned(), cases.len().to_string());
+            Some(vec![family, n, shortened(first.what, LINE)])
+        }));
+        let more = "`nimbus stress --list FAMILY` lists the cases of a family; \
+            `nimbus stress FAMILY` runs them.";
+        return format!("{}\n{} cases. {more}\n", left_aligned(&rows), chosen.len());
+    }
+    if chosen.len() > 1 {
+        let rows: Vec<Vec<String>> =
+            chosen.iter().map(|c| vec![c.name.to_owned(), shortened(c.what, LINE)]).collect();
+        let more = "`nimbus stress --list CASE` shows all about a case and its bound.";
+        return format!("{}\n{more}\n", left_aligned(&rows));
+    }
+    let text = |c: &Case| format!("{}\n    {}\n    allowed: {}\n", c.name, c.what, c.bound);
+    chosen.iter().map(text).collect()
+}
+
+/// Characters of a description in a list, which leave a line of 80 its name.
+const LINE: usize = 44;
+
+/// Cuts a text at a word to at most `n` characters.
+fn shortened(text: &str, n: usize) -> String {
+    if text.chars().count() <= n {
+        return text.to_owned();
+    }
+    let cut: String = text.chars().take(n - 1).collect();
+    format!("{}…", cut.rsplit_once(' ').map_or(cut.as_str(), |(words, _)| words))
+}
+
+/// Returns rows as a table with all columns to the left.
+fn left_aligned(rows: &[Vec<String>]) -> String {
+    let width = |i: usize| rows.iter().filter_map(|r| r.get(i)).map(|t| t.chars().count()).max();
+    let line = |row: &Vec<String>| {
+        let cells = row.iter().enumerate();
+        let cells = cells.map(|(i, text)| format!("{text:width$}", width = width(i).unwrap_or(0)));
+        format!("{}\n", cells.collect::<Vec<_>>().join("  ").trim_end())
+    };
+    rows.iter().map(line).collect()
 }
 
 /// Returns the cases whose names begin with one of `names`; all cases if there are none.

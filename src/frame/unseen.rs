@@ -55,11 +55,12 @@ fn shows_something(film: &Film, rgba: &[f32]) -> bool {
     let empty = film.display(DVec3::ZERO, 0.0);
     rgba.chunks_exact(4).any(|pixel| {
         let [r, g, b, a] = [pixel[0], pixel[1], pixel[2], pixel[3]].map(f64::from);
-        let is_empty = [r, g, b, a] == [0.0; 4];
+        if [r, g, b, a] == [0.0; 4] {
+            return false;
+        }
         // NaN differs from every colour.
-        !is_empty
-            && !((film.display(DVec3::new(r, g, b), a) - empty).abs().max_element() < HALF_STEP
-                && [r, g, b, a].iter().all(|v| v.is_finite()))
+        let difference = (film.display(DVec3::new(r, g, b), a) - empty).abs().max_element();
+        difference >= HALF_STEP || [r, g, b, a].iter().any(|v| !v.is_finite())
     })
 }
 

@@ -11,8 +11,10 @@ use super::values::at_least_one;
 /// Arguments of `nimbus bench`.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Time against particles and picture size:\n  \
-    nimbus bench scenes/cubes-554.toml --sweep draw.particles=500,5000,50000 --sweep \
-    size=800x600,1024x768\n\n\
+    nimbus bench scenes/threads.toml --sweep draw.particles=500,5000,50000 \\\n      \
+    --sweep size=800x600,1024x768\n\n\
+    Where nothing moves, the loops that skip draw nothing. The loop without skipping is then timed \
+    in any case, and its time is the figure.\n\n\
     Draw the frame times here, and as SVG files beside the results:\n  \
     nimbus bench scenes/threads.toml --plot --out run\n\n\
     Each [[phase]] of a scene is timed by itself; --set and --sweep apply to all of them.\n\n\
@@ -36,7 +38,8 @@ pub struct BenchArgs {
     /// Warm-up frames at the start of every block, which are not counted
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub warmup: u32,
-    /// Do not time the loop without skipping: takes less time, but `saved` stays unknown
+    /// Do not time the loop without skipping, unless nothing moves: takes less time, but `saved`
+    /// stays unknown
     #[arg(long, conflicts_with = "no_skip")]
     pub no_saved: bool,
     /// Blocks of each loop, in the order A B, B A, …; with an even number a steady drift cancels

@@ -21,19 +21,19 @@ pub enum FarmCommand {
     /// Cut the frames of an animation, the configurations of an error study, the cases of a bench,
     /// or a reference picture into shards
     #[command(after_help = "An animation on this machine:\n  \
-        nimbus farm plan scenes/flyby.toml --frames 0..240 --size 320x240 -o farm\n  \
-        nimbus farm local --plan farm\n  nimbus farm merge --plan farm -o frames\n\n\
+        nimbus farm plan scenes/flyby.toml --frames 0..240 --size 320x240 -o fly\n  \
+        nimbus farm local --plan fly\n  nimbus farm merge --plan fly -o frames\n\n\
         An error study of 60 configurations, as `nimbus error` measures them:\n  \
-        nimbus farm plan scenes/study-cloud.toml -o farm --error -- --grid --knob \
-        draw.cutoff=2,2.5,3,3.5,4 \\\n      \
-        --knob lighting.grid=16,24,32,48 --knob lighting.step=1,0.75,0.5\n\n\
+        nimbus farm plan scenes/study-cloud.toml -o study --error -- --grid \\\n      \
+        --knob draw.cutoff=2,2.5,3,3.5,4 --knob lighting.step=1,0.75,0.5 \\\n      \
+        --knob lighting.grid=16,24,32,48\n\n\
         A bench of 12 cases, as `nimbus bench` times them:\n  \
-        nimbus farm plan scenes/cubes-554.toml -o farm --bench --shard-cases 4 -- --repeat \
-        4 \\\n      \
-        --sweep draw.particles=500,5000,50000 --sweep size=400x300,800x600,1024x768,1600x1200\n\n\
+        nimbus farm plan scenes/threads.toml -o times --bench --shard-cases 4 \\\n      \
+        -- --repeat 4 --sweep draw.particles=500,5000,50000 \\\n      \
+        --sweep size=400x300,800x600,1024x768,1600x1200\n\n\
         A picture in f64 of 64 samples a pixel, as `nimbus render --reference` draws it:\n  \
-        nimbus farm plan scenes/study-light.toml -o farm --reference model --samples 64 \
-        --tile 80x60")]
+        nimbus farm plan scenes/study-light.toml -o picture --reference model \\\n      \
+        --samples 64 --tile 80x60")]
     Plan(Box<PlanArgs>),
     /// Time a few frames of scenes on this machine and fit a cost model, by which `plan` predicts
     ///
@@ -74,7 +74,7 @@ pub struct RunArgs {
     /// The plan's folder
     #[arg(long, value_name = "DIR")]
     pub plan: PathBuf,
-    /// Vulkan device, by index or part of its name (see `nimbus devices`)
+    /// Vulkan device, by its index in `nimbus devices` (digits) or a part of its name
     #[arg(long, value_name = "INDEX|NAME")]
     pub device: Option<String>,
     /// Run with the validation layers; any message fails the shard

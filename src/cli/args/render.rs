@@ -12,9 +12,10 @@ use crate::reference::picture::ReferenceKind;
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "The errors of the sprites against two references:\n  \
     nimbus render scenes/cubes-554.toml --size 200x150 -o drawn.exr\n  \
-    nimbus render scenes/cubes-554.toml --size 200x150 -o thin.exr --reference thin\n  \
-    nimbus render scenes/cubes-554.toml --size 200x150 --set 'cloud.0.texture=\"none\"' -o \
-    volume.exr --reference volume\n  \
+    nimbus render scenes/cubes-554.toml --size 200x150 --reference thin \\\n      \
+    -o thin.exr\n  \
+    nimbus render scenes/cubes-554.toml --size 200x150 --reference volume \\\n      \
+    --set 'cloud.0.texture=\"none\"' -o volume.exr\n  \
     nimbus compare thin.exr drawn.exr\n  nimbus compare volume.exr thin.exr\n\n\
     The second reflection of a reference is integrated over areas, which takes minutes for \
     hundreds of facets. \

@@ -11,13 +11,14 @@ use crate::timing::difference::Condition;
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Two settings of a scene:\n  \
     nimbus bench scenes/threads.toml --out before\n  \
-    nimbus bench scenes/threads.toml --set lighting.grid=64 --out after\n  \
+    nimbus bench scenes/threads.toml --set lighting.grid=32 --out after\n  \
     nimbus compare before after --allow scene\n\n\
-    Two builds:\n  nimbus compare old new --allow build\n\n\
+    --allow build compares the results of two builds, --allow device those of two devices.\n\n\
     Two pictures:\n  \
     nimbus render scenes/hello.toml --reference thin -o thin.exr\n  \
     nimbus render scenes/hello.toml -o drawn.exr\n  \
-    nimbus compare thin.exr drawn.exr --fail-above rmse=1e-3 --fail-below ssim=0.99\n\n\
+    nimbus compare thin.exr drawn.exr --fail-above rmse=0.1 \\\n      \
+    --fail-below ssim=0.9\n\n\
     Exit codes: 0 compared, whatever the verdict; 1 a metric is beyond --fail-above or \
     --fail-below;\n  \
     2 not comparable, or neither results of nimbus bench nor pictures.")]
@@ -63,7 +64,7 @@ pub struct CompareArgs {
     nimbus report run -o run.html\n\n\
     Before and after, compared:\n  \
     nimbus bench scenes/threads.toml --out before\n  \
-    nimbus bench scenes/threads.toml --set lighting.grid=64 --out after\n  \
+    nimbus bench scenes/threads.toml --set lighting.grid=32 --out after\n  \
     nimbus report before after -o change.html\n\n\
     Exit codes: 0 written; 2 a folder without results, results of another schema, or a page that \
     exists already.")]

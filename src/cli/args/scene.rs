@@ -9,7 +9,7 @@ use super::values::parse_size;
 /// Arguments of every command with a scene.
 #[derive(Debug, Clone, ClapArgs)]
 pub struct SceneArgs {
-    /// Vulkan device, by index or part of its name (see `nimbus devices`)
+    /// Vulkan device, by its index in `nimbus devices` (digits) or a part of its name
     #[arg(long, value_name = "INDEX|NAME", help_heading = "Device")]
     pub device: Option<String>,
     /// Folder with shaders that replace those built in

@@ -6,16 +6,17 @@ use clap::Args as ClapArgs;
 
 /// Arguments of `nimbus stress`.
 #[derive(Debug, ClapArgs)]
-#[command(
-    after_help = "Examples:\n  nimbus stress\n  nimbus stress --list\n  nimbus stress functions \
-        compositing/thin-tiles\n  \
-    nimbus stress --json --validation > stress.json\n  nimbus stress --shaders my-shaders functions"
-)]
+#[command(after_help = "The families of cases, the cases of one, and what one case checks:\n  \
+    nimbus stress --list\n  nimbus stress --list functions\n  \
+    nimbus stress --list functions/division\n\n\
+    All cases, a family and a case, and a family with the shaders of a folder:\n  \
+    nimbus stress\n  nimbus stress functions compositing/thin-tiles\n  \
+    nimbus stress --json --validation functions\n  nimbus stress --shaders shaders functions")]
 pub struct StressArgs {
     /// Cases to run, by the beginning of their names [default: all]
     #[arg(value_name = "CASE")]
     pub cases: Vec<String>,
-    /// List the cases and their bounds without running them
+    /// List the families without running them; with CASE, list these cases and their bounds
     #[arg(long, conflicts_with_all = ["json", "csv"])]
     pub list: bool,
     /// Print JSON instead of the table
@@ -24,7 +25,7 @@ pub struct StressArgs {
     /// Print CSV instead of the table
     #[arg(long)]
     pub csv: bool,
-    /// Vulkan device, by index or part of its name (see `nimbus devices`)
+    /// Vulkan device, by its index in `nimbus devices` (digits) or a part of its name
     #[arg(long, value_name = "INDEX|NAME")]
     pub device: Option<String>,
     /// Folder with shaders that replace those built in

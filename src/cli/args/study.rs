@@ -15,10 +15,12 @@ use crate::studies::error::front::Metric;
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \
     nimbus error scenes/study-cloud.toml\n  \
-    nimbus error scenes/study-light.toml --knob lighting.bases=2,4,8,16 --knob \
-    lighting.theta=0.2,0.4,0.8 --grid\n  \
-    nimbus error scenes/study-cloud.toml --out cloud --budget-ms 5 --budget-error 0.01\n  \
-    nimbus error scenes/study-cloud.toml --out cloud --resume --knob draw.cutoff=2.2,2.7\n\n\
+    nimbus error scenes/study-light.toml --knob lighting.bases=2,4,8,16 \\\n      \
+    --knob lighting.theta=0.2,0.4,0.8 --grid\n  \
+    nimbus error scenes/study-cloud.toml --out cloud --budget-ms 5 \\\n      \
+    --budget-error 0.01\n  \
+    nimbus error scenes/study-cloud.toml --out cloud --resume \\\n      \
+    --knob draw.cutoff=2.2,2.7\n\n\
     Exit codes: 0 done; 2 bad input; 3 device or driver; 130 interrupted, what was finished is \
     kept in --out.")]
 pub struct ErrorArgs {

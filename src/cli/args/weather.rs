@@ -9,8 +9,8 @@ use clap::Args as ClapArgs;
 #[command(after_help = "The contents of a file, and one of its steps alone:\n  \
     nimbus weather scenes/weather/katrina.nc\n  nimbus weather scenes/weather/supercell.nc --step \
     2\n\n\
-    The greatest optical depth of every step:\n  \
-    nimbus weather scenes/weather/katrina.nc --json | jq '.steps[].clouds.greatest_depth'\n\n\
+    The same for programs, with the greatest optical depth of every step:\n  \
+    nimbus weather scenes/weather/katrina.nc --json\n\n\
     Exit codes: 0 done; 2 no such file, or none that clouds can be made of.")]
 pub struct WeatherArgs {
     /// Weather file: output of WRF (wrfout_d01_…)

@@ -16,8 +16,8 @@ fn nearest<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
     near.map(|(_, name)| name).or_else(|| of_same_word(&typed, known))
 }
 
-/// Returns the only known name that shares a whole word with `typed`, such as `fov_y_deg` for
-/// `fov`.
+/// Returns the only known name of which a word is one of `typed` or at most one edit away, such as
+/// `fov_y_deg` for `fov`.
 fn of_same_word<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
     const SHORTEST: usize = 3;
     let words = |name: &str| -> Vec<String> {
@@ -25,7 +25,9 @@ fn of_same_word<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
         words.map(str::to_lowercase).collect()
     };
     let of_typed = words(typed);
-    let shares = |name: &&&str| words(name).iter().any(|word| of_typed.contains(word));
+    let is_near = |a: &String, b: &String| strsim::osa_distance(a, b) <= 1;
+    let shares =
+        |name: &&&str| words(name).iter().any(|word| of_typed.iter().any(|of| is_near(of, word)));
     let mut all = known.iter().filter(shares);
     let first = all.next();
     first.filter(|_| all.next().is_none()).copied()

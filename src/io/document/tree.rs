@@ -199,6 +199,11 @@ impl Value {
         }
     }
 
+    /// Returns whether the value is a number or an array.
+    pub fn is_number_or_list(&self) -> bool {
+        matches!(self, Value::Integer(_) | Value::Float(_) | Value::Array(_))
+    }
+
     /// Returns the value as a number, if it is one.
     pub fn as_f64(&self) -> Option<f64> {
         match self {

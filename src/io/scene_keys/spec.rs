@@ -2,6 +2,7 @@
 //! it, and how the reference describes it.
 
 use std::fmt::Display;
+use std::mem::discriminant;
 
 use glam::DVec3;
 use serde_json::{Value as Json, json};
@@ -93,9 +94,18 @@ impl<T: 'static> Spec<T> {
     /// reading of the value is one that the key takes.
     fn right_form(&self, s: &Section, key: &str, value: &Value) -> String {
         let meant = readings(value).into_iter().find(|other| (self.parse)(other).is_ok());
-        meant
-            .and_then(|other| toml_text(&other))
-            .map_or_else(String::new, |text| format!("; write `{}`", s.assignment(key, &text)))
+        if let Some(text) = meant.and_then(|other| toml_text(&other)) {
+            return format!("; write `{}`", s.assignment(key, &text));
+        }
+        let is_of_kind = |default: &Value| {
+            discriminant(default) == discriminant(value)
+                || (default.as_f64().is_some() && value.as_f64().is_some())
+        };
+        let example = self.default.as_ref().filter(|d| !is_of_kind(d) && d.is_number_or_list());
+        let example = example.and_then(toml_text);
+        example.map_or_else(String::new, |text| {
+            format!("; for example `{}`", s.assignment(key, &text))
+        })
     }
 
     /// Describes the type for the reference.

@@ -14,6 +14,7 @@ mod number;
 mod overlap;
 pub mod passes;
 mod plot_area;
+pub mod sweep;
 mod text_canvas;
 
 pub use chart::{Chart, LegendEntry, Tooltip, escape_markup};

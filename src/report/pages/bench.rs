@@ -9,7 +9,7 @@ use super::pictures::Png;
 use super::provenance;
 use super::table::{Cell, count, median, ms, percent, table, text, value};
 use crate::error::Result;
-use crate::report::charts::{frames, number, passes, with_interval};
+use crate::report::charts::{frames, number, passes, sweep, with_interval};
 use crate::timing::attachments::picture_file;
 use crate::timing::records::{Case, Measured, Mode, PartRecord, Pass, Run};
 use crate::timing::results::BenchResults;
@@ -31,6 +31,8 @@ pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
         let caption = "Time from the end of one frame to the end of the next; lower is better.";
         charts.push(figure(&frames, caption)?);
     }
+    let sweep = sweep::charts_of_run(run);
+    let sweep = sweep.iter().map(|chart| figure(chart, SWEEP)).collect::<Result<Vec<_>>>()?;
     let passes = passes::chart(run)
         .map(|passes| figure(&passes, "GPU time of every pass; shorter is better."))
         .transpose()?;
@@ -51,9 +53,14 @@ pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
             h3 { "Pictures" }
             div class="gallery" { @for picture in &pictures { (picture) } }
         }
+        (still(run))
+        @if !sweep.is_empty() {
+            h3 { "Sweep" }
+            div class="panels" { @for chart in &sweep { (chart) } }
+        }
         h3 { "Frames" }
         (loops(run))
-        @for chart in &charts { (chart) }
+        (charts_of_frames(&charts))
         (cases(run))
         h3 { "Passes" }
         @match &passes {
@@ -62,6 +69,45 @@ pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
         }
         (pass_table(run))
     })
+}
+
+/// Caption of a chart of a sweep.
+const SWEEP: &str =
+    "Medians with 95 % intervals; lower is better. Point at a marker for its value.";
+
+/// Returns the charts of frames; those of many points of a sweep are folded.
+fn charts_of_frames(charts: &[Markup]) -> Markup {
+    const MOST_UNFOLDED: usize = 2;
+    html! {
+        @if charts.len() <= MOST_UNFOLDED {
+            @for chart in charts { (chart) }
+        } @else {
+            details {
+                summary { "The frames of each of the " (charts.len()) " points of the sweep" }
+                @for chart in charts { (chart) }
+            }
+        }
+    }
+}
+
+/// Returns a warning about cases in which nothing moves.
+fn still(run: &Run) -> Markup {
+    let still: Vec<&Case> = run.cases.iter().filter(|c| c.is_still()).collect();
+    let figure = still.first().and_then(|c| c.figure_mode()).map(Mode::name);
+    html! {
+        @if !still.is_empty() {
+            p class="warning" {
+                strong { "Nothing moves" }
+                @if run.cases.len() > 1 { " in " (still.len()) " of " (run.cases.len()) " cases" }
+                ": the loops that skip draw nothing in most frames, and their times are those of "
+                "an empty frame. "
+                @match &figure {
+                    Some(name) => { "The figure is the loop " strong { (name) } "." }
+                    None => { "No loop without skipping was timed." }
+                }
+            }
+        }
+    }
 }
 
 fn loops(run: &Run) -> Markup {

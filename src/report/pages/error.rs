@@ -10,7 +10,7 @@ use super::provenance;
 use super::table::{count, figure, remark_list, table, text, value};
 use crate::error::Result;
 use crate::report::charts::error::{chart, error_of, front_numbers, metric_name, time_of};
-use crate::report::charts::number;
+use crate::report::charts::{number, sweep};
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::front::Front;
 use crate::studies::error::records::{Best, Budget, Configuration, Study};
@@ -20,6 +20,9 @@ use crate::studies::picture_error::PictureError;
 /// File name of the reference's picture.
 const REFERENCE_FILE: &str = "reference.png";
 
+/// Caption of the chart of a knob.
+const KNOBS: &str = "With 95 % intervals; lower is better. Point at a marker for its value.";
+
 /// Returns the section of a study.
 ///
 /// # Errors
@@ -28,11 +31,17 @@ pub fn section(study: &Study, folder: &Path) -> Result<Markup> {
     let caption = "Lower is more accurate, left is faster. Bars are 95 % intervals. The line joins \
         the configurations that no other configuration beats in both time and error. Point at a \
         configuration, or step through them with the Tab key, to see its settings.";
+    let knobs = sweep::charts_of_study(study);
+    let knobs = knobs.iter().map(|c| chart_figure(c, KNOBS)).collect::<Result<Vec<_>>>()?;
     Ok(html! {
         (provenance::section(study)?)
         (reference(study))
         h3 { "Time against error" }
         (chart_figure(&chart(study), caption)?)
+        @if !knobs.is_empty() {
+            h3 { "Time and error by setting" }
+            div class="panels" { @for chart in &knobs { (chart) } }
+        }
         (configurations(study))
         (best(study))
         (gallery(study, folder)?)

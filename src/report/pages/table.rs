@@ -68,12 +68,28 @@ pub fn remark_list(remarks: &[String]) -> Markup {
     }
 }
 
-/// Returns a table whose first column holds the rows' names; nothing without rows.
+/// Rows from which on a table is folded.
+const MOST_UNFOLDED: usize = 30;
+
+/// Returns a table whose first column holds the rows' names; nothing without rows. A long table is
+/// folded, and a wide one scrolls in its own box, with its first column in place.
 pub fn table(caption: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<Cell>>) -> Markup {
     let rows: Vec<Vec<Cell>> = rows.into_iter().collect();
     if rows.is_empty() {
         return html! {};
     }
+    if rows.len() > MOST_UNFOLDED {
+        return html! {
+            details class="folded" {
+                summary { (caption) " (" (rows.len()) " rows)" }
+                (unfolded(caption, header, &rows))
+            }
+        };
+    }
+    unfolded(caption, header, &rows)
+}
+
+fn unfolded(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
     let is_number = |i: usize| rows.iter().any(|row| row.get(i).is_some_and(|cell| cell.is_number));
     html! {
         div class="wide" tabindex="0" role="region" aria-label=(caption) {
@@ -83,7 +99,7 @@ pub fn table(caption: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<
                     th scope="col" class=[is_number(i).then_some("number")] { (name) }
                 } } }
                 tbody {
-                    @for row in &rows {
+                    @for row in rows {
                         tr {
                             @for (i, Cell { content, value, is_number }) in row.iter().enumerate() {
                                 @if i == 0 {

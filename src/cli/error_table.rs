@@ -29,8 +29,27 @@ pub fn report(study: &Study) -> String {
         out += "  ! the reference's own error is more than a tenth of it";
     }
     out.push('\n');
+    out += &missing_lines(study);
     for best in &study.best {
         out += &best_line(study, best);
+    }
+    out
+}
+
+/// Returns a line for each kind of figure that the table shows as "-", with the reason.
+fn missing_lines(study: &Study) -> String {
+    let mut out = String::new();
+    let run = || study.configurations.iter().filter(|c| c.failure.is_none());
+    if run().any(|c| c.ms(study.time).is_none() || c.error.is_none()) {
+        out += "- : the study ended before this was timed or drawn; --resume goes on\n";
+    } else if run().any(|c| c.by_base.is_none_or(|f| f.low.is_none())) {
+        let n = study.rounds;
+        out += &format!("95 %: - : an interval needs 2 rounds or more, found {n}; see --rounds\n");
+    }
+    let is_still = |c: &Configuration| c.gpu_ms.is_some_and(|t| t.value == 0.0);
+    if study.as_played && run().any(is_still) {
+        out += "NOTHING MOVES: with --as-played, frames that draw nothing were timed; leave it \
+            out, or set wind, gusts or a [[camera.path]]\n";
     }
     out
 }

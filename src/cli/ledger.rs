@@ -102,6 +102,13 @@ fn report(ledger: &Ledger) -> String {
          quadrature to {:.2e}\n",
         ledger.total.value, ledger.sum, ledger.quadrature
     );
+    if ledger.rows.iter().any(|row| row.time_ratio.is_none()) {
+        out += "GPU time by without: - : the row has no counterpart on the device, the device has \
+            no timestamps, or the ledger ended before\n";
+    }
+    if ledger.rows.iter().any(|row| row.error.low.is_none()) {
+        out += "95 %: - : an interval needs more pixels; see --pixels\n";
+    }
     if ledger.rows.iter().any(|row| !row.is_resolved) {
         out += "! the two pictures' own errors are more than a tenth of it\n";
     }

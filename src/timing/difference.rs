@@ -164,6 +164,15 @@ pub(super) fn remarks(a: &Run, b: &Run) -> Vec<String> {
             ));
         }
     }
+    let n_still = |run: &Run| run.cases.iter().filter(|case| case.is_still()).count();
+    let n = n_still(a).max(n_still(b));
+    if n > 0 {
+        remarks.push(format!(
+            "nothing moves in {n} of {} cases: the loops that skip timed frames that draw nothing; \
+             their figure is the loop \"no-skip\"",
+            a.cases.len().max(b.cases.len())
+        ));
+    }
     let [of_a, of_b] = [a, b].map(|run| relevant_words(&run.command).join(" "));
     if of_a != of_b {
         remarks.push(format!("the commands of A and B differ: A \"{of_a}\", B \"{of_b}\""));

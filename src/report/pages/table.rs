@@ -12,6 +12,7 @@ pub struct Cell {
     /// The number that sorting compares.
     value: Option<f64>,
     is_number: bool,
+    is_missing: bool,
 }
 
 /// Returns a cell of text.
@@ -20,12 +21,13 @@ pub fn text(text: &str) -> Cell {
     const SHORT: usize = 18;
     let is_short = text.chars().count() <= SHORT;
     let content = html! { span class=[is_short.then_some("short")] { (text) } };
-    Cell { content, value: None, is_number: false }
+    Cell { content, value: None, is_number: false, is_missing: text == MISSING }
 }
 
 /// Returns a cell of a count.
 pub fn count(n: usize) -> Cell {
-    Cell { content: html! { (n) }, value: Some(n as f64), is_number: true }
+    let content = html! { (n) };
+    Cell { content, value: Some(n as f64), is_number: true, is_missing: false }
 }
 
 /// Returns a cell of a number, "—" if there is none.
@@ -54,9 +56,10 @@ pub fn median(measured: Option<Measured>) -> Cell {
 }
 
 fn numeric<T: Copy>(item: Option<T>, value: fn(T) -> f64, text: fn(T) -> String) -> Cell {
-    let content = item.map_or("—".to_owned(), text);
+    let is_missing = item.is_none();
+    let content = item.map_or(MISSING.to_owned(), text);
     let value = item.map(value).filter(|v| v.is_finite());
-    Cell { content: html! { (content) }, value, is_number: true }
+    Cell { content: html! { (content) }, value, is_number: true, is_missing }
 }
 
 /// Returns a list of remarks, empty if there are none.
@@ -67,6 +70,14 @@ pub fn remark_list(remarks: &[String]) -> Markup {
         }
     }
 }
+
+/// Text of a cell without a value.
+const MISSING: &str = "—";
+
+/// Reasons for a cell without a value.
+const WHY_MISSING: &str = "— : not measured: the device has no timestamps, the pass or the loop \
+    did not run, or the run ended before. A median without an interval has too few values for \
+    one: frames of a loop need 30, rounds of a study 2.";
 
 /// Rows from which on a table is folded.
 const MOST_UNFOLDED: usize = 30;
@@ -90,6 +101,7 @@ pub fn table(caption: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<
 }
 
 fn unfolded(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
+    let has_missing = rows.iter().flatten().any(|cell| cell.is_missing);
     let is_number = |i: usize| rows.iter().any(|row| row.get(i).is_some_and(|cell| cell.is_number));
     html! {
         div class="wide" tabindex="0" role="region" aria-label=(caption) {
@@ -101,7 +113,7 @@ fn unfolded(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
                 tbody {
                     @for row in rows {
                         tr {
-                            @for (i, Cell { content, value, is_number }) in row.iter().enumerate() {
+                            @for (i, Cell { content, value, is_number, .. }) in row.iter().enumerate() {
                                 @if i == 0 {
                                     th scope="row" data-value=[value] { (content) }
                                 } @else {
@@ -115,5 +127,6 @@ fn unfolded(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
                 }
             }
         }
+        @if has_missing { p class="why" { (WHY_MISSING) } }
     }
 }

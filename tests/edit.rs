@@ -153,7 +153,7 @@ fn drags_and_undoes(window: &Window<'_>, path: &Path) {
     let edited = EditedScene::default_scene().expect("the editor's scene");
     let document = Document::new(box_file::read(path).expect("boxes"));
     let scene = edited.scene(&document);
-    let [width, height] = picture_size([900, 640], 1.0).map(f64::from);
+    let [width, height] = picture_size([900, 640], 1.0, true).map(f64::from);
     let view = Viewport {
         pose: scene.camera.pose(0.0).expect("a pose"),
         fov_y_rad: scene.camera.fov_y_rad,
@@ -273,6 +273,53 @@ fn the_window_looks_as_in_the_documentation() {
     });
     window.key("ctrl+z");
     window.wait_for_dirty(false);
+    window.key("ctrl+q");
+    assert_eq!(window.end(), "");
+}
+
+#[test]
+fn unsaved_changes_survive_a_lost_display() {
+    let display = Display::open();
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("cloud.dat");
+    let mut window = Window::open(&display, dir.path(), &path);
+    window.key("a");
+    window.wait_for_dirty(true);
+    display.end();
+    wait_for("end", || window.child.try_wait().expect("a child").is_some());
+    let output = window.child.wait_with_output().expect("its output");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    let kept = path.with_extension("unsaved-1.dat");
+    assert!(
+        text.contains(&format!("unsaved changes were written to {}", kept.display())),
+        "{text}"
+    );
+    assert_eq!(box_file::read(&kept).expect("the changes").len(), 1);
+    assert!(!path.exists());
+}
+
+#[test]
+fn a_saved_file_that_was_not_edited_keeps_its_bytes() {
+    let display = Display::open();
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("cloud.dat");
+    let written = "12\n\n2\n4, 1.0, 2.50, 3, 0.30000000000000004, 6.12438e-007, 0, 2\n\
+        8,1,1,1,  0,0,-5,2\n";
+    std::fs::write(&path, written).expect("a file");
+    let window = Window::open(&display, dir.path(), &path);
+    window.key("Tab");
+    // Fields that are visited, and left as they are.
+    window.types(&["", "", "", "", "", "", "", "", ""]);
+    window.key("Tab");
+    window.types(&["9"]);
+    window.wait_for_dirty(true);
+    window.save();
+    let text = std::fs::read_to_string(&path).expect("text");
+    let line = written.lines().nth(3).expect("the first box");
+    assert_eq!(text, format!("13\n2\n{line}\n9, 1, 1, 1, 0, 0, -5, 2\n"));
+    window.key("h");
+    window.key("h");
     window.key("ctrl+q");
     assert_eq!(window.end(), "");
 }

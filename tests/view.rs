@@ -17,6 +17,9 @@ use serde_json::Value;
 
 const HELLO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
 
+/// Colour behind the panels.
+const BACKGROUND: [u8; 3] = [24, 26, 30];
+
 /// A running `nimbus view` whose stderr goes to a file.
 struct View<'a> {
     display: &'a Display,
@@ -42,11 +45,11 @@ impl<'a> View<'a> {
     /// Waits until the window answers keys. Returns the window.
     fn window(&self) -> String {
         let window = self.display.window_of(self.child.id());
-        let n_helps = || self.text().matches("fly twice as fast").count();
-        let before = n_helps();
+        let n_answers = || self.text().matches("flies at ").count();
+        let before = n_answers();
         wait_for("answer to a key", || {
-            self.display.key("question");
-            n_helps() > before
+            self.display.key("minus");
+            n_answers() > before
         });
         window
     }
@@ -76,10 +79,16 @@ impl<'a> View<'a> {
 
     /// Presses a key that saves a file, and waits for the file. Returns its path.
     fn save(&self, key: &str, name: &str) -> PathBuf {
-        self.display.key(key);
         let path = self.dir.join(name);
+        self.display.key(key);
         wait_for(name, || path.is_file());
         path
+    }
+
+    /// Returns the number of pixels of the window with the colour behind the panels.
+    fn n_behind_panels(&self, window: &str) -> usize {
+        let (.., rgb) = self.display.pixels(window);
+        rgb.chunks_exact(3).filter(|p| **p == BACKGROUND).count()
     }
 
     /// Waits for the program's end. Returns stdout and stderr.
@@ -118,7 +127,8 @@ fn a_window_shows_as_many_frames_as_asked_for() {
     let (found, text) = view.end();
     // Ten frames of warm-up are not counted.
     assert_eq!(loops(&found), [("parallel".to_owned(), 110)], "{text}");
-    assert!(text.contains("keys:") && text.contains("close the window"), "{text}");
+    // The keys are listed in the window.
+    assert!(!text.contains("close the window") && !text.contains("keys"), "{text}");
     let more = ["--frames", "30", "--no-skip", "-q"];
     let (found, text) = View::start(&display, dir.path(), &[&args[..], &more].concat()).end();
     assert_eq!((loops(&found), text.as_str()), (vec![("parallel".to_owned(), 20)], ""));
@@ -132,7 +142,7 @@ fn the_window_follows_keys_mouse_and_size() {
     let window = view.window();
     // Paused at the first frame, the window shows what `render` draws.
     view.keys(&["space", "Home"]);
-    let first = std::fs::read(view.save("F12", "view-1.png")).expect("a picture");
+    let first = std::fs::read(view.save("F12", "captures/hello-view-1.png")).expect("a picture");
     assert!(first == rendered(dir.path(), HELLO, &["--size", "200x150"]), "the same bytes");
     view.keys(&["t", "l", "p", "r", "k", "b", "g", "o", "v", "c", "t", "i"]);
     display.drag(&window, 1, [100, 75], [140, 60]);
@@ -143,15 +153,16 @@ fn the_window_follows_keys_mouse_and_size() {
         display.resize(&window, [width, height]);
         wait_for("picture of the new size", || {
             n += 1;
-            let path = view.save("F12", &format!("view-{n}.png"));
+            let path = view.save("F12", &format!("captures/hello-view-{n}.png"));
             moved = std::fs::read(&path).expect("a picture");
             image::image_dimensions(&path).expect("a PNG") == (width, height)
         });
     }
     display.key("Escape");
     let (stdout, text) = view.end();
-    for words in
-        ["threads.mode = \"serial\"", "draw.path = \"sprites\"", "skipping is off", "view-1.png"]
+    let path = dir.path().canonicalize().expect("a folder").join("captures/hello-view-1.png");
+    let saved = format!("saved {}", path.display());
+    for words in ["threads.mode = \"serial\"", "draw.path = \"sprites\"", "skipping is off", &saved]
     {
         assert!(text.contains(words), "{words}: {text}");
     }
@@ -187,7 +198,7 @@ fn a_missing_display_is_reported_with_a_command_that_needs_none() {
 fn panels_compare_count_and_measure() {
     let display = Display::open();
     let dir = tempfile::tempdir().expect("a folder");
-    let view = View::start(&display, dir.path(), &[HELLO, "--size", "400x300"]);
+    let view = View::start(&display, dir.path(), &[HELLO, "--size", "640x480"]);
     view.window();
     view.keys(&["space", "n"]);
     view.wait_for_text("0 not finite");
@@ -243,7 +254,8 @@ fn changed_files_are_read_again_and_errors_keep_the_last_picture() {
             std::fs::copy(entry.path(), shaders.join(entry.file_name())).expect("a copy");
         }
     }
-    let args = ["scene.toml", "--size", "200x150", "--no-panels", "--shaders", "shaders"];
+    let options = ["--no-panels", "--shaders", "shaders", "--captures", "shots/of today"];
+    let args = [&["scene.toml", "--size", "200x150"][..], &options].concat();
     let view = View::start(&display, dir.path(), &args);
     let window = view.window();
     view.keys(&["space", "Home"]);
@@ -266,9 +278,65 @@ fn changed_files_are_read_again_and_errors_keep_the_last_picture() {
     write("shaders/present.frag", &present);
     wait_for("end of the alarm", || n_red() == 0);
     // The saved scene draws the saved picture.
-    let picture = std::fs::read(view.save("F12", "view-1.png")).expect("a picture");
-    let saved = view.save("F10", "scene-view-1.toml");
+    let picture = view.save("F12", "shots/of today/scene-view-1.png");
+    let picture = std::fs::read(picture).expect("a picture");
+    let saved = view.save("F10", "shots/of today/scene-view-1.toml");
     display.key("Escape");
     view.end();
     assert!(picture == rendered(dir.path(), &saved.to_string_lossy(), &[]), "the same bytes");
+}
+
+#[test]
+fn keys_are_listed_in_the_window_and_panels_keep_to_a_third_at_every_scale() {
+    let display = Display::open();
+    for (size, scale, share) in
+        [([640, 480], "1", 0.34), ([640, 480], "2", 0.34), ([1280, 960], "2", 0.34)]
+    {
+        let dir = tempfile::tempdir().expect("a folder");
+        let [width, height] = size;
+        let stderr = dir.path().join("stderr.txt");
+        let size = format!("{width}x{height}");
+        let mut command = nimbus(&["view", HELLO, "--size", &size, "--present", "immediate"]);
+        command.current_dir(dir.path()).env("DISPLAY", display.name());
+        command.env("WINIT_X11_SCALE_FACTOR", scale);
+        command.stderr(std::fs::File::create(&stderr).expect("a file"));
+        let child = command.spawn().expect("the program runs");
+        let view = View { display: &display, dir: dir.path(), child, stderr };
+        let window = view.window();
+        display.key("space");
+        let n_pixels = (width * height) as usize;
+        let covered = || view.n_behind_panels(&window);
+        // Text and graphs have other colours, so the panels have more pixels than these.
+        wait_for("panels", || covered() > n_pixels / 8);
+        assert!(covered() as f64 <= share * n_pixels as f64, "{size} at {scale}");
+        display.key("h");
+        wait_for("picture without panels", || covered() < n_pixels / 100);
+        // The list of keys covers the middle, which the cloud and the sky have had.
+        let grey = || {
+            let (.., rgb) = display.pixels(&window);
+            let is_dark = |p: &[u8]| p.iter().all(|v| *v < 60);
+            rgb.chunks_exact(3).filter(|p| is_dark(p)).count()
+        };
+        let before = grey();
+        display.key("question");
+        wait_for("list of keys", || grey() > before + n_pixels / 5);
+        display.key("Escape");
+        wait_for("picture without the list", || grey() < before + n_pixels / 10);
+        display.key("Escape");
+        view.end();
+    }
+}
+
+#[test]
+fn a_lost_display_ends_the_window_with_a_message() {
+    let display = Display::open();
+    let dir = tempfile::tempdir().expect("a folder");
+    let mut view = View::start(&display, dir.path(), &[HELLO, "--size", "200x150"]);
+    view.window();
+    display.end();
+    wait_for("end", || view.child.try_wait().expect("a child").is_some());
+    let status = view.child.wait().expect("a status");
+    let text = view.text();
+    assert_eq!(status.code(), Some(3), "{text}");
+    assert!(text.contains("the connection to the display is lost"), "{text}");
 }

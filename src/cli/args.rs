@@ -146,15 +146,18 @@ pub enum Command {
     Devices(DevicesArgs),
     /// Show a scene in a window: fly through it, change its settings, read frame times
     ///
-    /// The keys are printed at the start and by "?". Frames run in one of the two loops that bench
-    /// times; "t" switches between them. The title shows the frame time, and statistics of both
-    /// loops are printed when the window is closed. "i" prints and copies the render command for
-    /// the present view.
+    /// "?" lists the keys in the window. Frames run in one of the two loops that bench times; "t"
+    /// switches between them. The title shows the frame time, and statistics of both loops are
+    /// printed when the window is closed. "i" prints and copies the render command for the present
+    /// view.
     ///
     /// Panels ("h") show times, passes, the plan and every setting. "m" keeps the settings as B, to
     /// compare with later ones; "j" measures the error of both against the f64 reference while the
-    /// camera and the frame stand still; "F10" saves the present scene. The scene, its files and
-    /// the shaders of --shaders are loaded again when they change.
+    /// camera and the frame stand still. "F12" saves the picture and "F10" the scene, to the folder
+    /// of --captures. The scene, its files and the shaders of --shaders are loaded again when they
+    /// change; an error is shown over the last good picture.
+    ///
+    /// Panels and text have the scale of the display. WINIT_X11_SCALE_FACTOR=2 sets another.
     #[cfg(feature = "window")]
     View(ViewArgs),
     /// Shape a cloud by hand from boxes that are filled with particles

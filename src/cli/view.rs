@@ -10,7 +10,7 @@ use super::output::{self, header};
 use super::scene::{device_choice, load_with_files, typed_overrides};
 use crate::error::Result;
 use crate::measure::stats::Summary;
-use crate::viewer::scene_window::{self, LoopTimes, Options, SceneSource, WindowTimes, help};
+use crate::viewer::scene_window::{self, LoopTimes, Options, SceneSource, WindowTimes};
 
 /// Runs `nimbus view` until its window is closed.
 ///
@@ -18,9 +18,6 @@ use crate::viewer::scene_window::{self, LoopTimes, Options, SceneSource, WindowT
 /// Fails if the scene is faulty, or no window or device can be opened.
 pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
     let (loaded, files) = load_with_files(&args.scene, &args.options)?;
-    if !args.options.quiet {
-        eprint!("{}", help());
-    }
     let source = SceneSource {
         path: args.scene.clone(),
         overrides: typed_overrides(&args.options.set, args.options.size),
@@ -37,6 +34,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         stop,
         is_quiet: args.options.quiet,
         has_panels: !args.no_panels,
+        captures: args.captures.clone(),
     })?;
     if args.json {
         let rows: Vec<Value> = loops.iter().map(row).collect();

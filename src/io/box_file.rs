@@ -1,6 +1,7 @@
 //! Box files, P Table 1: the number of particles, the number of boxes, then a line a box of
 //! `particles, x extent, y extent, z extent, x, y, z, radius`.
 
+use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 
@@ -63,12 +64,37 @@ pub fn format(boxes: &[CloudBox]) -> String {
     text
 }
 
-/// Replaces the file at `path`, or the file that a link at `path` leads to.
+/// Returns text like [`format`], in which every box that `old` has too keeps its line. Where the
+/// boxes are those of `old`, it is `old`.
+fn format_like(old: &str, boxes: &[CloudBox]) -> String {
+    let Ok(old_boxes) = parse(old, Path::new("")) else { return format(boxes) };
+    if old_boxes.iter().map(bits).eq(boxes.iter().map(bits)) {
+        return old.to_owned();
+    }
+    let lines = old.lines().filter(|line| !line.trim().is_empty()).skip(2);
+    let kept: HashMap<_, &str> = old_boxes.iter().map(bits).zip(lines).collect();
+    let end = if old.lines().count() == old.matches("\r\n").count() { "\r\n" } else { "\n" };
+    let line = |(i, new): (usize, &str)| match i.checked_sub(2).and_then(|i| boxes.get(i)) {
+        Some(b) => format!("{}{end}", kept.get(&bits(b)).map_or(new, |line| line.trim_end())),
+        None => format!("{new}{end}"),
+    };
+    format(boxes).lines().enumerate().map(line).collect()
+}
+
+/// Returns the fields of a box, which distinguish 0 from −0.
+fn bits(b: &CloudBox) -> (u32, [u64; 7]) {
+    let numbers = numbers(b);
+    (b.n_particles, std::array::from_fn(|i| numbers[i].to_bits()))
+}
+
+/// Replaces the file at `path`, or the file that a link at `path` leads to. Lines of boxes that the
+/// file has already keep their text.
 ///
 /// # Errors
 /// When the file cannot be written, or [`Error::Limit`] when it would be too large to be read.
 pub fn write(path: &Path, boxes: &[CloudBox]) -> Result<()> {
-    let text = format(boxes);
+    let old = path.is_file().then(|| read_text(path, DATA_LIMIT, FIRST).ok()).flatten();
+    let text = old.map_or_else(|| format(boxes), |old| format_like(&old, boxes));
     if text.len() as u64 > DATA_LIMIT {
         let n_bytes = text.len();
         return Err(Error::limit(format!(
@@ -354,6 +380,33 @@ mod tests {
             (read(&file).unwrap(), std::fs::read_dir(folder.path()).unwrap().count()),
             (vec![b], 2)
         );
+    }
+
+    #[test]
+    fn lines_that_were_not_edited_keep_their_text() {
+        let old = "9\r\n3\r\n\r\n3,1.0,2,3,-4,5.50,6.12438e-007, 2\r\n\
+            4 1\t2  3 , 4 5 6,2 \r\n2, 1, 1, 1, 0, -0.0, 0, 1";
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("b.dat");
+        std::fs::write(&path, old).unwrap();
+        let mut boxes = read(&path).unwrap();
+        let written = |boxes: &[CloudBox]| {
+            write(&path, boxes).unwrap();
+            std::fs::read_to_string(&path).unwrap()
+        };
+        assert_eq!(written(&boxes), old);
+        boxes[1].n_particles = 5;
+        boxes.push(boxes[0]);
+        boxes[2].center.y = 0.0;
+        let expected = "13\n4\n3,1.0,2,3,-4,5.50,6.12438e-007, 2\n5, 1, 2, 3, 4, 5, 6, 2\n\
+            2, 1, 1, 1, 0, 0, 0, 1\n3,1.0,2,3,-4,5.50,6.12438e-007, 2\n";
+        assert_eq!(written(&boxes), expected);
+        std::fs::write(&path, expected.replace('\n', "\r\n")).unwrap();
+        boxes.pop();
+        let ends = |text: String| (text.matches("\r\n").count(), text.matches('\n').count());
+        assert_eq!(ends(written(&boxes)), (5, 5));
+        std::fs::write(&path, "no boxes").unwrap();
+        assert_eq!(written(&boxes), format(&boxes));
     }
 
     #[test]

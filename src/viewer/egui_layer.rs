@@ -4,10 +4,11 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use egui::epaint::textures::TexturesDelta;
-use egui::{Context, Ui, ViewportId};
+use egui::{Context, RawInput, Ui, ViewportId};
 use winit::event::WindowEvent;
 use winit::window::Window;
 
+use super::layout;
 use super::sync::lock;
 use crate::error::Result;
 use crate::gpu::{Backdrop, Overlay, Widgets};
@@ -82,6 +83,8 @@ impl EguiLayer {
         let context = Context::default();
         context.set_visuals(egui::Visuals::dark());
         context.tessellation_options_mut(|options| options.feathering = has_feathering);
+        // Text has the size that `layout` gives it, and keys of the windows keep their meaning.
+        context.options_mut(|options| options.zoom_with_keyboard = false);
         let state = egui_winit::State::new(
             context.clone(),
             ViewportId::ROOT,
@@ -99,6 +102,22 @@ impl EguiLayer {
         let response = self.state.on_window_event(&self.window, event);
         self.needs_update |= response.repaint;
         response.consumed
+    }
+
+    /// Returns the number of pixels of a point.
+    pub fn px_per_point(&self) -> f64 {
+        layout::px_per_point(self.window.inner_size().into(), self.window.scale_factor())
+    }
+
+    /// Sets the size of text. egui changes it at the beginning of a pass, by the size of the window
+    /// in the pass before, so that a change takes a pass of its own.
+    fn set_scale(&mut self) {
+        let zoom = (self.px_per_point() / self.window.scale_factor()) as f32;
+        if (zoom - self.context.zoom_factor()).abs() > 1e-4 {
+            self.context.set_zoom_factor(zoom);
+            let output = self.context.run_ui(RawInput::default(), |_| {});
+            lock(&self.shared).textures.append(output.textures_delta);
+        }
     }
 
     /// Returns whether a text field has the keyboard focus.
@@ -131,6 +150,7 @@ impl EguiLayer {
     /// result to the render thread.
     pub fn update(&mut self, mut add: impl FnMut(&mut Ui) -> Option<Backdrop>) {
         let begin = Instant::now();
+        self.set_scale();
         let input = self.state.take_egui_input(&self.window);
         let mut backdrop = None;
         let output = self.context.run_ui(input, |ui| backdrop = add(ui));

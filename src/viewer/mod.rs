@@ -5,6 +5,9 @@
 //! into a window target, and panels (egui) are drawn over the picture. The state compiles and is
 //! tested without a window.
 
+mod digits;
+#[cfg(feature = "window")]
+mod display_loss;
 #[cfg(feature = "window")]
 pub mod edit_window;
 pub mod editor;
@@ -14,12 +17,19 @@ pub mod error_probe;
 pub mod fly_camera;
 #[cfg(feature = "window")]
 mod free_path;
+pub mod layout;
+#[cfg(feature = "window")]
+mod messages;
 #[cfg(feature = "window")]
 mod native_window;
+#[cfg(feature = "window")]
+mod overlay_text;
 #[cfg(feature = "window")]
 mod posed_player;
 pub mod scene_window;
 mod shortcut;
 mod sync;
+#[cfg(all(test, feature = "window"))]
+mod widget_check;
 #[cfg(feature = "window")]
 mod window_target;

@@ -49,7 +49,7 @@ impl Rebuild {
             self.edit(Edit::Duplicate);
             self.acts.n_duplicated += 1;
         } else {
-            let new = self.session.editor().new_box(DVec3::ZERO);
+            let new = self.session.editor().new_box(DVec3::ZERO, 10.0);
             self.edit(Edit::Add(new));
             self.acts.n_added += 1;
         }

@@ -55,6 +55,13 @@ impl Display {
         Display { server, name: format!(":{}", number.trim()) }
     }
 
+    /// Ends the server at once, as a broken connection does.
+    pub fn end(&self) {
+        let pid = self.server.id().to_string();
+        let ended = Command::new("kill").args(["-9", &pid]).status().expect("kill");
+        assert!(ended.success());
+    }
+
     pub fn name(&self) -> &str {
         &self.name
     }

@@ -19,9 +19,12 @@ pub struct ViewArgs {
     /// Close the window after this many frames
     #[arg(long, value_name = "N", value_parser = at_least_one())]
     pub frames: Option<u32>,
-    /// Begin without panels (the key h shows them)
+    /// Begin without panels (h shows them); a window below 600 pixels of width does so, too
     #[arg(long)]
     pub no_panels: bool,
+    /// Folder that F10, F11 and F12 save to; it is made when needed, and no file is replaced
+    #[arg(long, value_name = "DIR", default_value = "captures")]
+    pub captures: PathBuf,
     /// Print the times of the loops that ran as JSON when the window is closed
     #[arg(long)]
     pub json: bool,

@@ -1,7 +1,6 @@
 //! The editor's window: passes events of the window system to the controller, and carries out its
 //! requests.
 
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -20,17 +19,18 @@ use super::keys::{button_of, key_of};
 use super::panel_state::PanelState;
 use super::panels;
 use super::render_thread::{DrawRequests, DrawState, EditRenderer, RenderEvent, RenderLinks};
+use super::rescue::Rescue;
 use crate::error::{Error, Result};
 use crate::frame::DeviceChoice;
-use crate::io::box_file;
 use crate::model::camera::Pose;
+use crate::viewer::display_loss;
 use crate::viewer::editor::{
     BoxAcceptance, Chord, DisplayMode, EditedScene, EditorController, Input, Intent, ModifierKeys,
     PictureArea, RecentFiles, Request, Session, SessionEvent, default_path, perform,
 };
 use crate::viewer::egui_layer::{EguiLayer, SharedWidgets};
 use crate::viewer::fly_camera::FlyCamera;
-use crate::viewer::free_path::free_path;
+use crate::viewer::layout::{has_room_for_panels, px_per_point};
 use crate::viewer::native_window::{RenderThread, event_loop, open_window, wheel_notches};
 
 /// Options of an editor window.
@@ -60,12 +60,14 @@ pub fn run(options: Options) -> Result<()> {
         FILE.png` draws it";
     let events = event_loop::<RenderEvent>(alternative)?;
     let mut app = App::new(options, &events)?;
+    let rescue = app.rescue.clone();
+    display_loss::on_loss(move || rescue.write());
     let ran = events.run_app(&mut app).map_err(|e| Error::vulkan("window", e));
     app.close();
     // The render thread ends before the window that it draws into.
     let rendered = app.thread.take().map(RenderThread::join);
     drop(app.layer.take());
-    app.rescue();
+    app.rescue.write();
     if let Some(error) = app.failure {
         return Err(error);
     }
@@ -89,8 +91,11 @@ struct App {
     recent: RecentFiles,
     /// Why the window could not open.
     failure: Option<Error>,
+    rescue: Rescue,
+    /// Whether the user wants panels; without a choice the size of the window decides.
+    wants_panels: Option<bool>,
     /// The user has closed the window, and was asked about unsaved changes.
-    is_closed: bool,
+    is_quitting: bool,
 }
 
 impl App {
@@ -100,7 +105,7 @@ impl App {
         let camera = FlyCamera::of_scene(&whole, scene.origin()).ok_or_else(|| {
             Error::usage("the scene's camera has no direction at its first frame")
         })?;
-        let [width, height] = panels::picture_size(size, 1.0).map(f64::from);
+        let [width, height] = panels::picture_size(size, 1.0, true).map(f64::from);
         let area = PictureArea {
             size_px: DVec2::new(width, height),
             px_per_point: 1.0,
@@ -129,7 +134,9 @@ impl App {
             recent: default_path()
                 .map_or_else(RecentFiles::default, |path| RecentFiles::load(&path)),
             failure: None,
-            is_closed: false,
+            rescue: Rescue::default(),
+            wants_panels: None,
+            is_quitting: false,
         })
     }
 
@@ -137,38 +144,44 @@ impl App {
         self.links.requests.change(|state| state.is_closing = true);
     }
 
-    /// Saves unsaved changes beside the file, where the window has ended without a question: by a
-    /// lost device or by Ctrl-C.
-    fn rescue(&self) {
-        let session = self.controller.session();
-        if self.is_closed || !session.is_dirty() {
-            return;
-        }
-        let path = session.path().unwrap_or(Path::new("cloud.dat"));
-        let path = free_path(|n| path.with_extension(format!("unsaved-{n}.dat")));
-        match box_file::write(&path, session.editor().boxes()) {
-            Ok(()) => eprintln!("unsaved changes were written to {}", path.display()),
-            Err(error) => eprintln!("unsaved changes are lost: {error}"),
-        }
-    }
-
     fn open(&mut self, events: &ActiveEventLoop) -> Result<()> {
         let (window, surface) = open_window(events, "nimbus", self.size, self.choice.validation)?;
-        let (size, px_per_point) = (window.inner_size(), window.scale_factor());
+        let size = window.inner_size();
         let links = self.links.clone();
         let renderer = EditRenderer::new(surface, &self.choice, self.scene.clone(), links.clone())?;
         let widgets = links.widgets.clone();
         self.layer = Some(EguiLayer::new(window, widgets, IDLE_INTERVAL, true));
         let on_end = move || links.send(RenderEvent::Ended);
         self.thread = Some(RenderThread::start(move || renderer.run(), on_end)?);
-        self.resize(size, px_per_point);
+        self.resize(size);
         Ok(())
     }
 
-    fn resize(&mut self, size: PhysicalSize<u32>, px_per_point: f64) {
+    fn display_scale(&self) -> f64 {
+        self.layer.as_ref().map_or(1.0, |layer| layer.window.scale_factor())
+    }
+
+    fn has_panels(&self) -> bool {
+        let has_room = || has_room_for_panels(self.size, self.display_scale());
+        self.wants_panels.unwrap_or_else(has_room)
+    }
+
+    fn resize(&mut self, size: PhysicalSize<u32>) {
         self.size = size.into();
-        let [width, height] = panels::picture_size(self.size, px_per_point).map(f64::from);
+        self.place_picture();
+    }
+
+    /// Gives the picture the part of the window that the panels leave.
+    fn place_picture(&mut self) {
+        let px_per_point = px_per_point(self.size, self.display_scale());
+        let size = panels::picture_size(self.size, px_per_point, self.has_panels());
+        let [width, height] = size.map(f64::from);
         self.handle(Input::Resized { size_px: DVec2::new(width, height), px_per_point });
+    }
+
+    fn show_panels(&mut self, wanted: bool) {
+        self.wants_panels = Some(wanted);
+        self.place_picture();
     }
 
     /// Passes an input to the controller, and carries out the requests that follow.
@@ -177,6 +190,11 @@ impl App {
         while let Some(input) = next {
             let request = self.controller.handle(&input);
             next = request.and_then(|request| self.carry_out(&request));
+        }
+        if self.is_quitting {
+            self.rescue.clear();
+        } else {
+            self.rescue.update(self.controller.session());
         }
         if let Some(layer) = &mut self.layer {
             layer.request_update();
@@ -192,8 +210,10 @@ impl App {
             }
             // The panels show the question.
             Request::Ask(_) => {}
+            Request::TogglePanels => self.show_panels(!self.has_panels()),
             Request::Quit => {
-                self.is_closed = true;
+                // The user was asked about unsaved changes.
+                self.is_quitting = true;
                 self.close();
             }
             Request::Open(_) | Request::Save { .. } => {
@@ -227,6 +247,9 @@ impl App {
 
     fn press(&mut self, event: &KeyEvent) {
         if event.logical_key == Key::Named(NamedKey::Enter) {
+            if !self.has_panels() {
+                self.show_panels(true);
+            }
             self.texts.wants_focus = true;
             self.update_panels();
         } else if let Some(key) = key_of(&event.logical_key) {
@@ -237,8 +260,10 @@ impl App {
 
     /// Updates the panels, and handles the inputs that follow.
     fn update_panels(&mut self) {
+        let has_panels = self.has_panels();
         let Some(layer) = &mut self.layer else { return };
         let state = PanelState {
+            has_panels,
             controller: &self.controller,
             acceptances: &self.acceptances,
             recent: self.recent.paths(),
@@ -331,13 +356,13 @@ impl ApplicationHandler<RenderEvent> for App {
         let is_key = matches!(event, WindowEvent::KeyboardInput { .. });
         let is_typing = layer.has_keyboard_focus() || self.dialog.is_some();
         let is_consumed = (!is_key || is_typing) && layer.handle(&event);
-        let px_per_point = layer.window.scale_factor();
         match event {
             WindowEvent::CloseRequested => {
                 self.handle(Input::Event(SessionEvent::Intend(Intent::Quit)));
             }
             WindowEvent::Destroyed => self.close(),
-            WindowEvent::Resized(size) => self.resize(size, px_per_point),
+            WindowEvent::Resized(size) => self.resize(size),
+            WindowEvent::ScaleFactorChanged { .. } => self.place_picture(),
             WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
             WindowEvent::Focused(false) => self.handle(Input::FocusLost),
             // A drag goes on over the panels, and ends there.

@@ -3,10 +3,11 @@
 
 use std::path::{Path, PathBuf};
 
-use egui::{Grid, Id, Key, Modal, RichText, TextEdit, Ui, Window};
+use egui::{Id, Key, Modal, ScrollArea, TextEdit, Ui};
 
 use super::panel_state::PanelState;
-use crate::viewer::editor::{Answer, Input, Intent, MOUSE_HELP, SHORTCUTS, SessionEvent};
+use crate::viewer::editor::{Answer, Command, Input, Intent, SessionEvent, key_groups};
+use crate::viewer::overlay_text;
 
 /// A dialog for the path of a file.
 #[derive(Debug, Clone)]
@@ -25,9 +26,14 @@ impl FileDialog {
     }
 }
 
+/// Width of the dialog for a file, points.
+const WIDTH: f32 = 420.0;
+/// Height of the list of recent files, points.
+const RECENT: f32 = 160.0;
+
 /// Adds the open dialog, if there is one.
 pub fn show(
-    ui: &mut Ui,
+    ui: &Ui,
     state: &PanelState<'_>,
     dialog: &mut Option<FileDialog>,
     inputs: &mut Vec<Input>,
@@ -42,8 +48,9 @@ pub fn show(
             }));
             *dialog = None;
         }
-    } else if state.controller.shows_help() {
-        help(ui);
+    } else if state.controller.shows_help() && overlay_text::keys(ui, ui.max_rect(), &key_groups())
+    {
+        inputs.push(Input::Command(Command::Help));
     }
 }
 
@@ -71,7 +78,7 @@ fn question(ui: &Ui, intent: &Intent, inputs: &mut Vec<Input>) {
 fn choose(ui: &Ui, dialog: &mut FileDialog, recent: &[PathBuf]) -> Option<Option<PathBuf>> {
     let mut chosen = None;
     Modal::new(Id::new("file")).show(ui.ctx(), |ui| {
-        ui.set_width(360.0);
+        ui.set_width(WIDTH.min(ui.ctx().content_rect().width() - 60.0));
         ui.label(if dialog.saves { "Save as" } else { "Open" });
         let edit = TextEdit::singleline(&mut dialog.text).hint_text("path");
         let response = ui.add(edit.desired_width(f32::INFINITY));
@@ -82,11 +89,14 @@ fn choose(ui: &Ui, dialog: &mut FileDialog, recent: &[PathBuf]) -> Option<Option
         let (enter, escape) = (is_pressed(Key::Enter), is_pressed(Key::Escape));
         let path = |text: &str| Some(Some(PathBuf::from(text.trim())));
         if !dialog.saves {
-            for place in recent.iter().filter_map(|p| p.to_str()) {
-                if ui.link(place).clicked() {
-                    chosen = path(place);
+            let list = ScrollArea::vertical().id_salt("recent").max_height(RECENT);
+            list.show(ui, |ui| {
+                for place in recent.iter().filter_map(|p| p.to_str()) {
+                    if ui.link(place).clicked() {
+                        chosen = path(place);
+                    }
                 }
-            }
+            });
         }
         ui.horizontal(|ui| {
             let is_given = !dialog.text.trim().is_empty();
@@ -99,19 +109,4 @@ fn choose(ui: &Ui, dialog: &mut FileDialog, recent: &[PathBuf]) -> Option<Option
         });
     });
     chosen
-}
-
-fn help(ui: &Ui) {
-    Window::new("Keys").collapsible(false).show(ui.ctx(), |ui| {
-        Grid::new("keys").num_columns(2).spacing([12.0, 1.0]).show(ui, |ui| {
-            let keys = SHORTCUTS.iter().map(|s| (s.key, s.description));
-            let mouse = MOUSE_HELP.iter().copied();
-            let enter = ("Enter", "enter the active box's numbers");
-            for (key, description) in keys.chain([enter]).chain(mouse) {
-                ui.label(RichText::new(key).monospace());
-                ui.label(description);
-                ui.end_row();
-            }
-        });
-    });
 }

@@ -2,25 +2,82 @@
 
 use std::collections::HashMap;
 
+use egui::text::{CCursor, CCursorRange};
+use egui::text_edit::TextEditState;
 use egui::{Grid, Id, Key, TextEdit, Ui};
 
+use crate::model::boxes::CloudBox;
+use crate::viewer::digits::{shown, significant};
 use crate::viewer::editor::document::density;
 use crate::viewer::editor::{Axis, EditorController, Field, Input};
 
 /// Texts of the fields that are being edited.
 #[derive(Debug, Default)]
 pub struct FieldTexts {
-    texts: HashMap<Field, String>,
+    texts: HashMap<Field, FieldText>,
     /// The first field is to receive the focus.
     pub wants_focus: bool,
+    /// The field whose whole text is selected until the button of the mouse is released.
+    selected: Option<Field>,
+}
+
+/// Text of a field that is being edited.
+#[derive(Debug)]
+struct FieldText {
+    /// The whole value, before any edit.
+    before: String,
+    now: String,
+}
+
+impl FieldText {
+    /// Returns the text where it was edited.
+    fn typed(self) -> Option<String> {
+        (self.now != self.before && !self.now.trim().is_empty()).then_some(self.now)
+    }
 }
 
 impl FieldTexts {
     /// Takes the entered texts as inputs.
     pub fn take(&mut self) -> Vec<Input> {
-        let texts = self.texts.drain().filter(|(_, text)| !text.trim().is_empty());
+        let typed = |(field, text): (Field, FieldText)| Some((field, text.typed()?));
+        let texts = self.texts.drain().filter_map(typed);
         texts.map(|(field, text)| Input::Typed { field, text }).collect()
     }
+}
+
+/// Number of digits of lengths, of the largest length or coordinate of the box.
+const LENGTH_DIGITS: i32 = 6;
+/// Number of digits of a density, which follows from the other numbers.
+const DENSITY_DIGITS: i32 = 4;
+/// Width of the fields' names, points.
+const NAMES: f32 = 66.0;
+/// Width of a field, points.
+const FIELD: f32 = 130.0;
+
+/// A number as a field shows it.
+struct Shown {
+    /// Every digit, for an edit.
+    whole: String,
+    /// The digits that matter.
+    rounded: String,
+}
+
+impl Shown {
+    fn exact(v: f64) -> Shown {
+        Shown { whole: format!("{v}"), rounded: format!("{v}") }
+    }
+
+    fn with_digits(v: f64, n: i32) -> Shown {
+        Shown { rounded: significant(v, n), ..Shown::exact(v) }
+    }
+}
+
+/// Returns the length that matters in a box: the last of six digits of its largest number, and no
+/// more than the step of the grid.
+fn resolution(b: &CloudBox, step: f64) -> f64 {
+    let largest = b.center.abs().max(b.extent).max_element().max(b.radius_max);
+    let digits = if largest > 0.0 { largest.log10().floor() } else { 0.0 };
+    10f64.powf(digits - f64::from(LENGTH_DIGITS - 1)).min(step)
 }
 
 /// Adds the fields.
@@ -40,61 +97,91 @@ pub fn show(
         None => ui.weak("no box is selected"),
     };
     let active = active.map(|(_, b)| b);
-    Grid::new("fields").num_columns(2).spacing([8.0, 2.0]).show(ui, |ui| {
-        let mut row = |name: &str, field: Field, value: Option<f64>, hint: &str| {
+    let step = editor.settings().snap.step;
+    let length = |of: fn(&CloudBox, Axis) -> f64, axis: Axis| {
+        let b = active?;
+        let v = of(b, axis);
+        Some(Shown { rounded: shown(v, resolution(b, step)), ..Shown::exact(v) })
+    };
+    Grid::new("fields").num_columns(2).min_col_width(NAMES).spacing([8.0, 2.0]).show(ui, |ui| {
+        let mut row = |name: &str, field: Field, value: Option<Shown>, hint: &str| {
             ui.label(name).on_hover_text(hint);
             edit(ui, texts, field, value, inputs);
             ui.end_row();
         };
         const LENGTH: &str = "in scene units, or 1.5 m, 150 cm, 2 km";
-        let n = active.map(|b| f64::from(b.n_particles));
+        let n = active.map(|b| Shown::exact(b.n_particles.into()));
         row("particles", Field::Count, n, "a whole number");
         let hint = "particles in a cubic unit; 12 /m³, 0.5 /km³";
-        row("density", Field::Density, active.and_then(density), hint);
+        let density = active.and_then(density).map(|v| Shown::with_digits(v, DENSITY_DIGITS));
+        row("density", Field::Density, density, hint);
         for axis in Axis::ALL {
-            let value = active.map(|b| b.extent[axis.index()]);
+            let value = length(|b, axis| b.extent[axis.index()], axis);
             row(&format!("extent {}", axis.name()), Field::Extent(axis), value, LENGTH);
         }
         for axis in Axis::ALL {
-            let value = active.map(|b| b.center[axis.index()]);
+            let value = length(|b, axis| b.center[axis.index()], axis);
             row(&format!("centre {}", axis.name()), Field::Center(axis), value, LENGTH);
         }
-        row("radius", Field::Radius, active.map(|b| b.radius_max), LENGTH);
+        row("radius", Field::Radius, length(|b, _| b.radius_max, Axis::X), LENGTH);
         let hint = "of the cloud's particles; not saved in the file";
-        row("seed", Field::Seed, Some(f64::from(editor.document().seed)), hint);
+        row("seed", Field::Seed, Some(Shown::exact(editor.document().seed.into())), hint);
         let hint = "of the grid that drags snap to";
-        row("grid step", Field::SnapStep, Some(editor.settings().snap.step), hint);
+        row("grid step", Field::SnapStep, Some(Shown::with_digits(step, LENGTH_DIGITS)), hint);
     });
 }
 
 /// Adds one field. It is disabled without a value.
+///
+/// A field shows the digits that matter. While it has the focus it shows every digit, selected, so
+/// that typed text replaces them.
 fn edit(
     ui: &mut Ui,
     texts: &mut FieldTexts,
     field: Field,
-    value: Option<f64>,
+    value: Option<Shown>,
     inputs: &mut Vec<Input>,
 ) {
     let is_enabled = value.is_some();
-    let value = value.map_or(String::new(), |v| format!("{v}"));
-    // A focused field is empty and shows its value as a hint, so that typed text replaces it.
-    let mut text = texts.texts.get(&field).cloned().unwrap_or_else(|| value.clone());
-    let edit =
-        TextEdit::singleline(&mut text).id(Id::new(field)).desired_width(110.0).hint_text(value);
+    let value = value.unwrap_or(Shown { whole: String::new(), rounded: String::new() });
+    let text = texts.texts.get(&field).map(|text| text.now.clone());
+    let mut text = text.unwrap_or(value.rounded);
+    let id = Id::new(field);
+    let width = FIELD.min(ui.available_width());
+    let edit = TextEdit::singleline(&mut text).id(id).desired_width(width);
     let response = ui.add_enabled(is_enabled, edit);
     if texts.wants_focus && is_enabled {
         texts.wants_focus = false;
         response.request_focus();
     }
     if response.gained_focus() {
-        texts.texts.insert(field, String::new());
-    } else if response.changed() {
-        texts.texts.insert(field, text);
+        let (before, now) = (value.whole.clone(), value.whole);
+        texts.texts.insert(field, FieldText { before, now });
+        texts.selected = Some(field);
+    } else if response.changed()
+        && let Some(typed) = texts.texts.get_mut(&field)
+    {
+        typed.now = text;
+    }
+    if texts.selected == Some(field) {
+        select_all(ui, id);
+        if !ui.input(|input| input.pointer.any_down()) {
+            texts.selected = None;
+        }
     }
     if response.lost_focus() {
         let is_cancelled = ui.input(|input| input.key_pressed(Key::Escape));
-        let typed = texts.texts.remove(&field);
-        let typed = typed.filter(|text| !text.trim().is_empty() && !is_cancelled);
+        let typed = texts.texts.remove(&field).and_then(FieldText::typed);
+        let typed = typed.filter(|_| !is_cancelled);
         inputs.extend(typed.map(|text| Input::Typed { field, text }));
     }
+}
+
+/// Selects the whole text of a field.
+fn select_all(ui: &Ui, id: Id) {
+    let mut state = TextEditState::load(ui.ctx(), id).unwrap_or_default();
+    // The field limits the range to its text.
+    let whole = CCursorRange::two(CCursor::new(0), CCursor::new(usize::MAX));
+    state.cursor.set_char_range(Some(whole));
+    state.store(ui.ctx(), id);
 }

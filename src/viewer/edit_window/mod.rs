@@ -7,6 +7,7 @@ mod keys;
 mod panel_state;
 mod panels;
 mod render_thread;
+mod rescue;
 mod shapes;
 
 pub(crate) use app::{Options, run};

@@ -12,6 +12,8 @@ pub struct PanelState<'a> {
     pub acceptances: &'a [BoxAcceptance],
     /// Recently opened files, newest first.
     pub recent: &'a [PathBuf],
+    /// Whether panels are shown beside the picture.
+    pub has_panels: bool,
     /// Why the picture does not show the document.
     pub failure: Option<&'a str>,
 }

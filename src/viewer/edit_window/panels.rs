@@ -1,6 +1,7 @@
-//! The editor's panels: file, numbers, buttons, list of boxes, and status line.
+//! The editor's panels: file, numbers, buttons, list of boxes, status line, and messages.
 
-use egui::{Color32, Frame, Margin, Panel, RichText, ScrollArea, TextStyle, Ui};
+use egui::{Align, Button, Color32, Frame, Id, Layout, Margin, Panel, Rect, RichText, ScrollArea};
+use egui::{TextStyle, Ui, vec2};
 
 use super::dialogs::{self, FileDialog};
 use super::fields::{self, FieldTexts};
@@ -10,24 +11,42 @@ use crate::viewer::editor::{
     Action, Axis, Command, DisplayMode, Input, SHORTCUTS, ScalingAnchor, Select, SelectionMode,
     SessionEvent, Setting, mean_rate,
 };
+use crate::viewer::layout::panel_width;
+use crate::viewer::overlay_text::{self, banner, rows_of_third, shrink_text};
 use crate::viewer::shortcut::Shortcut;
 
 /// Width of the panel, points.
 const WIDTH: f32 = 230.0;
+/// Largest part of the window's width that the panel covers. With the status line it is a third of
+/// a window of 640 × 480.
+const MAX_SHARE: f64 = 0.3;
 /// Height of the status line, points.
-const STATUS: f32 = 30.0;
-/// Height of the list of boxes, points.
-const LIST: f32 = 130.0;
+const STATUS: f32 = 24.0;
+/// Part of the panel's height that the list of boxes has at least.
+const LIST_SHARE: f32 = 0.25;
+/// Height of the list of boxes at least, points.
+const LEAST_LIST: f32 = 60.0;
+/// Number of rows of a message.
+const MESSAGE_ROWS: usize = 4;
 const BACKGROUND: Color32 = Color32::from_rgb(24, 26, 30);
-const ERROR: Color32 = Color32::from_rgb(240, 110, 100);
+/// The line over an empty picture.
+const FIRST_STEPS: &str = "A: add a box where the view looks    ?: all keys";
 
 /// Returns the size of the picture that the panels leave in a window of `size` pixels, at least one
 /// pixel. The picture is at the upper left corner.
-pub fn picture_size([width, height]: [u32; 2], px_per_point: f64) -> [u32; 2] {
-    let less = |n: u32, points: f32| {
-        n.saturating_sub((f64::from(points) * px_per_point).round() as u32).max(1)
+pub fn picture_size(size: [u32; 2], px_per_point: f64, has_panels: bool) -> [u32; 2] {
+    let width = width_of(f64::from(size[0]) / px_per_point);
+    let panels = if has_panels { [width, STATUS] } else { [0.0; 2] };
+    let less = |k: usize| {
+        let px = (f64::from(panels[k]) * px_per_point).round() as u32;
+        size[k].saturating_sub(px).max(1)
     };
-    [less(width, WIDTH), less(height, STATUS)]
+    [less(0), less(1)]
+}
+
+/// Returns the width of the panel in a window of this width; points.
+fn width_of(window_points: f64) -> f32 {
+    panel_width(window_points, WIDTH.into(), MAX_SHARE) as f32
 }
 
 /// Adds the overlay and all panels. Returns the inputs that follow from clicks and typed text.
@@ -39,23 +58,46 @@ pub fn show(
 ) -> Vec<Input> {
     let mut inputs = vec![];
     shapes::draw(ui, state.controller);
-    let frame = Frame::new().fill(BACKGROUND).inner_margin(Margin::same(6));
-    let status_line = Panel::bottom("status").resizable(false).exact_size(STATUS).frame(frame);
-    status_line.show(ui, |ui| status(ui, state));
-    let numbers = Panel::right("numbers").resizable(false).exact_size(WIDTH).frame(frame);
-    numbers.show(ui, |ui| {
-        ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-            file(ui, state, &mut inputs);
-            ui.separator();
-            fields::show(ui, state.controller, texts, &mut inputs);
-            ui.separator();
-            buttons(ui, state, &mut inputs);
-            ui.separator();
-            list(ui, state, &mut inputs);
-        });
-    });
+    if state.has_panels {
+        sides(ui, state, texts, &mut inputs);
+    }
+    let mut free = ui.available_rect_before_wrap();
+    if let Some(failure) = state.failure {
+        free = banner(ui, free, failure, overlay_text::ERROR, rows_of_third(free));
+    }
+    if let Some(message) = state.controller.message() {
+        free = banner(ui, free, message, overlay_text::MESSAGE, MESSAGE_ROWS);
+    }
+    if state.controller.editor().boxes().is_empty() && !state.controller.shows_help() {
+        banner(ui, free, FIRST_STEPS, overlay_text::MESSAGE, MESSAGE_ROWS);
+    }
     dialogs::show(ui, state, dialog, &mut inputs);
     inputs
+}
+
+/// Adds the status line and the panel.
+fn sides(ui: &mut Ui, state: &PanelState<'_>, texts: &mut FieldTexts, inputs: &mut Vec<Input>) {
+    let width = width_of(ui.max_rect().width().into());
+    let frame = Frame::new().fill(BACKGROUND).inner_margin(Margin::symmetric(6, 2));
+    let status_line = Panel::bottom("status").resizable(false).exact_size(STATUS).frame(frame);
+    status_line.show(ui, |ui| status(ui, state));
+    let frame = Frame::new().fill(BACKGROUND).inner_margin(Margin::same(6));
+    let numbers = Panel::right("numbers").resizable(false).exact_size(width).frame(frame);
+    numbers.show(ui, |ui| {
+        shrink_text(ui, width / WIDTH);
+        // The list has a part of the panel, however many numbers and buttons are above it.
+        let of_list = (LIST_SHARE * ui.available_height()).max(LEAST_LIST);
+        let controls = ScrollArea::vertical().id_salt("controls").auto_shrink([false, true]);
+        controls.max_height((ui.available_height() - of_list).max(0.0)).show(ui, |ui| {
+            file(ui, state, inputs);
+            ui.separator();
+            fields::show(ui, state.controller, texts, inputs);
+            ui.separator();
+            buttons(ui, state, inputs);
+        });
+        ui.separator();
+        list(ui, state, inputs);
+    });
 }
 
 /// Adds a button for a command. Its tooltip names the shortcut.
@@ -112,7 +154,7 @@ fn buttons(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
             button(ui, &text, command, label.is_some(), inputs);
         }
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         use DisplayMode::{Both, Boxes, Cloud};
         for (text, display) in [("Boxes", Boxes), ("Cloud", Cloud), ("Both", Both)] {
             if ui.selectable_label(settings.display == display, text).clicked() {
@@ -123,7 +165,7 @@ fn buttons(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
             inputs.push(Input::Command(Command::ToggleSnap));
         }
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let mut is_centred = settings.anchor == ScalingAnchor::Center;
         let hover = "scaling keeps the centre in place, else the opposite face (Shift inverts)";
         if ui.checkbox(&mut is_centred, "Symmetric").on_hover_text(hover).clicked() {
@@ -139,16 +181,32 @@ fn buttons(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
     });
 }
 
+/// Adds the list of boxes, which fills the rest of the panel and scrolls to a new active box.
 fn list(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
     let editor = state.controller.editor();
-    let (height, n) = (ui.text_style_height(&TextStyle::Body), editor.boxes().len());
-    let area = ScrollArea::vertical().id_salt("boxes").max_height(LIST).auto_shrink([false, true]);
+    let n = editor.boxes().len();
+    let text_height = ui.text_style_height(&TextStyle::Button);
+    let height =
+        ui.spacing().interact_size.y.max(text_height + 2.0 * ui.spacing().button_padding.y);
+    let active = editor.active_box().map(|(i, _)| i);
+    let id = Id::new("listed active box");
+    let was_active = ui.data(|data| data.get_temp::<Option<usize>>(id)).flatten();
+    ui.data_mut(|data| data.insert_temp(id, active));
+    let area = ScrollArea::vertical().id_salt("boxes").auto_shrink(false);
     area.show_rows(ui, height, n, |ui, rows| {
+        if let Some(i) = active.filter(|_| active != was_active) {
+            let step = height + ui.spacing().item_spacing.y;
+            let top = ui.max_rect().top() + (i as f32 - rows.start as f32) * step;
+            let row = Rect::from_x_y_ranges(ui.max_rect().x_range(), top..=top + height);
+            ui.scroll_to_rect(row, None);
+        }
         for i in rows {
             let rate = state.acceptances.get(i).and_then(|b| b.acceptance.rate());
             let rate = rate.map_or(String::new(), |r| format!(", {:.0} % accepted", 100.0 * r));
             let text = format!("{i}: {} particles{rate}", editor.boxes()[i].n_particles);
-            if ui.selectable_label(editor.selection().contains(i), text).clicked() {
+            let is_selected = editor.selection().contains(i);
+            let row = Button::selectable(is_selected, text).min_size(vec2(0.0, height)).truncate();
+            if ui.add(row).clicked() {
                 let keys = ui.input(|input| input.modifiers);
                 let mode = match (keys.command, keys.shift) {
                     (true, _) => SelectionMode::Toggle,
@@ -164,17 +222,17 @@ fn list(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
 
 fn status(ui: &mut Ui, state: &PanelState<'_>) {
     let document = state.controller.editor().document();
-    ui.horizontal(|ui| {
-        let mut text =
-            format!("{} boxes, {} particles", document.boxes.len(), document.n_particles());
-        if let Some(rate) = mean_rate(state.acceptances) {
-            text += &format!(", {:.1} % of attempts accepted", 100.0 * rate);
-        }
+    let mut text = format!("{} boxes, {} particles", document.boxes.len(), document.n_particles());
+    if let Some(rate) = mean_rate(state.acceptances) {
+        text += &format!(", {:.1} % of attempts accepted", 100.0 * rate);
+    }
+    ui.horizontal_centered(|ui| {
         ui.label(text);
-        if let Some(failure) = state.failure {
-            ui.label(RichText::new(failure).color(ERROR));
-        } else if let Some(message) = state.controller.message() {
-            ui.label(RichText::new(message).strong());
-        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.weak("?: all keys    H: hide panels");
+        });
     });
 }
+
+#[cfg(test)]
+mod tests;

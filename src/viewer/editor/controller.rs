@@ -166,6 +166,7 @@ impl EditorController {
                 self.shows_help = !self.shows_help;
                 return None;
             }
+            Command::TogglePanels => return Some(Request::TogglePanels),
             Command::Cancel if self.shows_help => {
                 self.shows_help = false;
                 return None;
@@ -181,7 +182,8 @@ impl EditorController {
                 return None;
             }
             Command::Add => {
-                let new = self.editor().new_box(self.pointer.place_for_new());
+                let (place, view_height) = self.pointer.place_for_new(self.editor().boxes());
+                let new = self.editor().new_box(place, view_height);
                 SessionEvent::Act(Action::Edit(Edit::Add(new)))
             }
             Command::Move => SessionEvent::Act(self.pointer.begin_key_drag(Handle::MoveView)),

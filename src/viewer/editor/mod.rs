@@ -60,8 +60,7 @@ pub use viewport::Viewport;
 #[cfg(feature = "window")]
 pub(crate) use self::{
     acceptance::{BoxAcceptance, box_acceptances, mean_rate},
-    input::MOUSE_HELP,
     overlay::{Color, Shape, Stroke, overlay_shapes},
     recent_files::{RecentFiles, default_path},
-    shortcuts::{Command, SHORTCUTS},
+    shortcuts::{Command, SHORTCUTS, key_groups},
 };

@@ -7,7 +7,8 @@ use super::handles::{Handle, pick_handle};
 use super::input::{Button, ModifierKeys};
 use super::selection::SelectionMode;
 use super::state::Editor;
-use super::viewport::{Viewport, framing, pick_all, pick_rectangle};
+use super::viewport::{Viewport, bounds, framing, pick_all, pick_rectangle};
+use crate::model::boxes::CloudBox;
 use crate::viewer::fly_camera::{FlyCamera, Motion};
 
 /// The part of the window that the picture fills.
@@ -251,12 +252,21 @@ impl Pointer {
         self.camera = self.camera.placed(position, target);
     }
 
-    /// Returns the place for a new box: under the pointer at the depth of the target, or the target
-    /// itself.
-    pub fn place_for_new(&self) -> DVec3 {
-        let (view, target) = (self.viewport(), self.camera.target());
-        let under = self.pixel.and_then(|p| view.ray(p).on_plane(target, view.pose.forward));
-        under.unwrap_or(target)
+    /// Returns the place for a new box, and the height of the view there, scene units.
+    ///
+    /// It is the point that the middle of the picture looks at: on the nearest box there, or else
+    /// as far away as the middle of the cloud; in an empty cloud the camera's target.
+    pub fn place_for_new(&self, boxes: &[CloudBox]) -> (DVec3, f64) {
+        let view = self.viewport();
+        let ray = view.ray(0.5 * view.size_px);
+        let hit = boxes.iter().filter_map(|b| ray.hit(b)).min_by(f64::total_cmp);
+        let to_cloud = || {
+            let (low, high) = bounds(boxes)?;
+            let distance = (0.5 * (low + high) - ray.origin).dot(ray.direction);
+            (distance > 0.0).then_some(distance)
+        };
+        let place = hit.or_else(to_cloud).map_or(self.camera.target(), |t| ray.at(t));
+        (place, view.units_per_point(place) * view.size_px.y / view.px_per_point)
     }
 }
 

@@ -112,6 +112,8 @@ pub enum Request {
         /// The document as written.
         document: Arc<Document>,
     },
+    /// Shows or hides the panels.
+    TogglePanels,
     /// Closes the window.
     Quit,
 }
@@ -275,9 +277,11 @@ pub fn perform(request: &Request) -> Option<SessionEvent> {
         }
         Request::Save { path, document } => box_file::write(path, &document.boxes)
             .map(|()| SessionEvent::Saved { path: path.clone(), document: document.clone() }),
-        Request::Ask(_) | Request::ChooseToOpen | Request::ChooseToSave | Request::Quit => {
-            return None;
-        }
+        Request::Ask(_)
+        | Request::ChooseToOpen
+        | Request::ChooseToSave
+        | Request::TogglePanels
+        | Request::Quit => return None,
     };
     Some(done.unwrap_or_else(SessionEvent::Failed))
 }

@@ -86,12 +86,14 @@ pub enum Command {
     ToggleSnap,
     /// Sets what is drawn.
     Display(DisplayMode),
+    /// Shows or hides the panels.
+    TogglePanels,
     /// Lists the keys.
     Help,
 }
 
 /// Every shortcut, in the order of the list of keys. Panels show the first chord of a command.
-pub const SHORTCUTS: [Shortcut<Command>; 30] = [
+pub const SHORTCUTS: [Shortcut<Command>; 31] = [
     Shortcut::new("Ctrl+N", Command::New, "new cloud"),
     Shortcut::new("Ctrl+O", Command::Open, "open a box file"),
     Shortcut::new("Ctrl+S", Command::Save, "save"),
@@ -100,7 +102,7 @@ pub const SHORTCUTS: [Shortcut<Command>; 30] = [
     Shortcut::new("Ctrl+Z", Command::Undo, "undo"),
     Shortcut::new("Ctrl+Shift+Z", Command::Redo, "redo"),
     Shortcut::new("Ctrl+Y", Command::Redo, "redo"),
-    Shortcut::new("A", Command::Add, "add a box"),
+    Shortcut::new("A", Command::Add, "add a box where the view looks"),
     Shortcut::new("Ctrl+D", Command::Duplicate, "duplicate the selection"),
     Shortcut::new("Delete", Command::Delete, "delete the selection"),
     Shortcut::new("Backspace", Command::Delete, "delete the selection"),
@@ -121,8 +123,36 @@ pub const SHORTCUTS: [Shortcut<Command>; 30] = [
     Shortcut::new("1", Command::Display(DisplayMode::Boxes), "show the boxes"),
     Shortcut::new("2", Command::Display(DisplayMode::Cloud), "show the cloud"),
     Shortcut::new("3", Command::Display(DisplayMode::Both), "show both"),
-    Shortcut::new("?", Command::Help, "list the keys"),
+    Shortcut::new("H", Command::TogglePanels, "show or hide the panels"),
+    Shortcut::new("?", Command::Help, "show or hide this list"),
 ];
+
+/// Returns every key and use of the mouse, in groups.
+#[cfg(feature = "window")]
+pub fn key_groups() -> Vec<(&'static str, Vec<(&'static str, &'static str)>)> {
+    use Command as C;
+    let of = |group: fn(Command) -> bool| {
+        let shortcuts = SHORTCUTS.iter().filter(move |s| group(s.command));
+        shortcuts.map(|s| (s.key, s.description)).collect::<Vec<_>>()
+    };
+    let is_of_files = |c: Command| matches!(c, C::New | C::Open | C::Save | C::SaveAs | C::Quit);
+    let is_of_selection =
+        |c: Command| matches!(c, C::SelectAll | C::Cancel | C::NextBox | C::PreviousBox);
+    let is_of_view = |c: Command| matches!(c, C::Frame | C::Display(_) | C::TogglePanels | C::Help);
+    let boxes = of(|c| {
+        use Command as C;
+        let adds = matches!(c, C::Add | C::Duplicate | C::Delete | C::Undo | C::Redo);
+        let changes = matches!(c, C::Move | C::Scale | C::Axis(_) | C::ToggleSnap);
+        adds || changes || matches!(c, C::Mirror | C::MirrorCopy | C::MirrorMiddle)
+    });
+    vec![
+        ("View", of(is_of_view)),
+        ("Boxes", [boxes, vec![("Enter", "enter the active box's numbers")]].concat()),
+        ("Selection", of(is_of_selection)),
+        ("Mouse", super::input::MOUSE_HELP.to_vec()),
+        ("File", of(is_of_files)),
+    ]
+}
 
 /// Returns the command of a chord.
 pub fn command(chord: Chord) -> Option<Command> {
@@ -169,6 +199,7 @@ impl Command {
             | Command::Frame
             | Command::Move
             | Command::Scale
+            | Command::TogglePanels
             | Command::Help => return None,
         })
     }

@@ -8,6 +8,7 @@ use super::action::{Action, DragAction, DragModifiers, Edit, Select, Setting};
 use super::document::Document;
 use super::drag::Drag;
 use super::edits::edited;
+use super::grid_snap::GridSnap;
 use super::handles::{Handle, PlacedHandle, place_handles};
 use super::history::History;
 use super::selection::Selection;
@@ -25,9 +26,28 @@ pub struct Editor {
     drag: Option<Drag>,
 }
 
-/// The box that is added to an empty document: the most common one in P.
+/// Share of the view's height that a new box has.
+const NEW_SHARE: f64 = 0.1;
+/// Shares of the view's height that a copied box may have.
+const COPIED_SHARES: std::ops::RangeInclusive<f64> = 0.01..=0.7;
+
+/// The box that is added to an empty document, in units of its edge: the most common one in P.
 pub const NEW_BOX: CloudBox =
     CloudBox { n_particles: 10, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 2.0 };
+
+/// Returns 1, 2 or 5 times a power of ten, whichever is nearest to `v` by its ratio; 1 where `v` is
+/// no positive number.
+fn round_number(v: f64) -> f64 {
+    if !(v.is_finite() && v > 0.0) {
+        return 1.0;
+    }
+    let power = v.log10().floor();
+    let off = |k: f64| (v / (k * 10f64.powf(power))).ln().abs();
+    let nearest = [1.0, 2.0, 5.0, 10.0].into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b)));
+    // Parsing gives the number nearest to the decimal one, where powf may be off by a bit.
+    let written = format!("{}e{power}", nearest.unwrap_or(1.0));
+    written.parse().unwrap_or(1.0)
+}
 
 impl Default for Editor {
     fn default() -> Self {
@@ -201,12 +221,24 @@ impl Editor {
         self.active_box().map_or_else(Vec::new, |(_, b)| place_handles(b, view))
     }
 
-    /// Returns a box to add at `place`, or at the nearest grid point where snapping is on. It
-    /// copies the active box, if there is one.
-    pub fn new_box(&self, place: DVec3) -> CloudBox {
+    /// Returns a box to add at `place`, or at the nearest grid point where snapping is on.
+    ///
+    /// `view_height` is the height of the view there, scene units. The box copies the active one
+    /// where that has a size to work with in this view. Else it is a cube of about a tenth of the
+    /// view. Its coordinates have only the digits that show.
+    pub fn new_box(&self, place: DVec3, view_height: f64) -> CloudBox {
+        let edge = round_number(NEW_SHARE * view_height);
+        let fits = |b: &CloudBox| COPIED_SHARES.contains(&(b.extent.max_element() / view_height));
+        let active = self.active_box().map(|(_, b)| *b).filter(fits);
+        let new = active.unwrap_or(CloudBox {
+            extent: edge * NEW_BOX.extent,
+            radius_max: edge * NEW_BOX.radius_max,
+            ..NEW_BOX
+        });
         let snap = self.settings.snap;
-        let center = if snap.is_on { snap.place(place) } else { place };
-        CloudBox { center, ..self.active_box().map_or(NEW_BOX, |(_, b)| *b) }
+        let fine = GridSnap { is_on: true, step: 0.01 * edge };
+        let center = if snap.is_on { snap.place(place) } else { fine.place(place) };
+        CloudBox { center, ..new }
     }
 
     /// Returns the lower and upper bounds of the selected boxes, or of all boxes where none is

@@ -1,6 +1,6 @@
 //! The scene window: passes events of the window system to the view state, and answers commands.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -13,6 +13,7 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow};
 use winit::keyboard::{Key, NamedKey};
 use winit::window::WindowId;
 
+use super::captures::Captures;
 use super::error_meter::ErrorMeter;
 use super::file_watch::FileWatch;
 use super::frame_loop::LoopTimes;
@@ -25,10 +26,9 @@ use super::view_state::{Response, ViewState};
 use crate::error::{Error, Result};
 use crate::frame::DeviceChoice;
 use crate::gpu::PresentMode;
-use crate::io::image::{self, ImageKind};
-use crate::model::film::Film;
+use crate::viewer::display_loss;
 use crate::viewer::egui_layer::{EguiLayer, SharedWidgets};
-use crate::viewer::free_path::free_path;
+use crate::viewer::messages::Messages;
 use crate::viewer::native_window::{RenderThread, event_loop, open_window, wheel_notches};
 use crate::viewer::sync::lock;
 
@@ -48,8 +48,10 @@ pub struct Options {
     pub stop: &'static AtomicBool,
     /// Whether no message is printed.
     pub is_quiet: bool,
-    /// Whether panels are shown at the start.
+    /// Whether panels are shown at the start, in a window with room for them.
     pub has_panels: bool,
+    /// The folder that pictures and scenes are saved to.
+    pub captures: PathBuf,
 }
 
 /// Times measured while a window was open.
@@ -71,8 +73,10 @@ const IDLE_INTERVAL: Duration = Duration::from_millis(250);
 pub fn run(options: Options) -> Result<WindowTimes> {
     let mut state = ViewState::new(options.source.first.clone(), options.skips)
         .ok_or_else(|| Error::usage("the scene's camera has no direction at its first frame"))?;
-    state.has_panels = options.has_panels;
+    (state.fits_panels, state.shows_hint) = (options.has_panels, options.has_panels);
     let events = event_loop::<RenderEvent>("`nimbus render SCENE -o FILE.png` needs none")?;
+    // A view has nothing to lose.
+    display_loss::on_loss(|| {});
     let files = FileWatch::new(&options.source.files, options.choice.shaders.as_deref());
     let links = RenderLinks {
         state: Arc::new(Mutex::new(state)),
@@ -82,6 +86,8 @@ pub fn run(options: Options) -> Result<WindowTimes> {
         stop: options.stop,
     };
     let mut app = App {
+        captures: Captures::new(&options.captures, &options.source.path),
+        messages: Messages::default(),
         options,
         links,
         files,
@@ -121,6 +127,8 @@ struct App {
     layer: Option<EguiLayer>,
     pointer: Pointer,
     error_meter: ErrorMeter,
+    captures: Captures,
+    messages: Messages,
     /// Why the window could not open.
     failure: Option<Error>,
 }
@@ -140,14 +148,15 @@ impl ApplicationHandler<RenderEvent> for App {
             RenderEvent::Title(text) => {
                 self.layer.iter().for_each(|layer| layer.window.set_title(&text));
             }
-            RenderEvent::Message(text) => self.print(&text),
+            RenderEvent::Message(text) => self.tell(&text),
+            RenderEvent::Note(text) => self.print(&text),
             RenderEvent::Capture { format, film, rgba } => {
-                let message = capture(format, &film, &rgba);
-                self.print(&message.unwrap_or_else(|e| e.to_string()));
+                let saved = self.captures.save_picture(format, &film, &rgba);
+                self.tell_saved(saved);
             }
             RenderEvent::Readback(readback) => {
                 let message = self.error_meter.compare(&readback);
-                message.iter().for_each(|text| self.print(text));
+                message.iter().for_each(|text| self.tell(text));
             }
             RenderEvent::ErrorChanged => self.request_panels(),
             RenderEvent::Ended => events.exit(),
@@ -176,7 +185,11 @@ impl ApplicationHandler<RenderEvent> for App {
             }
             _ => {}
         }
-        if self.state().has_panels
+        let has_widgets = {
+            let state = self.state();
+            state.has_panels || state.shows_help
+        };
+        if has_widgets
             && let Some(layer) = &mut self.layer
             && layer.handle(&event)
         {
@@ -185,8 +198,10 @@ impl ApplicationHandler<RenderEvent> for App {
         match event {
             // The render thread ends, and its event closes the window.
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.state().is_closing = true,
-            WindowEvent::Resized(PhysicalSize { width, height }) => {
-                self.state().size = [width, height];
+            WindowEvent::Resized(size) => self.resize(size),
+            WindowEvent::ScaleFactorChanged { .. } => {
+                let size = self.layer.as_ref().map(|layer| layer.window.inner_size());
+                size.into_iter().for_each(|size| self.resize(size));
             }
             WindowEvent::Focused(false) => self.state().release_all(),
             WindowEvent::KeyboardInput { event, .. }
@@ -227,7 +242,7 @@ impl App {
         let title = if scene.title.is_empty() { "nimbus" } else { &scene.title };
         let size = [scene.film.width, scene.film.height];
         let (window, surface) = open_window(events, title, size, choice.validation)?;
-        self.state().size = window.inner_size().into();
+        self.state().resize(window.inner_size().into(), window.scale_factor());
         let links = self.links.clone();
         let renderer = SceneRenderer::new(surface, choice, *mode, *n_frames, links.clone())?;
         let widgets = links.widgets.clone();
@@ -253,7 +268,7 @@ impl App {
         match read {
             Ok(scene) => {
                 self.state().reload(scene);
-                self.print(&format!("{} has changed", self.options.source.path.display()));
+                self.tell(&format!("{} has changed", self.options.source.path.display()));
             }
             Err(error) => self.print(&error.to_string()),
         }
@@ -264,10 +279,22 @@ impl App {
         self.layer.iter_mut().for_each(EguiLayer::request_update);
     }
 
-    /// Updates the panels where due. Returns whether any widget is shown.
+    fn resize(&mut self, size: PhysicalSize<u32>) {
+        let scale = self.layer.as_ref().map_or(1.0, |layer| layer.window.scale_factor());
+        self.state().resize(size.into(), scale);
+        self.request_panels();
+    }
+
+    /// Updates the widgets where due. Returns whether any widget is shown.
     fn update_panels(&mut self) -> bool {
-        let has_panels = self.state().has_panels;
-        let is_shown = has_panels || lock(&self.links.status).alarm().is_some();
+        let messages = self.messages.at(Instant::now());
+        // Copies, so that the render thread never waits for the panels.
+        let (state, status) = (lock(&self.links.state).clone(), lock(&self.links.status).clone());
+        let is_shown = state.has_panels
+            || state.shows_help
+            || state.shows_hint
+            || !messages.is_empty()
+            || status.alarm().is_some();
         let Some(layer) = &mut self.layer else { return is_shown };
         if !is_shown {
             layer.hide();
@@ -276,18 +303,10 @@ impl App {
         if !layer.is_due() {
             return true;
         }
-        // Copies, so that the render thread never waits for the panels.
-        let (state, status) = (lock(&self.links.state).clone(), lock(&self.links.status).clone());
         let mut commands = vec![];
         layer.update(|ui| {
-            let backdrop = has_panels.then(|| {
-                let (clicked, backdrop) = panels::show(ui, &state, &status);
-                commands.extend(clicked);
-                backdrop
-            });
-            if let Some(text) = status.alarm() {
-                panels::alarm(ui, &text);
-            }
+            let (clicked, backdrop) = panels::show_all(ui, &state, &status, &messages);
+            commands.extend(clicked);
             backdrop
         });
         if !commands.is_empty() {
@@ -300,23 +319,43 @@ impl App {
         true
     }
 
-    fn respond(&self, response: Response) {
-        let source = &self.options.source;
+    fn respond(&mut self, response: Response) {
+        // A key changes what the panels show.
+        self.request_panels();
         match response {
             Response::Nothing => {}
-            Response::Message(text) => self.print(&text),
+            Response::Message(text) => self.tell(&text),
             Response::PrintCommandLine => {
+                let source = &self.options.source;
                 let path = source.path.display().to_string();
                 let line = self.state().command_line(&path, &source.first);
                 println!("{line}");
                 self.layer.iter().for_each(|layer| layer.copy(&line));
+                self.show(&format!("copied, and printed on the terminal: {line}"));
             }
             Response::SaveScene => {
                 let state = self.state().clone();
-                let saved = source.save(&state).map(|path| format!("saved {}", path.display()));
-                self.print(&saved.unwrap_or_else(|e| e.to_string()));
+                let source = &self.options.source;
+                let saved = self.captures.save_scene(|to| source.text_of_view(&state, to));
+                self.tell_saved(saved);
             }
         }
+    }
+
+    fn tell_saved(&mut self, saved: Result<PathBuf>) {
+        let text = |path: &Path| format!("saved {}", path.display());
+        self.tell(&saved.map_or_else(|e| e.to_string(), |path| text(&path)));
+    }
+
+    /// Shows a message in the window, and prints it.
+    fn tell(&mut self, text: &str) {
+        self.print(text);
+        self.show(text);
+    }
+
+    fn show(&mut self, text: &str) {
+        self.messages.push(text, Instant::now());
+        self.request_panels();
     }
 
     fn print(&self, text: &str) {
@@ -326,17 +365,6 @@ impl App {
     }
 }
 
-/// Saves a picture in the current folder under a free name. Returns a message.
-fn capture(format: ImageKind, film: &Film, rgba: &[f32]) -> Result<String> {
-    let extension = match format {
-        ImageKind::Png => "png",
-        ImageKind::Exr => "exr",
-    };
-    let path = free_path(|n| PathBuf::from(format!("view-{n}.{extension}")));
-    image::write(&path, film, film.width, film.height, rgba)?;
-    Ok(format!("saved {}", path.display()))
-}
-
 /// Returns the name of a key as the shortcuts have it.
 fn key_name(key: &Key) -> Option<String> {
     let name = match key {
@@ -344,6 +372,7 @@ fn key_name(key: &Key) -> Option<String> {
         Key::Named(NamedKey::Space) => "space",
         Key::Named(NamedKey::Home) => "home",
         Key::Named(NamedKey::Escape) => "escape",
+        Key::Named(NamedKey::F1) => "f1",
         Key::Named(NamedKey::F10) => "f10",
         Key::Named(NamedKey::F11) => "f11",
         Key::Named(NamedKey::F12) => "f12",

@@ -47,16 +47,16 @@ pub enum Command {
     ToggleError,
     /// Writes a scene file that draws this view.
     SaveScene,
-    /// Prints the command that draws this view.
+    /// Copies and prints the command that draws this view.
     PrintCommandLine,
-    /// Prints the keys.
+    /// Shows or hides the list of keys.
     Help,
     /// Closes the window.
     Quit,
 }
 
 /// Every key of the window except the flying keys.
-pub const SHORTCUTS: [Shortcut<Command>; 27] = [
+pub const SHORTCUTS: [Shortcut<Command>; 28] = [
     Shortcut::new(
         "t",
         Command::Advance(Knob::Threading),
@@ -112,10 +112,11 @@ pub const SHORTCUTS: [Shortcut<Command>; 27] = [
     Shortcut::new(
         "i",
         Command::PrintCommandLine,
-        "print and copy the command that draws this view",
+        "copy the command that draws this view, and print it on the terminal",
     ),
-    Shortcut::new("?", Command::Help, "print the keys"),
-    Shortcut::new("escape", Command::Quit, "close the window"),
+    Shortcut::new("?", Command::Help, "show or hide this list"),
+    Shortcut::new("f1", Command::Help, "the same"),
+    Shortcut::new("escape", Command::Quit, "close this list, or the window"),
 ];
 
 /// Keys that move the camera while they are held: direction as (right, up, forward).
@@ -128,12 +129,41 @@ pub(super) const FLYING_KEYS: [(&str, DVec3); 6] = [
     ("q", DVec3::NEG_Y),
 ];
 
-/// Returns the list of keys that `?` prints.
-pub fn help() -> String {
-    let keys: String =
-        SHORTCUTS.iter().map(|s| format!("  {:<7} {}\n", s.key, s.description)).collect();
-    format!(
-        "keys:\n{keys}  w a s d q e  fly\nmouse: the left button turns the camera, the right \
-         button orbits the target, the wheel approaches it\n"
-    )
+/// Uses of the mouse, and the keys that fly, for the list of keys.
+#[cfg(feature = "window")]
+const MOVES: [(&str, &str); 6] = [
+    ("w a s d", "fly forward, left, back, right"),
+    ("e q", "fly up, down"),
+    ("left button", "drag: turn the camera"),
+    ("right button", "drag: orbit the target"),
+    ("wheel", "approach the target, or recede"),
+    ("+ -", "fly twice or half as fast"),
+];
+
+/// The line that the window begins with.
+#[cfg(feature = "window")]
+pub const HINT: &str = "w a s d: fly    drag: turn    h: panels    ?: all keys    escape: close";
+
+/// Returns every key and use of the mouse, in groups.
+#[cfg(feature = "window")]
+pub fn key_groups() -> Vec<(&'static str, Vec<(&'static str, &'static str)>)> {
+    let of = |group: fn(Command) -> bool| {
+        let shortcuts = SHORTCUTS.iter().filter(move |s| group(s.command));
+        shortcuts.map(|s| (s.key, s.description)).collect::<Vec<_>>()
+    };
+    use Command::{
+        Advance, Capture, Compare, Count, Help, NextComparison, NextPresentMode, PrintCommandLine,
+        Quit, SaveScene, Seek, ToggleB, ToggleError, TogglePanels, ToggleSkipping,
+    };
+    vec![
+        ("Move", MOVES.to_vec()),
+        ("Window", of(|c| matches!(c, Help | TogglePanels | Quit))),
+        ("Play", of(|c| matches!(c, Seek(_)))),
+        ("Save", of(|c| matches!(c, Capture(_) | SaveScene | PrintCommandLine))),
+        (
+            "Compare and measure",
+            of(|c| matches!(c, ToggleB | NextComparison | Compare(_) | ToggleError | Count)),
+        ),
+        ("Settings", of(|c| matches!(c, Advance(_) | ToggleSkipping | NextPresentMode))),
+    ]
 }

@@ -6,6 +6,8 @@
 
 #[cfg(feature = "window")]
 mod app;
+#[cfg(feature = "window")]
+mod captures;
 mod commands;
 #[cfg(feature = "window")]
 mod comparison;
@@ -34,7 +36,6 @@ mod view_state;
 #[cfg(feature = "window")]
 pub(crate) use self::{
     app::{Options, WindowTimes, run},
-    commands::help,
     frame_loop::LoopTimes,
     scene_source::SceneSource,
 };

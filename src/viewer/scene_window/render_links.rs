@@ -18,8 +18,10 @@ use crate::viewer::sync::lock;
 pub enum RenderEvent {
     /// A new window title.
     Title(String),
-    /// A message for the terminal.
+    /// A message for the window and the terminal.
     Message(String),
+    /// A message for the terminal alone.
+    Note(String),
     /// A picture to save: premultiplied linear RGBA, rows from the top.
     Capture { format: ImageKind, film: Film, rgba: Vec<f32> },
     /// Pictures that the error measurement has asked for.
@@ -69,9 +71,14 @@ impl RenderLinks {
         drop(self.events.send_event(event));
     }
 
-    /// Sends a message for the terminal.
+    /// Sends a message for the window and the terminal.
     pub fn message(&self, text: String) {
         self.send(RenderEvent::Message(text));
+    }
+
+    /// Sends a message for the terminal alone.
+    pub fn note(&self, text: String) {
+        self.send(RenderEvent::Note(text));
     }
 
     /// Returns whether the thread is to end.

@@ -139,7 +139,8 @@ impl SceneRenderer {
         let text = format!("{}; the last good state stays", error.to_string().trim_end());
         lock(&self.links.status).render_error = Some(text.clone());
         self.links.send(RenderEvent::ErrorChanged);
-        self.links.message(text);
+        // The window shows the error until something can be drawn again.
+        self.links.note(text);
     }
 
     /// Restores the old shaders, or else the last good scene.
@@ -197,7 +198,7 @@ impl SceneRenderer {
         let ActiveScene { draw, player, variant } = active;
         let Player { mut renderer, game, scene, choices, impostor_choice } = player;
         let texts = choices.iter().map(|c| c.text()).chain(impostor_choice.map(|c| c.text()));
-        texts.for_each(|text| self.links.message(text));
+        texts.for_each(|text| self.links.note(text));
         let (shared, cameras) = (self.links.state.clone(), CameraQueue::default());
         let queue = cameras.clone();
         let mut game = game.with_viewpoint(Box::new(move || queue.push(lock(&shared).camera)));

@@ -8,7 +8,6 @@ use super::view_state::ViewState;
 use crate::error::Result;
 use crate::io::{scene_file, scene_view};
 use crate::model::scene::Scene;
-use crate::viewer::free_path::free_path;
 
 /// A scene file with the overrides it is read with.
 pub struct SceneSource {
@@ -45,15 +44,12 @@ impl SceneSource {
         Ok(scene)
     }
 
-    /// Saves the view as a scene file in the current folder, and returns its path.
+    /// Returns the text of a scene file at `to` that draws the view. The folder of `to` must exist.
     ///
     /// # Errors
-    /// The scene cannot be read, or the new file cannot be written.
-    pub fn save(&self, state: &ViewState) -> Result<PathBuf> {
-        let stem = self.path.file_stem().unwrap_or("scene".as_ref()).to_string_lossy();
+    /// The scene cannot be read.
+    pub fn text_of_view(&self, state: &ViewState, to: &Path) -> Result<String> {
         let overrides = [self.overrides.clone(), state.overrides(&self.first)].concat();
-        let to = free_path(|n| Path::new(&format!("{stem}-view-{n}.toml")).to_owned());
-        scene_view::save(&self.path, &to, &overrides, self.seed)?;
-        Ok(to)
+        scene_view::text_of(&self.path, to, &overrides, self.seed)
     }
 }

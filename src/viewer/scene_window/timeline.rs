@@ -92,14 +92,15 @@ pub fn device_spans(
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::frame::Marks;
     use crate::frame::plan::Plan;
     use crate::gpu::ScopeTime;
     use std::time::Duration;
 
-    fn times(zero: Instant, i: u32, passes: &[(&'static str, f64, f64)]) -> FrameTimes {
+    /// Returns the times of frame `i`, with these passes: name, begin and end, ns.
+    pub fn times(zero: Instant, i: u32, passes: &[(&'static str, f64, f64)]) -> FrameTimes {
         let at = |ms: f64| zero + Duration::from_secs_f64(1e-3 * (10.0 * f64::from(i) + ms));
         let pass = |(name, begin_ns, end_ns): &(&'static str, f64, f64)| ScopeTime {
             name,

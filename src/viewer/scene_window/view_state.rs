@@ -7,12 +7,15 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::commands::{Command, Comparison, FLYING_KEYS, SHORTCUTS, help};
+use super::commands::{Command, Comparison, FLYING_KEYS, SHORTCUTS};
 use super::knobs::Knob;
 use super::playback::Playback;
 use crate::io::image::ImageKind;
 use crate::model::scene::Scene;
+use crate::viewer::digits::significant;
 use crate::viewer::fly_camera::{FlyCamera, Motion};
+#[cfg(feature = "window")]
+use crate::viewer::layout;
 use crate::viewer::shortcut::Shortcut;
 
 /// Settings that are drawn as B.
@@ -45,6 +48,12 @@ pub struct ViewState {
     pub capture: Option<ImageKind>,
     /// Whether panels are shown.
     pub has_panels: bool,
+    /// Whether panels show and hide with the size of the window, because the user has not chosen.
+    pub fits_panels: bool,
+    /// Whether the list of keys is shown.
+    pub shows_help: bool,
+    /// Whether the line with the first keys is shown.
+    pub shows_hint: bool,
     /// The next frame's values are to be counted.
     pub wants_counts: bool,
     /// The settings that A is compared with.
@@ -67,9 +76,9 @@ pub struct ViewState {
 pub enum Response {
     /// No work.
     Nothing,
-    /// Prints a message.
+    /// Shows and prints a message.
     Message(String),
-    /// Prints and copies the command that draws this view.
+    /// Copies and prints the command that draws this view.
     PrintCommandLine,
     /// Saves the view as a scene file.
     SaveScene,
@@ -93,6 +102,9 @@ impl ViewState {
             n_mode_steps: 0,
             capture: None,
             has_panels: false,
+            fits_panels: false,
+            shows_help: false,
+            shows_hint: false,
             wants_counts: false,
             variant: None,
             comparison: Comparison::Split(0.5),
@@ -162,6 +174,11 @@ impl ViewState {
                 };
                 return Response::Message(text.to_owned());
             }
+            Command::NextComparison if self.variant.is_none() => {
+                return Response::Message(
+                    "there is no B to compare with: m keeps the present settings as B".to_owned(),
+                );
+            }
             Command::NextComparison => {
                 self.comparison = match self.comparison {
                     Comparison::Split(_) => Comparison::Difference(GAIN),
@@ -170,21 +187,47 @@ impl ViewState {
                 };
             }
             Command::Speed(doublings) => {
-                self.camera = self.camera.after(Motion::Speed { doublings })
+                self.camera = self.camera.after(Motion::Speed { doublings });
+                let speed = significant(self.camera.speed(), 3);
+                return Response::Message(format!("flies at {speed} units a second"));
             }
             Command::NextPresentMode => self.n_mode_steps += 1,
             Command::Seek(seek) => self.playback = self.playback.after(seek),
             Command::Capture(format) => self.capture = Some(format),
-            Command::TogglePanels => self.has_panels = !self.has_panels,
+            Command::TogglePanels => {
+                self.has_panels = !self.has_panels;
+                (self.fits_panels, self.shows_hint) = (false, false);
+            }
             Command::Count => self.wants_counts = true,
             Command::Compare(comparison) => self.comparison = comparison,
-            Command::ToggleError => self.measures_error = !self.measures_error,
+            Command::ToggleError => {
+                self.measures_error = !self.measures_error;
+                if self.measures_error && !self.playback.is_paused() {
+                    return Response::Message(
+                        "the error is measured while the frames pause: press space".to_owned(),
+                    );
+                }
+            }
             Command::SaveScene => return Response::SaveScene,
             Command::PrintCommandLine => return Response::PrintCommandLine,
-            Command::Help => return Response::Message(help()),
+            Command::Help => {
+                self.shows_help = !self.shows_help;
+                self.shows_hint = false;
+            }
+            Command::Quit if self.shows_help => self.shows_help = false,
             Command::Quit => self.is_closing = true,
         }
         Response::Nothing
+    }
+
+    /// Takes the size of the window in pixels. Panels that the user has not chosen are shown where
+    /// the window has room for them.
+    #[cfg(feature = "window")]
+    pub fn resize(&mut self, size: [u32; 2], display_scale: f64) {
+        self.size = size;
+        if self.fits_panels {
+            self.has_panels = layout::has_room_for_panels(size, display_scale);
+        }
     }
 
     /// Turns the camera after the mouse has moved by `pixels`, right and down, with a button held.
@@ -278,8 +321,6 @@ mod tests {
         let names: Vec<&str> =
             SHORTCUTS.iter().map(|s| s.key).chain(FLYING_KEYS.iter().map(|f| f.0)).collect();
         assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
-        let text = help();
-        assert!(SHORTCUTS.iter().all(|s| text.contains(s.key) && text.contains(s.description)));
         let mut s = state();
         let message = |text: &str| Response::Message(text.to_owned());
         assert_eq!(s.press("t"), message("threads.mode = \"serial\""));
@@ -289,8 +330,40 @@ mod tests {
             (Response::Nothing, Response::PrintCommandLine)
         );
         s.press("f12");
+        s.press("?");
         s.press("escape");
-        assert!(s.capture == Some(ImageKind::Png) && s.is_closing);
+        assert!(s.capture == Some(ImageKind::Png) && !s.shows_help && !s.is_closing);
+        s.press("escape");
+        assert!(s.is_closing);
+    }
+
+    #[test]
+    #[cfg(feature = "window")]
+    fn every_key_is_in_one_group_of_the_list() {
+        let groups = super::super::commands::key_groups();
+        let listed: Vec<&str> =
+            groups.iter().flat_map(|(_, keys)| keys.iter().flat_map(|k| k.0.split(' '))).collect();
+        for key in SHORTCUTS.iter().map(|s| s.key).chain(FLYING_KEYS.iter().map(|f| f.0)) {
+            assert_eq!(listed.iter().filter(|k| **k == key).count(), 1, "{key}");
+        }
+    }
+
+    #[test]
+    #[cfg(feature = "window")]
+    fn panels_follow_the_size_until_the_user_chooses() {
+        let mut s = state();
+        s.fits_panels = true;
+        for (width, expected) in [(640, true), (300, false), (1280, true), (0, false)] {
+            s.resize([width, 480], 1.0);
+            assert_eq!((s.has_panels, s.size), (expected, [width, 480]));
+        }
+        s.press("h");
+        assert!(s.has_panels);
+        s.resize([320, 240], 1.0);
+        assert!(s.has_panels);
+        s.press("h");
+        s.resize([1280, 960], 1.0);
+        assert!(!s.has_panels);
     }
 
     #[test]

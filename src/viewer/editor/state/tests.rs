@@ -8,6 +8,7 @@ use super::super::grid_snap::GridSnap;
 use super::super::selection::SelectionMode;
 use super::super::settings::{DisplayMode, ScalingAnchor};
 use super::*;
+use crate::io::box_file;
 
 #[test]
 fn undo_and_redo_restore_boxes_and_selection() {
@@ -93,13 +94,39 @@ fn the_seed_is_a_step() {
 #[test]
 fn a_new_box_copies_the_active_one_and_snaps_to_the_grid() {
     let place = DVec3::new(0.12, 0.0, 1.3);
-    assert_eq!(editor(0).new_box(place), CloudBox { center: place, ..NEW_BOX });
+    assert_eq!(editor(0).new_box(place, 10.0), CloudBox { center: place, ..NEW_BOX });
     let e = after(
         &selected(&editor(3), &[2]),
         &[Action::Set(Setting::Snap(GridSnap { is_on: true, step: 0.5 }))],
     );
     let center = DVec3::new(0.0, 0.0, 1.5);
-    assert_eq!(e.new_box(place), CloudBox { n_particles: 12, center, ..unit_box() });
+    assert_eq!(e.new_box(place, 10.0), CloudBox { n_particles: 12, center, ..unit_box() });
+    // The active box would fill this view, or be too small to be seen in it.
+    for (view_height, edge) in [(0.5, 0.05), (2e4, 2e3)] {
+        let new = e.new_box(place, view_height);
+        assert_eq!((new.extent, new.n_particles), (DVec3::splat(edge), NEW_BOX.n_particles));
+    }
+}
+
+#[test]
+fn a_new_box_fits_every_view() {
+    for power in -50..50 {
+        for share in [1.0, 1.3, 2.2, 3.1, 4.4, 7.0, 9.9] {
+            let view_height = share * 10f64.powi(power).clamp(1e-5, 1e14);
+            let place = view_height * DVec3::new(1.0 / 3.0, -2.0 / 7.0, 0.1);
+            let new = editor(0).new_box(place, view_height);
+            let in_view = new.extent.x / view_height;
+            assert!((0.06..0.16).contains(&in_view), "{new:?} in {view_height}");
+            assert!(new.extent == DVec3::splat(new.extent.x) && box_file::wrong(&new).is_none());
+            assert!((new.center - place).abs().max_element() < 0.02 * new.extent.x);
+            // Coordinates have few digits.
+            let digits = format!("{:e}", new.center.x.abs());
+            assert!(digits.len() <= 9, "{digits} in {view_height}");
+        }
+    }
+    for view_height in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(editor(0).new_box(DVec3::ZERO, view_height).extent, DVec3::ONE);
+    }
 }
 
 #[test]

@@ -95,23 +95,23 @@ pub fn counters(ui: &mut Ui, status: &ViewStatus, commands: &mut Vec<Command>) {
         return;
     };
     ui.label(format!("frame {i_frame}"));
-    Grid::new("counts").num_columns(2).spacing([8.0, 1.0]).show(ui, |ui| {
-        for (name, n, of, is_fault) in [
-            ("picture values not finite", c.not_finite, Some(c.values), true),
-            ("picture values clipped", c.saturated, Some(c.values), false),
-            ("particles folded back", c.folded, Some(c.particles), false),
-            ("facets not finite", c.facets_not_finite, Some(c.facets), true),
-            ("facets below 0", c.facets_negative, Some(c.facets), false),
-            ("pairs unresolved", c.pairs_unresolved, None, false),
-            ("sources lost", c.sources_lost, None, false),
-        ] {
+    for (name, n, of, is_fault) in [
+        ("picture values not finite", c.not_finite, Some(c.values), true),
+        ("picture values clipped", c.saturated, Some(c.values), false),
+        ("particles folded back", c.folded, Some(c.particles), false),
+        ("facets not finite", c.facets_not_finite, Some(c.facets), true),
+        ("facets below 0", c.facets_negative, Some(c.facets), false),
+        ("pairs unresolved", c.pairs_unresolved, None, false),
+        ("sources lost", c.sources_lost, None, false),
+    ] {
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing = [8.0, 0.0].into();
             ui.label(name);
             let of = of.map_or(String::new(), |of| format!(" of {of}"));
             let text = RichText::new(format!("{n}{of}")).monospace();
             ui.label(if is_fault && n > 0 { highlighted(text) } else { text });
-            ui.end_row();
-        }
-    });
+        });
+    }
 }
 
 fn highlighted(text: RichText) -> RichText {

@@ -1,35 +1,77 @@
 use super::style::ms;
 use super::*;
+use crate::frame::Counts;
 use crate::io::scene_file;
+use crate::viewer::error_probe::ProbeStatus;
+use crate::viewer::layout::has_room_for_panels;
 use crate::viewer::scene_window::knobs::Knob;
-use egui::{Context, Event, PointerButton, Pos2, RawInput, Rect, vec2};
+use crate::viewer::scene_window::playback::Seek;
+use crate::viewer::scene_window::status::ErrorStatus;
+use crate::viewer::scene_window::timeline::{CAPACITY, tests::times};
+use crate::viewer::scene_window::view_state::Variant;
+use crate::viewer::widget_check::{FakeWindow, Text, assert_whole_lines, is_visible};
+use egui::{Event, PointerButton, Pos2, pos2};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Instant;
 
 fn state() -> ViewState {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
-    ViewState::new(Arc::new(scene_file::load(&path, &[], None).unwrap().scene), true).unwrap()
+    let scene = Arc::new(scene_file::load(&path, &[], None).unwrap().scene);
+    ViewState { has_panels: true, ..ViewState::new(scene, true).unwrap() }
 }
 
-/// Runs the panels with `events`. Returns the clicked commands, and every drawn text with its
-/// place.
-fn run(
-    context: &Context,
-    events: Vec<Event>,
-    status: &ViewStatus,
-) -> (Vec<Command>, Vec<(String, Pos2)>) {
-    let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, vec2(800.0, 1400.0)));
-    let input = RawInput { screen_rect, events, ..RawInput::default() };
-    let (state, mut commands) = (state(), vec![]);
-    let mut output = context.run_ui(input, |ui| commands = show(ui, &state, status).0);
-    output.textures_delta.clear();
-    let text = |shape: &egui::epaint::ClippedShape| match &shape.shape {
-        egui::Shape::Text(t) => {
-            Some((t.galley.text().to_owned(), t.visual_bounding_rect().center()))
-        }
-        _ => None,
+/// A state with all that makes lines long.
+fn full_state() -> ViewState {
+    let mut state = state();
+    state.variant = Some(Variant { scene: state.scene.clone(), skips: true });
+    for knob in Knob::ALL {
+        knob.advance(Arc::make_mut(&mut state.scene)).unwrap();
+    }
+    state.act(Command::Seek(Seek::TogglePause));
+    ViewState { measures_error: true, ..state }
+}
+
+fn full_status() -> ViewStatus {
+    let (zero, mut status) = (Instant::now(), ViewStatus::default());
+    let passes: Vec<(&'static str, f64, f64)> =
+        ["generate", "place", "transmit", "second", "contract", "impostors", "upsample"]
+            .into_iter()
+            .enumerate()
+            .map(|(i, name)| (name, 1e9 * i as f64, 1e9 * (i + 1) as f64))
+            .collect();
+    for i in 0..CAPACITY as u32 {
+        // Frame times of some thousand ms have the most digits.
+        status.timeline.push(&times(zero, 3000 + 10 * i, &passes));
+    }
+    let n = 3840 * 2160 * 4;
+    let counts = Counts {
+        values: n,
+        not_finite: n,
+        saturated: n,
+        particles: 1 << 30,
+        folded: 1 << 30,
+        facets: 1 << 30,
+        facets_not_finite: 1 << 30,
+        facets_negative: 1 << 30,
+        pairs_unresolved: u64::from(u32::MAX),
+        sources_lost: u64::from(u32::MAX),
     };
-    (commands, output.shapes.iter().filter_map(text).collect())
+    status.counts = Some((123_456, counts));
+    status.device_name = "llvmpipe (LLVM 15.0.6, 256 bits), of a maker with a long name".to_owned();
+    status.variant_ms = Some(12.345);
+    let failure = Some("the folder of references cannot be written: disk full".to_owned());
+    let probe = ProbeStatus { failure, ..ProbeStatus::default() };
+    status.error = Some(ErrorStatus { probe, ..ErrorStatus::default() });
+    status
+}
+
+/// The sizes and scales of windows that are tried.
+fn windows() -> Vec<([u32; 2], f64)> {
+    let sizes = [[640, 480], [700, 700], [800, 600], [961, 540], [1280, 720], [1920, 1080]];
+    let sizes = sizes.into_iter().chain([[3840, 2160], [1080, 1920], [2560, 600]]);
+    sizes.flat_map(|size| [1.0, 1.5, 2.0].map(|scale| (size, scale))).collect()
 }
 
 fn click(at: Pos2) -> Vec<Vec<Event>> {
@@ -42,27 +84,169 @@ fn click(at: Pos2) -> Vec<Vec<Event>> {
     vec![vec![Event::PointerMoved(at)], vec![button(true)], vec![button(false)]]
 }
 
+fn find<'a>(texts: &'a [Text], text: &str) -> &'a Text {
+    texts.iter().find(|t| t.text == text).unwrap_or_else(|| panic!("no {text}: {texts:?}"))
+}
+
+/// Opens every section of a window that is high enough for all of them.
+fn open_all(window: &mut FakeWindow, state: &ViewState, status: &ViewStatus) -> Vec<Text> {
+    let mut add = |ui: &mut Ui| drop(show_all(ui, state, status, &[]));
+    for (title, inside) in
+        [("A and B", "split"), ("Timeline", "device"), ("Plan", "place"), ("Counters", "count")]
+    {
+        let texts = window.settle(&mut add);
+        if !texts.iter().any(|t| t.text == inside) {
+            let at = find(&texts, title).rect.center();
+            click(at).into_iter().for_each(|events| drop(window.run(events, &mut add)));
+        }
+    }
+    window.settle(add)
+}
+
+#[test]
+fn panels_leave_two_thirds_of_the_picture_and_cut_no_line() {
+    let (state, status) = (full_state(), full_status());
+    for (size, scale) in windows() {
+        assert!(has_room_for_panels(size, scale));
+        let what = format!("{size:?} at {scale}");
+        let mut window = FakeWindow::new(size, scale);
+        let rect = window.rect();
+        let mut room = egui::Rect::NOTHING;
+        let texts = window.settle(|ui| {
+            room = show_all(ui, &state, &status, &[]).1.expect("panels").room;
+        });
+        assert!(room.area() <= 0.334 * rect.area() && rect.contains_rect(room), "{what}: {room:?}");
+        assert_whole_lines(&texts, rect, &what);
+        // The same width, with all sections open.
+        let high = [size[0], size[1].max(size[0] * 8)];
+        let mut window = FakeWindow::new(high, scale);
+        let texts = open_all(&mut window, &state, &status);
+        assert_whole_lines(&texts, window.rect(), &what);
+        assert!(texts.len() > 100, "{what}: {texts:?}");
+    }
+}
+
+#[test]
+fn all_panels_are_reached_by_scrolling_in_the_smallest_window() {
+    let (state, status) = (full_state(), full_status());
+    let mut window = FakeWindow::new([640, 480], 1.0);
+    let mut add = |ui: &mut Ui| drop(show_all(ui, &state, &status, &[]));
+    let at = pos2(600.0, 240.0);
+    // Sections are opened from the last to the first, so that the wheel reaches each title.
+    let mut seen: BTreeSet<String> = BTreeSet::new();
+    for title in ["Counters", "Plan", "Passes", "Timeline", "A and B"] {
+        window.scroll(at, 1e5, &mut add);
+        let mut texts = window.settle(&mut add);
+        for _ in 0..40 {
+            let found = texts.iter().find(|t| t.text == title).cloned();
+            if let Some(t) = found.filter(|t| is_visible(t, window.rect())) {
+                click(t.rect.center()).into_iter().for_each(|e| drop(window.run(e, &mut add)));
+                break;
+            }
+            texts = window.scroll(at, -100.0, &mut add);
+        }
+    }
+    window.scroll(at, -1e5, &mut add);
+    for _ in 0..40 {
+        let texts = window.scroll(at, 100.0, &mut add);
+        seen.extend(texts.iter().filter(|t| is_visible(t, window.rect())).map(|t| t.text.clone()));
+    }
+    for text in [
+        "lighting.mode",
+        "draw.resolution",
+        "error against the reference",
+        "device",
+        "impostors",
+        "place",
+        "picture values not finite",
+        "sources lost",
+        "h hides the panels, ? lists the keys",
+    ] {
+        assert!(seen.contains(text), "{text} is not reached: {seen:?}");
+    }
+}
+
 /// A knob's button shows its value.
 #[test]
 fn a_click_invokes_the_command_of_the_key() {
-    let context = Context::default();
-    let status = ViewStatus::default();
-    // Headers open with an animation that takes some frames.
-    let mut texts = vec![];
-    for _ in 0..20 {
-        texts = run(&context, vec![], &status).1;
-    }
-    let (_, at) = texts
-        .iter()
-        .find(|(text, _)| text == "two-reflection")
-        .unwrap_or_else(|| panic!("{texts:?}"));
+    let (state, status) = (state(), ViewStatus::default());
+    let mut window = FakeWindow::new([800, 1400], 1.0);
     let mut commands = vec![];
-    for events in click(*at) {
-        commands.extend(run(&context, events, &status).0);
-    }
+    let mut add = |ui: &mut Ui| commands.extend(show_all(ui, &state, &status, &[]).0);
+    let texts = window.settle(&mut add);
+    let at = find(&texts, "two-reflection").rect.center();
+    click(at).into_iter().for_each(|events| drop(window.run(events, &mut add)));
     assert_eq!(commands, [Command::Advance(Knob::Lighting)]);
-    assert!(texts.iter().any(|(text, _)| text == "threads.mode"));
-    assert!(texts.iter().any(|(text, _)| text == "no frame yet"));
+    find(&texts, "threads.mode");
+    find(&texts, "no frame yet");
+}
+
+#[test]
+fn the_list_of_keys_is_inside_every_window_and_scrolls() {
+    let status = ViewStatus::default();
+    let state = ViewState { shows_help: true, has_panels: false, ..state() };
+    let small = [([320, 240], 1.0), ([320, 240], 2.0)];
+    for (size, scale) in windows().into_iter().chain(small) {
+        let what = format!("{size:?} at {scale}");
+        let mut window = FakeWindow::new(size, scale);
+        let mut add = |ui: &mut Ui| drop(show_all(ui, &state, &status, &[]));
+        let (rect, mut seen) = (window.rect(), BTreeSet::new());
+        let mut texts = window.settle(&mut add);
+        for _ in 0..30 {
+            assert_whole_lines(&texts, rect, &what);
+            let visible = texts.iter().filter(|t| is_visible(t, rect));
+            seen.extend(visible.map(|t| t.text.clone()));
+            texts = window.scroll(rect.center(), 60.0, &mut add);
+        }
+        for (title, keys) in key_groups() {
+            assert!(seen.contains(title), "{what}: {title}");
+            for (key, description) in keys {
+                assert!(seen.contains(key) && seen.contains(description), "{what}: {key}");
+            }
+        }
+    }
+}
+
+#[test]
+fn messages_and_errors_stay_legible_beside_the_panels() {
+    let path = format!("saved /home/{}/captures/hello-view-12.png", "long-name/".repeat(14));
+    let mut status = ViewStatus::default();
+    status.file_error = Some("scene.toml:3:9: expected a number, found `]`".to_owned());
+    status.render_error = Some("shaders/tiles.comp:1: no such thing\n".repeat(1_000_000));
+    for (size, scale) in windows() {
+        let what = format!("{size:?} at {scale}");
+        let state = ViewState { shows_hint: true, ..state() };
+        let mut window = FakeWindow::new(size, scale);
+        let rect = window.rect();
+        let mut room = egui::Rect::NOTHING;
+        let messages = [path.clone(), "skipping is off".to_owned()];
+        let texts = window.settle(|ui| {
+            room = show_all(ui, &state, &status, &messages).1.expect("panels").room;
+        });
+        for text in [path.as_str(), "skipping is off", HINT] {
+            let shown = find(&texts, text);
+            assert!(!shown.is_cut && is_visible(shown, rect), "{what}: {shown:?}");
+            assert!(shown.rect.right() <= room.left() + 1.0, "{what}: {shown:?} {room:?}");
+        }
+        let alarm = texts.iter().find(|t| t.text.starts_with("scene.toml:3:9")).expect(&what);
+        assert!(is_visible(alarm, rect) && alarm.rect.height() < 0.4 * rect.height(), "{what}");
+    }
+}
+
+#[test]
+fn a_window_of_any_size_is_drawn() {
+    let (state, status) = (full_state(), full_status());
+    for shows_help in [false, true] {
+        let state = ViewState { shows_help, shows_hint: true, ..state.clone() };
+        for size in [[1, 1], [16, 4], [4, 300], [300, 4], [64, 48], [199, 99], [16384, 16384]] {
+            for scale in [0.5, 1.0, 3.0] {
+                let mut window = FakeWindow::new(size, scale);
+                window.settle(|ui| {
+                    show_all(ui, &state, &status, &["saved a file".to_owned()]);
+                });
+            }
+        }
+    }
 }
 
 #[test]

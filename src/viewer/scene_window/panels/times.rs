@@ -8,6 +8,8 @@ use crate::viewer::scene_window::timeline::{CAPACITY, Timeline};
 
 /// Height of the graph, points.
 const HEIGHT: f32 = 70.0;
+/// Width from which on the table has all columns, points.
+const WIDE: f32 = 250.0;
 
 /// Adds the graph and a table of percentiles.
 pub fn show(ui: &mut Ui, timeline: &Timeline) {
@@ -23,17 +25,21 @@ pub fn show(ui: &mut Ui, timeline: &Timeline) {
         ("waiting", timeline.summary(|f| f.wait_ms)),
         ("latency", timeline.summary(|f| f.latency_ms)),
     ];
+    let is_wide = ui.available_width() >= WIDE;
+    // A narrow table leaves out one percentile.
+    let all = |values: [(&'static str, f64); 4]| {
+        values.into_iter().filter(move |(name, _)| is_wide || *name != "p95")
+    };
+    let values =
+        |s: &Summary| all([("p50", s.p50), ("p95", s.p95), ("p99", s.p99), ("max", s.max)]);
     Grid::new("times").num_columns(5).spacing([8.0, 1.0]).show(ui, |ui| {
-        for head in ["ms", "p50", "p95", "p99", "max"] {
-            ui.weak(head);
-        }
+        ui.weak("ms");
+        values(&frame).for_each(|(name, _)| drop(ui.weak(name)));
         ui.end_row();
         for (name, summary) in rows {
-            let Some(Summary { p50, p95, p99, max, .. }) = summary else { continue };
+            let Some(summary) = summary else { continue };
             ui.label(name);
-            for value in [p50, p95, p99, max] {
-                ui.monospace(ms(value));
-            }
+            values(&summary).for_each(|(_, value)| drop(ui.monospace(ms(value))));
             ui.end_row();
         }
     });

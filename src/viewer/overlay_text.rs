@@ -1,0 +1,98 @@
+//! Text over a picture that both windows show: messages, errors, and the list of keys.
+
+use egui::text::{LayoutJob, TextWrapping};
+use egui::{
+    Align, Align2, Color32, FontId, Label, Layout, Rect, RichText, ScrollArea, TextFormat, Ui,
+    Vec2, Window, pos2, vec2,
+};
+
+/// Colour behind messages.
+pub const MESSAGE: Color32 = Color32::from_rgb(34, 38, 46);
+/// Colour behind errors.
+pub const ERROR: Color32 = Color32::from_rgb(150, 40, 40);
+
+/// Distance of banners from each other and from the picture's edges, points.
+const GAP: f32 = 8.0;
+/// Distance of a banner's text from its edge, points.
+const MARGIN: Vec2 = vec2(8.0, 5.0);
+/// Size of a banner's text, points.
+const TEXT: f32 = 13.0;
+/// Number of characters of a banner beyond which its text is cut before it is laid out.
+const MAX_CHARS: usize = 2000;
+/// Smallest share that text of narrow panels shrinks to.
+const LEAST_TEXT: f32 = 0.85;
+/// Width of the list of keys, points.
+const KEYS_WIDTH: f32 = 480.0;
+/// Width of the column of keys, points.
+const KEY_WIDTH: f32 = 118.0;
+
+/// A group of keys with its title: each key with what it does.
+pub type KeyGroup = (&'static str, Vec<(&'static str, &'static str)>);
+
+/// Draws `text` on a filled rectangle in the lower left corner of `area`, in at most `max_rows`
+/// rows. Returns the area above it.
+pub fn banner(ui: &Ui, area: Rect, text: &str, fill: Color32, max_rows: usize) -> Rect {
+    let width = area.width() - 2.0 * (GAP + MARGIN.x);
+    if width <= 0.0 || area.height() <= 0.0 {
+        return area;
+    }
+    let format = TextFormat::simple(FontId::proportional(TEXT), Color32::WHITE);
+    let cut: String = text.chars().take(MAX_CHARS).collect();
+    let wrap = TextWrapping { max_width: width, max_rows, ..TextWrapping::default() };
+    let job = LayoutJob { wrap, ..LayoutJob::single_section(cut, format) };
+    let painter = ui.painter();
+    let galley = painter.layout_job(job);
+    let size = galley.size() + 2.0 * MARGIN;
+    let place = pos2(area.left() + GAP, area.bottom() - GAP);
+    let frame = Align2::LEFT_BOTTOM.anchor_size(place, size);
+    painter.rect_filled(frame, 4.0, fill);
+    painter.galley(frame.min + MARGIN, galley, Color32::WHITE);
+    Rect::from_min_max(area.min, pos2(area.right(), frame.top()))
+}
+
+/// Makes all text of `ui` smaller by `share`, within bounds that stay legible.
+pub fn shrink_text(ui: &mut Ui, share: f32) {
+    let share = share.clamp(LEAST_TEXT, 1.0);
+    for font in ui.style_mut().text_styles.values_mut() {
+        font.size *= share;
+    }
+}
+
+/// Returns the number of rows of text that fill a third of `area`, at least one.
+pub fn rows_of_third(area: Rect) -> usize {
+    ((area.height() / 3.0 / (1.3 * TEXT)) as usize).max(1)
+}
+
+/// Shows the list of keys in the middle of `area`. Returns whether its close button was clicked.
+pub fn keys(ui: &Ui, area: Rect, groups: &[KeyGroup]) -> bool {
+    let mut is_open = true;
+    let width = KEYS_WIDTH.min(area.width() - 40.0).max(60.0);
+    // The title and the margins take the rest.
+    let height = (area.height() - 80.0).max(40.0);
+    let window = Window::new("Keys").open(&mut is_open).collapsible(false).resizable(false);
+    let at = area.center() - ui.ctx().content_rect().center();
+    window.anchor(Align2::CENTER_CENTER, at).show(ui.ctx(), |ui| {
+        ui.set_width(width);
+        ScrollArea::vertical().max_height(height).show(ui, |ui| {
+            ui.set_width(width);
+            for (title, keys) in groups {
+                ui.label(RichText::new(*title).strong());
+                keys.iter().for_each(|(key, what)| row(ui, width, key, what));
+                ui.add_space(4.0);
+            }
+        });
+    });
+    !is_open
+}
+
+fn row(ui: &mut Ui, width: f32, key: &str, what: &str) {
+    let key_width = KEY_WIDTH.min(0.4 * width);
+    ui.horizontal_top(|ui| {
+        let (size, layout) = (vec2(key_width, 0.0), Layout::left_to_right(Align::Min));
+        ui.allocate_ui_with_layout(size, layout, |ui| {
+            ui.set_width(key_width);
+            ui.add(Label::new(RichText::new(key).monospace()).wrap());
+        });
+        ui.add(Label::new(what).wrap());
+    });
+}

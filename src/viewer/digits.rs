@@ -2,10 +2,10 @@
 
 /// Number of digits that a number has at least, whatever the resolution.
 const LEAST_DIGITS: i32 = 3;
-/// Number of decimals beyond which a number is written with an exponent.
-const MAX_DECIMALS: i32 = 9;
-/// Size from which on a number is written with an exponent.
-const MAX_PLAIN: f64 = 1e9;
+/// Number of digits that f64 has at least.
+const MOST_DIGITS: i32 = 15;
+/// Sizes that are written without an exponent.
+const PLAIN: std::ops::Range<f64> = 1e-4..1e9;
 
 /// Writes `v` without the digits below `resolution`, and without trailing zeros.
 ///
@@ -21,14 +21,14 @@ pub fn shown(v: f64, resolution: f64) -> String {
         true => (-resolution.log10() - 1e-9).ceil() as i32,
         false => LEAST_DIGITS - 1 - exponent,
     };
-    let n_decimals = by_resolution.max(LEAST_DIGITS - 1 - exponent).max(0);
-    if n_decimals > MAX_DECIMALS || v.abs() >= MAX_PLAIN {
-        let n_digits = (n_decimals.max(by_resolution) + exponent).clamp(LEAST_DIGITS - 1, 15);
+    // Digits after the first one.
+    let n_digits = (by_resolution + exponent).clamp(LEAST_DIGITS - 1, MOST_DIGITS);
+    if !PLAIN.contains(&v.abs()) {
         let text = format!("{v:.*e}", n_digits as usize);
         let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
         return format!("{}e{power}", trimmed(digits));
     }
-    trimmed(&format!("{v:.*}", n_decimals as usize)).to_owned()
+    trimmed(&format!("{v:.*}", (n_digits - exponent).max(0) as usize)).to_owned()
 }
 
 /// Writes `v` with `n` significant digits at most.

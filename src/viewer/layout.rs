@@ -28,7 +28,8 @@ pub fn has_room_for_panels(size: [u32; 2], display_scale: f64) -> bool {
 /// user shows panels in a window without room for them, they keep the width that their text needs.
 pub fn panel_width(window_points: f64, usual: f64, share: f64) -> f64 {
     let least = (share * LEAST_FOR_PANELS).min(window_points);
-    usual.min(share * window_points).max(least)
+    // egui rounds a fraction of a point up.
+    usual.min(share * window_points).max(least).floor()
 }
 
 #[cfg(test)]

@@ -22,12 +22,14 @@ const WIDTH: f32 = 230.0;
 const MAX_SHARE: f64 = 0.3;
 /// Height of the status line, points.
 const STATUS: f32 = 24.0;
-/// Part of the panel's height that the list of boxes has at least.
-const LIST_SHARE: f32 = 0.25;
-/// Height of the list of boxes at least, points.
+/// Part of the panel's height that a long list of boxes has at least.
+const LIST_SHARE: f32 = 0.17;
+/// Height of a long list of boxes at least, points.
 const LEAST_LIST: f32 = 60.0;
+/// Distance of buttons from each other, points.
+const BUTTON_GAP: f32 = 5.0;
 /// Number of rows of a message.
-const MESSAGE_ROWS: usize = 4;
+const MESSAGE_ROWS: usize = 8;
 const BACKGROUND: Color32 = Color32::from_rgb(24, 26, 30);
 /// The line over an empty picture.
 const FIRST_STEPS: &str = "A: add a box where the view looks    ?: all keys";
@@ -86,9 +88,12 @@ fn sides(ui: &mut Ui, state: &PanelState<'_>, texts: &mut FieldTexts, inputs: &m
     numbers.show(ui, |ui| {
         shrink_text(ui, width / WIDTH);
         // The list has a part of the panel, however many numbers and buttons are above it.
-        let of_list = (LIST_SHARE * ui.available_height()).max(LEAST_LIST);
+        let n = state.controller.editor().boxes().len();
+        let rows = n as f32 * (row_height(ui) + ui.spacing().item_spacing.y);
+        let of_list = (LIST_SHARE * ui.available_height()).max(LEAST_LIST).min(rows);
         let controls = ScrollArea::vertical().id_salt("controls").auto_shrink([false, true]);
         controls.max_height((ui.available_height() - of_list).max(0.0)).show(ui, |ui| {
+            ui.spacing_mut().item_spacing.x = BUTTON_GAP;
             file(ui, state, inputs);
             ui.separator();
             fields::show(ui, state.controller, texts, inputs);
@@ -179,6 +184,12 @@ fn buttons(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
             }
         }
     });
+}
+
+/// Returns the height of a line of the list, points.
+fn row_height(ui: &Ui) -> f32 {
+    let text = ui.text_style_height(&TextStyle::Button);
+    ui.spacing().interact_size.y.max(text + 2.0 * ui.spacing().button_padding.y)
 }
 
 /// Adds the list of boxes, which fills the rest of the panel and scrolls to a new active box.

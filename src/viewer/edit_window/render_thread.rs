@@ -163,9 +163,22 @@ impl EditRenderer {
             if !is_current || self.target.size() != Some(state.size) {
                 self.target.finish();
                 self.active = None;
-                if !self.target.recreate(state.size)? {
-                    std::thread::sleep(HIDDEN_DELAY);
-                    continue;
+                match self.target.recreate(state.size) {
+                    Ok(true) => {}
+                    Ok(false) => {
+                        std::thread::sleep(HIDDEN_DELAY);
+                        continue;
+                    }
+                    // The window is too large for the device. It may become smaller.
+                    Err(error @ Error::Limit { .. }) => {
+                        if !std::mem::replace(&mut self.has_failed, true) {
+                            self.links.send(RenderEvent::Failure(Some(error.to_string())));
+                        }
+                        is_current = false;
+                        std::thread::sleep(HIDDEN_DELAY);
+                        continue;
+                    }
+                    Err(error) => return Err(error),
                 }
             }
             match self.update(&state) {

@@ -236,7 +236,7 @@ impl Editor {
             ..NEW_BOX
         });
         let snap = self.settings.snap;
-        let fine = GridSnap { is_on: true, step: 0.01 * edge };
+        let fine = GridSnap { is_on: true, step: round_number(0.01 * edge) };
         let center = if snap.is_on { snap.place(place) } else { fine.place(place) };
         CloudBox { center, ..new }
     }

@@ -24,8 +24,19 @@ struct ActiveScene {
     variant: Option<PosedPlayer>,
 }
 
-/// A scene, and its variant B, that could be drawn.
-type GoodScene = (Arc<Scene>, Option<Variant>);
+/// A scene, and its variant B, that could be drawn in a window of this size.
+struct GoodScene {
+    scene: Arc<Scene>,
+    variant: Option<Variant>,
+    size: [u32; 2],
+}
+
+/// Version, shader count and window size of a state.
+type Attempt = (u64, u64, [u32; 2]);
+
+fn attempt(state: &ViewState) -> Attempt {
+    (state.version, state.n_shader_loads, state.size)
+}
 
 /// Delay before another attempt while the window has no visible area.
 const HIDDEN_DELAY: Duration = Duration::from_millis(50);
@@ -37,8 +48,8 @@ pub struct SceneRenderer {
     links: RenderLinks,
     n_shader_loads: u64,
     n_mode_steps: u32,
-    /// Version and shader count of the state that could not be drawn.
-    failed_at: Option<(u64, u64)>,
+    /// The state that could not be drawn.
+    failed_at: Option<Attempt>,
     /// Frames until the window closes; `None`: no limit.
     n_left: Option<u32>,
     samples: LoopSamples,
@@ -82,20 +93,28 @@ impl SceneRenderer {
         let mut good: Option<GoodScene> = None;
         while !self.links.is_closing() && self.n_left != Some(0) {
             let state = lock(&self.links.state).clone();
-            if !self.recreate_target(&state)? {
-                std::thread::sleep(HIDDEN_DELAY);
-                continue;
+            match self.recreate_target(&state) {
+                Ok(true) => {}
+                Ok(false) => {
+                    std::thread::sleep(HIDDEN_DELAY);
+                    continue;
+                }
+                Err(error @ Error::Limit { .. }) if good.is_some() => {
+                    self.wait_for_other_size(&error, &state);
+                    continue;
+                }
+                Err(error) => return Err(error),
             }
             let old_shaders = self.reload_shaders(&state);
             match self.activate(&state) {
                 Ok(Some(active)) => {
                     // An error stays visible until something else is drawn than what failed.
-                    if self.failed_at.is_some_and(|at| at != (state.version, state.n_shader_loads))
-                    {
+                    if self.failed_at.is_some_and(|at| at != attempt(&state)) {
                         self.failed_at = None;
                         lock(&self.links.status).render_error = None;
                     }
-                    good = Some((state.scene.clone(), state.variant.clone()));
+                    let (scene, variant) = (state.scene.clone(), state.variant.clone());
+                    good = Some(GoodScene { scene, variant, size: state.size });
                     self.play(active, &state)?;
                 }
                 Ok(None) => {}
@@ -135,7 +154,7 @@ impl SceneRenderer {
     }
 
     fn report(&mut self, error: &Error, state: &ViewState) {
-        self.failed_at = Some((state.version, state.n_shader_loads));
+        self.failed_at = Some(attempt(state));
         let text = format!("{}; the last good state stays", error.to_string().trim_end());
         lock(&self.links.status).render_error = Some(text.clone());
         self.links.send(RenderEvent::ErrorChanged);
@@ -143,7 +162,18 @@ impl SceneRenderer {
         self.links.note(text);
     }
 
-    /// Restores the old shaders, or else the last good scene.
+    /// Reports that the window is too large for the device, and waits for a while. The window shows
+    /// pictures again when it is smaller.
+    fn wait_for_other_size(&mut self, error: &Error, state: &ViewState) {
+        if self.failed_at != Some(attempt(state)) {
+            self.report(error, state);
+            self.links.send(RenderEvent::Title(format!("the window is too large: {error}")));
+        }
+        std::thread::sleep(HIDDEN_DELAY);
+    }
+
+    /// Restores the old shaders, or else the last good scene, or else waits for the size of the
+    /// window.
     ///
     /// # Errors
     /// There is neither; the error is the given one.
@@ -156,7 +186,7 @@ impl SceneRenderer {
     ) -> Result<()> {
         match (old_shaders, good) {
             (Some(compiler), _) => self.target.gpu.set_compiler(compiler),
-            (None, Some((scene, variant)))
+            (None, Some(GoodScene { scene, variant, .. }))
                 if *scene != failed.scene || variant.is_none() && failed.variant.is_some() =>
             {
                 let mut state = lock(&self.links.state);
@@ -164,6 +194,12 @@ impl SceneRenderer {
                 if state.version == failed.version {
                     (state.scene, state.variant) = (scene.clone(), variant.clone());
                 }
+            }
+            (None, Some(GoodScene { size, .. }))
+                if *size != failed.size && matches!(error, Error::Limit { .. }) =>
+            {
+                self.wait_for_other_size(&error, failed);
+                return Ok(());
             }
             _ => return Err(error),
         }

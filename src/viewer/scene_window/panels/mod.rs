@@ -23,7 +23,7 @@ const MAX_SHARE: f64 = 1.0 / 3.0;
 /// Height of the window from which on times and settings begin open together, points.
 const TALL: f32 = 700.0;
 /// Number of rows of one message.
-const MESSAGE_ROWS: usize = 4;
+const MESSAGE_ROWS: usize = 8;
 
 /// Adds all that is shown over the picture. Returns the clicked commands, and the backdrop behind
 /// the panels where they are shown.

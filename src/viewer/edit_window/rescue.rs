@@ -9,9 +9,12 @@ use crate::viewer::editor::{Document, Session};
 use crate::viewer::free_path::free_path;
 use crate::viewer::sync::lock;
 
+/// A changed document, and the file that it is not saved to.
+type Unsaved = (PathBuf, Arc<Document>);
+
 /// The unsaved changes of a window, shared with whatever ends it.
 #[derive(Clone, Default)]
-pub struct Rescue(Arc<Mutex<Option<(PathBuf, Arc<Document>)>>>);
+pub struct Rescue(Arc<Mutex<Option<Unsaved>>>);
 
 impl Rescue {
     /// Takes the changes that `session` has not saved.

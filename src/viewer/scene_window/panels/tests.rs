@@ -217,9 +217,11 @@ fn the_list_of_keys_is_inside_every_window_and_scrolls() {
 #[test]
 fn messages_and_errors_stay_legible_beside_the_panels() {
     let path = format!("saved /home/{}/captures/hello-view-12.png", "long-name/".repeat(14));
-    let mut status = ViewStatus::default();
-    status.file_error = Some("scene.toml:3:9: expected a number, found `]`".to_owned());
-    status.render_error = Some("shaders/tiles.comp:1: no such thing\n".repeat(100_000));
+    let status = ViewStatus {
+        file_error: Some("scene.toml:3:9: expected a number, found `]`".to_owned()),
+        render_error: Some("shaders/tiles.comp:1: no such thing\n".repeat(100_000)),
+        ..ViewStatus::default()
+    };
     for (size, scale) in windows() {
         let what = format!("{size:?} at {scale}");
         let mut state = state();

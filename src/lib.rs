@@ -11,6 +11,9 @@
 
 #![warn(missing_docs)]
 #![warn(clippy::missing_errors_doc)]
+// These macros panic when the stream is broken; io::console and cli::output do not.
+#![warn(clippy::print_stderr)]
+#![warn(clippy::print_stdout)]
 
 pub mod cli;
 pub mod error;

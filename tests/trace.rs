@@ -36,10 +36,11 @@ fn benched(zones: &Zones) -> (Vec<Sample>, Stage, Collected) {
     let stage = Stage::new(cases[0].scene.clone(), &choice, false).expect("a stage");
     zones.take();
     let plan = BenchPlan { n_warm_up: 0, n_rounds: 1, hash_frames: false, pictures: false };
-    let ran = blocks::run(stage, &cases, &plan, &AtomicBool::new(false), &mut || {});
+    let outcome = Mutex::default();
+    let ran = blocks::run(stage, &cases, &plan, &AtomicBool::new(false), &outcome, &mut || {});
     assert_eq!(ran.failure, None);
-    let (stage, outcome) = (ran.stage.expect("a stage"), ran.outcome);
-    (outcome.samples, stage, zones.take())
+    let samples = std::mem::take(&mut blocks::lock(&outcome).samples);
+    (samples, ran.stage.expect("a stage"), zones.take())
 }
 
 fn written(samples: &[Sample], zones: Option<&Collected>, clock: Option<ClockFit>) -> Value {

@@ -2,29 +2,26 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::ColorChoice;
 
 use super::args::{BenchArgs, SceneArgs};
 use super::bench_cases::{BenchCases, bench_cases};
+use super::bench_record::{Recorder, Runs, print_json};
+use super::interrupt::{self, PATIENCE};
 use super::output::refuse_existing;
 use super::progress::progress;
 use super::scene::{device_choice, print_sizes};
-use super::{bench_plot, bench_table, output};
 use crate::error::{Error, Result};
 use crate::frame::{Stage, limits};
-use crate::gpu::ClockFit;
 use crate::io::atomic;
 use crate::measure::zones::Zones;
-use crate::timing::attachments::Attachments;
 use crate::timing::blocks::{self, BenchPlan, Finished, Outcome};
 use crate::timing::cases::Case;
-use crate::timing::frame_rows::FrameTable;
-use crate::timing::json::ResultFile;
+use crate::timing::limits::check_bench;
 use crate::timing::machine;
-use crate::timing::records::Run;
-use crate::timing::results::{prepare_out_dir, write_results};
-use crate::timing::trace;
+use crate::timing::results::prepare_out_dir;
 
 /// Readings of the device's clock and the host's, before the frames and again after them.
 const N_CLOCK_READINGS: usize = 8;
@@ -60,26 +57,19 @@ pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
     // at once and no folder is made for results that will not come.
     let quiet = SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
     for scene in &args.scenes {
-        bench_cases(args, scene, &quiet)?;
+        let BenchCases { cases, .. } = bench_cases(args, scene, &quiet)?;
+        check_bench(&cases, &plan(args))?;
     }
-    let mut runs = Vec::new();
+    let runs = Runs::default();
     let mut ended = Ok(());
-    for (scene, out) in args.scenes.iter().zip(&outs) {
-        match bench_scene(args, scene, out.as_deref(), context) {
-            Ok((run, end)) => {
-                runs.push(run);
-                ended = end.map_or(Ok(()), Err);
-            }
-            Err(error) => ended = Err(error),
-        }
+    for (scene, out) in args.scenes.iter().zip(outs) {
+        ended = bench_scene(args, scene, out, context, &runs);
         if ended.is_err() {
             break;
         }
     }
     // Finished runs are printed even if a later scene failed.
-    if args.json && !runs.is_empty() {
-        if let [run] = &runs[..] { output::object(run)? } else { output::object(&runs)? }
-    }
+    print_json(args, &runs)?;
     ended
 }
 
@@ -111,21 +101,17 @@ fn open(args: &BenchArgs, cases: &[Case]) -> Result<Stage> {
     Ok(stage)
 }
 
-/// Times one scene. Returns its record, and the error that ended it early, if there was one.
+/// Times one scene and adds its record to `runs`.
 fn bench_scene(
     args: &BenchArgs,
     path: &Path,
-    out: Option<&Path>,
+    out: Option<PathBuf>,
     context: &Context<'_>,
-) -> Result<(Run, Option<Error>)> {
+    runs: &Runs,
+) -> Result<()> {
     let date = machine::utc_now();
     let BenchCases { cases, scene_hash, resolved } = bench_cases(args, path, &args.options)?;
-    let plan = BenchPlan {
-        n_warm_up: args.warmup,
-        n_rounds: args.repeat,
-        hash_frames: args.hash_frames,
-        pictures: out.is_some(),
-    };
+    let plan = plan(args);
     let mut stage = open(args, &cases)?;
     if args.options.verbose {
         print_sizes(&stage.scene, Some(&stage));
@@ -133,79 +119,75 @@ fn bench_scene(
     let info = stage.info().clone();
     let clocks = machine::clocks_record(&info, &mut stage.renderer)?;
     // Read before and after the frames, to measure the drift between the two clocks.
-    let mut readings = stage.device.read_clocks(N_CLOCK_READINGS)?;
-    if let Some(dir) = out {
+    let readings = stage.device.read_clocks(N_CLOCK_READINGS)?;
+    let (color, zones) = (context.color, context.zones.cloned());
+    let (args, path) = (args.clone(), path.to_owned());
+    let recorder = Arc::new(Recorder {
+        args,
+        color,
+        path,
+        out,
+        cases,
+        scene_hash,
+        resolved,
+        plan,
+        date,
+        info,
+        clocks,
+        zones,
+        readings,
+    });
+    let outcome = Arc::new(Mutex::new(Outcome::default()));
+    let mut keeping = {
+        let (recorder, outcome, runs) = (recorder.clone(), outcome.clone(), runs.clone());
+        interrupt::keep(PATIENCE, move || recorder.keep(&outcome, &runs))
+    };
+    if let Some(dir) = &recorder.out {
         // An existing folder was refused, or --force was given.
         prepare_out_dir(dir, true)?;
     }
-    let n_frames = blocks::n_frames_total(&cases, &plan);
-    let bar = progress(n_frames, &path.display().to_string(), args.options.quiet);
-    let Finished { stage, outcome, failure } =
-        blocks::run(stage, &cases, &plan, context.stop, &mut || bar.inc(1));
-    bar.finish_and_clear();
+    let ended = time(stage, &recorder, context.stop, &outcome);
+    keeping.finish();
+    let outcome = std::mem::take(&mut *blocks::lock(&outcome));
+    let Finished { stage, failure } = ended;
     if let (Some(failure), true) = (&failure, outcome.samples.is_empty()) {
         // An empty folder would only be refused by the next run.
-        let _ = out.map(std::fs::remove_dir);
+        let _ = recorder.out.as_ref().map(std::fs::remove_dir);
         return Err(failure.clone());
     }
-    let run = Run {
-        schema: Run::SCHEMA,
-        nimbus: env!("CARGO_PKG_VERSION").into(),
-        revision: machine::revision().into(),
-        date,
-        command: std::env::args().collect(),
-        scene_hash,
-        scene: resolved,
-        device: machine::device_record(&info),
-        cpu: machine::cpu(),
-        environment: machine::environment(),
-        clocks,
-        block_order: outcome.block_order(),
-        cases: outcome.cases(&cases, &plan),
-        chosen: outcome.chosen.clone(),
-        parts: Vec::new(),
-        interrupted: outcome.interrupted || failure.is_some(),
+    let later = match (&recorder.args.trace, &stage) {
+        (Some(_), Some(stage)) => stage.device.read_clocks(N_CLOCK_READINGS)?,
+        _ => Vec::new(),
     };
-    let needs_table = out.is_some() || args.plot;
-    let table = if needs_table { outcome.table(&cases) } else { FrameTable::default() };
-    if let Some(dir) = out {
-        let charts = if args.plot { bench_plot::files(&run, &table.rows)? } else { vec![] };
-        let pictures = outcome.pictures.clone();
-        write_results(dir, &run, &table, &Attachments { pictures, charts, copies: vec![] })?;
-    }
-    if !args.json {
-        print(args, path, &run, &cases, &outcome)?;
-        if args.plot {
-            output::painted(&bench_plot::text(&run, &table.rows, context.color)?)?;
-        }
-    }
-    if let Some(file) = &args.trace {
-        if let Some(stage) = &stage {
-            readings.extend(stage.device.read_clocks(N_CLOCK_READINGS)?);
-        }
-        let zones = context.zones.map(Zones::take);
-        trace::write(file, &outcome.samples, zones.as_ref(), ClockFit::from_samples(&readings))?;
-    }
-    if !args.options.quiet {
-        outcome.chosen.iter().for_each(|chosen| eprintln!("note: {chosen}"));
-        outcome.notes.iter().for_each(|note| eprintln!("warning: {note}"));
-    }
+    let is_cut = outcome.interrupted || failure.is_some();
+    let run = recorder.record(&outcome, &later, is_cut)?;
+    runs.lock().unwrap_or_else(PoisonError::into_inner).push(run);
     if failure.is_none() {
         stage.map_or(Ok(()), Stage::close)?;
     }
-    let end = failure.or(outcome.interrupted.then_some(Error::Interrupted));
-    Ok((run, end))
+    failure.or(outcome.interrupted.then_some(Error::Interrupted)).map_or(Ok(()), Err)
 }
 
-/// Prints the tables.
-fn print(
-    args: &BenchArgs,
-    path: &Path,
-    run: &Run,
-    cases: &[Case],
-    outcome: &Outcome,
-) -> Result<()> {
-    let same = cases.iter().enumerate().map(|(i, case)| outcome.is_same_picture(i, case));
-    let same: Vec<Option<bool>> = same.collect();
-    output::text(&bench_table::report(path, run, &same, args.options.verbose))
+/// Runs all blocks, with a progress bar.
+fn time(
+    stage: Stage,
+    recorder: &Recorder,
+    stop: &AtomicBool,
+    outcome: &Mutex<Outcome>,
+) -> Finished {
+    let Recorder { args, path, cases, plan, .. } = recorder;
+    let n_frames = blocks::n_frames_total(cases, plan);
+    let bar = progress(n_frames, &path.display().to_string(), args.options.quiet);
+    let ended = blocks::run(stage, cases, plan, stop, outcome, &mut || bar.inc(1));
+    bar.finish_and_clear();
+    ended
+}
+
+fn plan(args: &BenchArgs) -> BenchPlan {
+    BenchPlan {
+        n_warm_up: args.warmup,
+        n_rounds: args.repeat,
+        hash_frames: args.hash_frames,
+        pictures: args.out.is_some(),
+    }
 }

@@ -7,8 +7,10 @@ use super::args::{BenchArgs, SceneArgs, Span, ThreadingArg};
 use super::scene::{load, load_at, warnings};
 use crate::error::{Error, Result};
 use crate::farm::{Workload, bench_workload};
+use crate::io::console::say;
 use crate::model::scene::Threading;
 use crate::timing::cases::{Case, LoopChoice, cases};
+use crate::timing::limits::{SceneMemory, check_cases};
 use crate::timing::names::sweep_text;
 use crate::timing::parts::numbers;
 use crate::timing::sweep::{Axis, SIZE_KEY, points};
@@ -34,6 +36,8 @@ pub fn bench_cases(args: &BenchArgs, path: &Path, options: &SceneArgs) -> Result
         ThreadingArg::Both => &[Threading::Serial, Threading::Parallel],
     };
     let axes = axes(args)?;
+    check_cases("--sweep", axes.iter().map(|axis| axis.values.len()))?;
+    let mut memory = SceneMemory::default();
     let loops = LoopChoice { modes, skip: !options.no_skip, saved: !args.no_saved };
     let loaded = load(path, options)?;
     let (scene_hash, resolved) = (loaded.hash.clone(), loaded.resolved.clone());
@@ -46,9 +50,10 @@ pub fn bench_cases(args: &BenchArgs, path: &Path, options: &SceneArgs) -> Result
             let at = load_at(path, options, "--sweep", &point)?;
             for warning in warnings(&at).into_iter().filter(|_| !options.quiet) {
                 if printed.insert(warning.clone()) {
-                    eprintln!("warning: {}: {warning}", sweep_text(&point));
+                    say!("warning: {}: {warning}", sweep_text(&point));
                 }
             }
+            memory.add(&at.scene)?;
             all.extend(cases(at, &point, args.frames, loops));
         }
     }

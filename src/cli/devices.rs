@@ -6,6 +6,7 @@ use super::args::DevicesArgs;
 use super::output;
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceInfo, Instance, no_permission};
+use crate::io::console::say;
 
 /// Runs `nimbus devices`.
 ///
@@ -30,7 +31,7 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
             Some(choice) => format!("named by --device \"{choice}\""),
             None => "the first of the best kind: discrete, integrated, virtual, cpu".to_owned(),
         };
-        eprintln!("device {}: {} is used: {why}", used.index, used.name);
+        say!("device {}: {} is used: {why}", used.index, used.name);
     }
     let messages = instance.messages().take();
     if messages.is_empty() {

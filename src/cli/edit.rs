@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use super::args::EditArgs;
+use super::interrupt;
 use super::scene::{device_choice, load};
 use crate::error::{Error, Result};
 use crate::io::box_file;
@@ -32,6 +33,8 @@ pub fn run(args: &EditArgs, stop: &'static AtomicBool) -> Result<()> {
     };
     let (width, height) = args.options.size.unwrap_or(SIZE);
     let choice = device_choice(&args.options);
+    // Unsaved changes are written to a file first.
+    let _keeping = interrupt::keep_by_itself();
     edit_window::run(Options { session, scene, choice, size: [width, height], stop })
 }
 

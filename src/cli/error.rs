@@ -8,11 +8,12 @@ use indicatif::ProgressBar;
 use super::args::ErrorArgs;
 use super::error_configurations::{axes, design, load_configuration};
 use super::error_table;
-use super::interrupt::graceful_stop;
+use super::interrupt::{self, PATIENCE, graceful_stop};
 use super::output::{self, refuse_existing};
 use super::progress::{ReferenceProgress, progress};
 use super::scene::{StudyScene, load_study, open_for_study, print_sizes, with_texture_hint};
 use crate::error::{Error, Result};
+use crate::io::console::say;
 use crate::io::image;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;
@@ -83,6 +84,8 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         files::write(out, &study, &results)?;
     }
     let stop = graceful_stop();
+    let out = args.out.clone();
+    let mut keeping = interrupt::keep(PATIENCE, move || cut_short(out.as_deref()));
     let (n_frames, as_played) = (args.frames, args.as_played);
     let frames = FrameChoice { i_frame: args.frame, time_s, n_frames, as_played };
     let mut runner = DeviceRunner::new(&gpu, frames);
@@ -101,6 +104,7 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         };
         running.run(&mut runner, &mut results, &mut |event| recorder.on(event))
     };
+    keeping.finish();
     bar.finish_and_clear();
     drop(runner);
     study.interrupted = !matches!(done, Ok(true));
@@ -113,6 +117,18 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     print(args, color, &study)?;
     gpu.close()?;
     if study.interrupted { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+/// Says what is kept of a study whose present step takes too long to stop.
+fn cut_short(out: Option<&Path>) -> Error {
+    match out {
+        Some(out) => say!(
+            "the step under way was cut short; {} has the rounds before it, and --resume goes on",
+            out.display()
+        ),
+        None => say!("the step under way was cut short; without --out nothing is kept"),
+    }
+    Error::Interrupted
 }
 
 fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {

@@ -12,6 +12,7 @@ use crate::studies::error::design::{Design, settings};
 use crate::studies::error::knobs::default_axes;
 use crate::studies::error::records::name_of;
 use crate::studies::error::study::LoadedConfiguration;
+use crate::timing::limits::check_cases;
 use crate::timing::names::Setting;
 use crate::timing::sweep::{Axis, SIZE_KEY};
 
@@ -32,6 +33,11 @@ pub fn axes(args: &ErrorArgs, options: &SceneArgs, scene: &Scene) -> Result<Vec<
         return Ok(default_axes(scene));
     }
     let axes = Axis::parse_all("--knob", &args.knob)?;
+    let n_values = || axes.iter().map(|axis| axis.values.len());
+    match design(args) {
+        Design::Grid => check_cases("--grid", n_values())?,
+        Design::Alone => check_cases("--knob", std::iter::once(n_values().sum()))?,
+    }
     for Axis { key, .. } in &axes {
         if let Some(what) = refusal(key) {
             return Err(Error::usage(format!("--knob {key}: {what}")));

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::args::{FarmArgs, FarmCommand, GcArgs, LocalArgs, MergeArgs, RunArgs, StatusArgs};
-use super::interrupt::graceful_stop;
+use super::interrupt::{self, PATIENCE_OF_POOL, PATIENCE_WITH_CHILDREN, graceful_stop};
 use super::progress::{progress, spinner};
 use super::{farm_jobs, farm_plan, output};
 use crate::error::{Error, Result};
@@ -48,6 +48,10 @@ fn refuse_device(plan: &Plan, device: Option<&String>, validation: bool) -> Resu
 fn shard(args: &RunArgs) -> Result<()> {
     // Ctrl-C, or the signal with which Slurm takes a node back.
     let stop = graceful_stop();
+    // An item takes longer than a node is left to us. The items before it are kept.
+    let _keeping = interrupt::keep(PATIENCE_WITH_CHILDREN, || Error::Transient {
+        what: "interrupted; the items that were finished are kept".to_owned(),
+    });
     let plan = Plan::read(&args.plan)?;
     refuse_device(&plan, args.device.as_ref(), args.validation)?;
     let (n, noun) = (plan.shard(args.shard)?.n, plan.work.noun());
@@ -70,6 +74,7 @@ fn shard(args: &RunArgs) -> Result<()> {
 
 fn local(args: &LocalArgs) -> Result<()> {
     let stop = graceful_stop();
+    let _keeping = interrupt::keep(PATIENCE_OF_POOL, || Error::Interrupted);
     let plan = Plan::read(&args.plan)?;
     refuse_device(&plan, args.device.as_ref(), false)?;
     // A stale plan is refused here, and not once by every shard.

@@ -7,6 +7,7 @@ use super::scene::{check_time, device_choice, load, print_notes, print_sizes};
 use crate::error::Result;
 use crate::frame::Stage;
 use crate::inspect::{air, basis, stages as inspect};
+use crate::io::console::say;
 use crate::model::scene::Scene;
 
 /// Frames that `--plan` shows: the first runs every pass, the second those that a step of time
@@ -72,7 +73,7 @@ fn facets(args: &InspectArgs, scene: &Scene, rows: Vec<inspect::FacetRow>) -> Re
 
 fn basis_text(report: &basis::BasisReport, what: BasisArg, args: &InspectArgs) -> Result<String> {
     if let Some(note) = basis::note(report).filter(|_| !args.options.quiet) {
-        eprintln!("note: {note}");
+        say!("note: {note}");
     }
     match what {
         _ if args.json => output::json_text(report),

@@ -1,17 +1,20 @@
 //! `nimbus ledger SCENE`.
 
+use std::sync::{Arc, Mutex};
+
 use super::args::LedgerArgs;
-use super::interrupt::graceful_stop;
+use super::interrupt::{self, PATIENCE, graceful_stop};
 use super::output::{self, header, interval, or_dash, refuse_existing, scientific};
 use super::progress::ReferenceProgress;
 use super::scene::{StudyScene, load_study, open_for_study, with_texture_hint};
 use crate::error::{Error, Result};
 use crate::io::atomic::check_place;
+use crate::io::console::say;
 use crate::reference::picture::{Pixels, ReferenceKind, n_reflections};
 use crate::report::charts;
 use crate::studies::error::device_runner::FrameChoice;
 use crate::studies::ledger::records::{Ledger, Row};
-use crate::studies::ledger::study::LedgerStudy;
+use crate::studies::ledger::study::{LedgerParts, LedgerStudy, lock};
 use crate::studies::provenance::Provenance;
 use crate::timing::json::{self, ResultFile};
 use crate::timing::results::prepare_out_dir;
@@ -38,37 +41,35 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
     }
     let (gpu, clocks) = open_for_study(&options, scene, time_s)?;
     let made = Provenance::now(Ledger::SCHEMA, &args.scene, &loaded, gpu.device.info(), clocks);
+    let stop = graceful_stop();
+    let frames =
+        FrameChoice { i_frame: args.frame, time_s, n_frames: args.frames, as_played: false };
+    let pixels = Pixels::sample(scene.film.width, scene.film.height, args.pixels);
+    let parts = Arc::new(Mutex::new(LedgerParts::default()));
+    let mut keeping = {
+        let (args, made, pixels, parts) =
+            (args.clone(), made.clone(), pixels.clone(), parts.clone());
+        interrupt::keep(PATIENCE, move || cut_short(&args, made, frames, &pixels, &parts))
+    };
     if let Some(out) = &args.out {
         prepare_out_dir(out, true)?;
         check_place(&out.join(Ledger::FILE))?;
     }
-    let stop = graceful_stop();
     let shown = ReferenceProgress::new(args.options.quiet);
     let study = LedgerStudy {
         gpu: &gpu,
         scene,
-        frames: FrameChoice {
-            i_frame: args.frame,
-            time_s,
-            n_frames: args.frames,
-            as_played: false,
-        },
+        frames,
         n_rounds: args.rounds as usize,
-        pixels: &Pixels::sample(scene.film.width, scene.film.height, args.pixels),
+        pixels: &pixels,
         n_reflections: args.reflections,
         stop,
+        parts: &parts,
     };
     let ledger = study.run(made, &|work, n| shown.advance(work, n))?;
+    keeping.finish();
     drop(shown);
-    if let Some(out) = &args.out {
-        json::write(&out.join(Ledger::FILE), &ledger)?;
-        output::write_chart(&out.join("ledger.svg"), &charts::ledger::chart(&ledger))?;
-    }
-    if args.json {
-        output::object(&ledger)?;
-    } else {
-        output::text(&report(&ledger))?;
-    }
+    deliver(args, &ledger)?;
     gpu.close()?;
     if ledger.interrupted {
         return Err(Error::Interrupted);
@@ -77,6 +78,41 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
         let (total, sum) = (ledger.total.value, ledger.sum);
         let what = format!("the total {total:.3e} is more than the sum of all rows {sum:.3e}");
         return Err(Error::Check { what });
+    }
+    Ok(())
+}
+
+/// Keeps what a ledger has finished whose present picture takes too long to stop. Returns the error
+/// that the program ends with.
+fn cut_short(
+    args: &LedgerArgs,
+    made: Provenance,
+    frames: FrameChoice,
+    pixels: &Pixels,
+    parts: &Mutex<LedgerParts>,
+) -> Error {
+    let parts = lock(parts);
+    if !parts.has_row() {
+        say!("no row was finished, nothing is kept");
+        // An empty folder would only be refused by the next run.
+        let _ = args.out.as_ref().map(std::fs::remove_dir);
+        return Error::Interrupted;
+    }
+    let kept = parts.ledger(made, frames, pixels, true).and_then(|ledger| deliver(args, &ledger));
+    kept.err().unwrap_or(Error::Interrupted)
+}
+
+/// Prints the ledger and writes its files.
+fn deliver(args: &LedgerArgs, ledger: &Ledger) -> Result<()> {
+    // The table appears even where the files cannot be written.
+    if args.json {
+        output::object(ledger)?;
+    } else {
+        output::text(&report(ledger))?;
+    }
+    if let Some(out) = &args.out {
+        json::write(&out.join(Ledger::FILE), ledger)?;
+        output::write_chart(&out.join("ledger.svg"), &charts::ledger::chart(ledger))?;
     }
     Ok(())
 }

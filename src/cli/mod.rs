@@ -6,6 +6,7 @@ mod attach;
 mod bench;
 mod bench_cases;
 mod bench_plot;
+mod bench_record;
 mod bench_remarks;
 mod bench_table;
 mod compare;
@@ -34,24 +35,55 @@ mod stress;
 mod view;
 mod weather;
 
+use std::io::Write;
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{ColorChoice, Parser};
 
+use crate::error::{Error, Result};
+use crate::measure::zones::Zones;
 use args::{Args, Command};
 use interrupt::graceful_stop;
 
 /// Parses the command line, runs the command, prints its error and returns the exit code.
 pub fn main() -> ExitCode {
-    let args = Args::parse();
+    let args = match Args::try_parse() {
+        Ok(args) => args,
+        Err(shown) => return usage(&shown),
+    };
     // If no handler can be set, Ctrl-C still ends the program, but leaves temporary files.
     let _ = ctrlc::set_handler(interrupt::handle);
     let zones = attach::attach(matches!(&args.command, Command::Bench(a) if a.trace.is_some()));
-    let done = match &args.command {
+    let done = run(&args, zones.as_ref());
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::error(&error, args.color);
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Prints the help that was asked for, or what is wrong with the command line.
+fn usage(shown: &clap::Error) -> ExitCode {
+    let printed = shown.print().and_then(|()| std::io::stdout().flush());
+    match printed {
+        _ if shown.use_stderr() => ExitCode::from(Error::usage("").exit_code()),
+        Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
+            let error = Error::io("stdout".as_ref(), cause);
+            output::error(&error, ColorChoice::Never);
+            ExitCode::from(error.exit_code())
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+fn run(args: &Args, zones: Option<&Zones>) -> Result<()> {
+    match &args.command {
         Command::Render(a) => render::run(a),
         Command::Bench(a) => {
             let (color, stop) = (args.color, graceful_stop());
-            bench::run(a, &bench::Context { color, stop, zones: zones.as_ref() })
+            bench::run(a, &bench::Context { color, stop, zones })
         }
         Command::Compare(a) => compare::run(a),
         Command::Error(a) => error::run(a, args.color),
@@ -66,12 +98,5 @@ pub fn main() -> ExitCode {
         Command::Edit(a) => edit::run(a, graceful_stop()),
         Command::Weather(a) => weather::run(a),
         Command::Farm(a) => farm::run(a),
-    };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            output::error(&error, args.color);
-            ExitCode::from(error.exit_code())
-        }
     }
 }

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
+use crate::io::console;
 use crate::io::plain_text::{plain, plain_json};
 use crate::report::charts::Chart;
 use crate::studies::figure::Figure;
@@ -16,7 +17,7 @@ use crate::studies::figure::Figure;
 pub fn error(error: &Error, color: ColorChoice) {
     let is_colored = is_colored(color, &std::io::stderr());
     let label = if is_colored { "\x1b[1;31merror:\x1b[0m" } else { "error:" };
-    eprintln!("{label} {}", plain(&error.to_string()));
+    console::write_painted(&format!("{label} {}", plain(&error.to_string())));
 }
 
 fn is_colored(color: ColorChoice, stream: &impl IsTerminal) -> bool {

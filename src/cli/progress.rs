@@ -73,7 +73,7 @@ pub fn spinner(what: &'static str, quiet: bool) -> Spinner {
         return Spinner { drawn: None };
     }
     let (done, waiting) = mpsc::channel::<()>();
-    let thread = std::thread::spawn(move || {
+    let draw = move || {
         if waiting.recv_timeout(SPINNER_DELAY) != Err(RecvTimeoutError::Timeout) {
             return;
         }
@@ -84,8 +84,10 @@ pub fn spinner(what: &'static str, quiet: bool) -> Spinner {
             spinner.tick();
         }
         spinner.finish_and_clear();
-    });
-    Spinner { drawn: Some((done, thread)) }
+    };
+    // Where no thread can be started, the work goes on without a spinner.
+    let thread = std::thread::Builder::new().name("spinner".into()).spawn(draw);
+    Spinner { drawn: thread.ok().map(|thread| (done, thread)) }
 }
 
 impl Drop for Spinner {

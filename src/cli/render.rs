@@ -9,6 +9,7 @@ use super::{output, render_reference};
 use crate::error::Result;
 use crate::frame::plan::Pass;
 use crate::frame::{Counts, DrawnFrame, Rendered, Stage};
+use crate::io::console::say;
 use crate::io::image::{self, ImageKind, image_hash};
 use crate::model::film::FilmFormat;
 use crate::model::scene::Scene;
@@ -50,19 +51,19 @@ fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
         print_sizes(&stage.scene, Some(&stage));
         for pass in Pass::ALL {
             let time = output::or_dash(pass_ms(&rendered, pass), |ms| format!("{ms:.3} ms"));
-            eprintln!("  {:9} {time:>12}  {}", pass.name(), rendered.plan.decision(pass).reason);
+            say!("  {:9} {time:>12}  {}", pass.name(), rendered.plan.decision(pass).reason);
         }
     }
     let counts = (args.options.verbose || args.json)
         .then(|| Counts::new(&mut stage.renderer, &stage.device, &stage.scene))
         .transpose()?;
     if let (Some(counts), true) = (&counts, args.options.verbose) {
-        eprintln!("  {}", counts.text());
+        say!("  {}", counts.text());
     }
     stage.close()?;
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
     if n_bad > 0 && !quiet {
-        eprintln!("warning: {}", not_finite(n_bad, rgba.len(), film.format));
+        say!("warning: {}", not_finite(n_bad, rgba.len(), film.format));
     }
     let writing = spinner("writing", quiet);
     image::write(&args.output, &film, film.width, film.height, &rgba)?;

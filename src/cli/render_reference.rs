@@ -10,6 +10,7 @@ use super::progress::ReferenceProgress;
 use super::scene::print_sizes;
 use crate::error::Result;
 use crate::io::atomic;
+use crate::io::console::say;
 use crate::io::image::{self, image_hash};
 use crate::model::scene::Scene;
 use crate::reference::picture::{
@@ -45,7 +46,7 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
     if n_bad > 0 && !args.options.quiet {
         let n = rgba.len();
-        eprintln!("warning: {n_bad} of {n} values of the picture are not finite");
+        say!("warning: {n_bad} of {n} values of the picture are not finite");
     }
     let film = scene.film;
     image::write(&args.output, &film, film.width, film.height, &rgba)?;
@@ -75,7 +76,7 @@ fn at_centers(
         drawn_as_set(scene, time_s, drawing, &|work, n| shown.advance(work, n))?;
     drop(shown);
     if let Some(error) = error.filter(|_| args.options.verbose) {
-        eprintln!(
+        say!(
             "error of the integral: at most about {error:.1e}; the brightest particle has \
              {brightest:.3e}"
         );
@@ -84,7 +85,7 @@ fn at_centers(
     if let Some(share) = share.filter(|_| args.options.verbose && scene.draw.threshold.is_active())
     {
         let n = omitted.n_layers;
-        eprintln!(
+        say!(
             "draw.threshold cuts {n} layers of a pixel at most, and changes it by at most \
              {share:.1e} of the radiances"
         );
@@ -107,7 +108,7 @@ fn sampled(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
     drop(shown);
     let accuracy = kind.accuracy_text(scene, args.samples);
     if args.options.verbose {
-        eprintln!(
+        say!(
             "off by about {:.1e} (root mean square of the pixels' estimates; {accuracy})",
             mean.own_error
         );

@@ -8,6 +8,7 @@ use crate::frame::limits::{self, advice};
 use crate::frame::{DeviceChoice, DrawnFrame, GpuContext, Stage, light_notes, unseen};
 use crate::inspect::basis::basis_warnings;
 use crate::io::bounds::{GREATEST, is_carried_place, shortest};
+use crate::io::console::say;
 use crate::io::scene_file::{self, LoadedScene};
 use crate::model::scene::Scene;
 use crate::timing::machine::{Clocks, clocks_record};
@@ -24,7 +25,7 @@ pub fn typed_overrides(set: &[String], size: Option<(u32, u32)>) -> Vec<String> 
 /// Prints the warnings about a scene unless `quiet` is set.
 pub fn print_warnings(loaded: &LoadedScene, quiet: bool) {
     for warning in warnings(loaded).iter().filter(|_| !quiet) {
-        eprintln!("warning: {warning}");
+        say!("warning: {warning}");
     }
 }
 
@@ -191,10 +192,10 @@ pub fn check_time(scene: &Scene, time_s: f64) -> Result<()> {
 pub fn print_notes(stage: &mut Stage, args: &SceneArgs) -> Result<()> {
     if !args.quiet {
         for chosen in stage.take_chosen() {
-            eprintln!("note: {chosen}");
+            say!("note: {chosen}");
         }
         for note in light_notes(stage)? {
-            eprintln!("warning: {note}");
+            say!("warning: {note}");
         }
     }
     Ok(())
@@ -206,7 +207,7 @@ pub fn print_notes(stage: &mut Stage, args: &SceneArgs) -> Result<()> {
 /// Fails if the scene has no state at the time of the frame.
 pub fn print_unseen(scene: &Scene, frame: DrawnFrame, rgba: &[f32], quiet: bool) -> Result<()> {
     if let Some(note) = unseen(scene, frame, rgba)?.filter(|_| !quiet) {
-        eprintln!("warning: {note}");
+        say!("warning: {note}");
     }
     Ok(())
 }
@@ -214,9 +215,9 @@ pub fn print_unseen(scene: &Scene, frame: DrawnFrame, rgba: &[f32], quiet: bool)
 /// Prints the device and the sizes of a scene, for `--verbose`.
 pub fn print_sizes(scene: &Scene, stage: Option<&Stage>) {
     if let Some(stage) = stage {
-        eprintln!("{} ({})", stage.info().name, stage.info().driver);
+        say!("{} ({})", stage.info().name, stage.info().driver);
     }
     let film = scene.film;
     let (particles, groups) = (scene.n_particles(), scene.groups().len());
-    eprintln!("{particles} particles in {groups} groups, film {} x {}", film.width, film.height);
+    say!("{particles} particles in {groups} groups, film {} x {}", film.width, film.height);
 }

@@ -1,12 +1,13 @@
 //! `nimbus stress [CASE…]`.
 
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::Serialize;
 use serde_json::json;
 
 use super::args::StressArgs;
-use super::interrupt::graceful_stop;
+use super::interrupt::{self, PATIENCE, graceful_stop};
 use super::output::{self, header};
 use super::progress::progress;
 use crate::error::{Error, Result};
@@ -35,18 +36,37 @@ pub fn run(args: &StressArgs) -> Result<()> {
     let mut context = StressContext::open(&choice)?;
     let stop = graceful_stop();
     let bar = progress(chosen.len() as u64, "cases", args.quiet);
-    let mut done: Vec<Outcome> = Vec::new();
+    let device = machine::device_record(context.device().info());
+    let done = Arc::new(Mutex::new(Vec::<Outcome>::new()));
+    let mut keeping = {
+        let (args, device, done) = (args.clone(), device.clone(), done.clone());
+        interrupt::keep(PATIENCE, move || {
+            print(&args, &device, &lock(&done), true).err().unwrap_or(Error::Interrupted)
+        })
+    };
     for case in &chosen {
         if stop.load(Ordering::Relaxed) {
             break;
         }
         bar.set_message(case.name);
-        done.push(case.run(&mut context));
+        let outcome = case.run(&mut context);
+        lock(&done).push(outcome);
         bar.inc(1);
     }
+    keeping.finish();
     bar.finish_and_clear();
+    let done = std::mem::take(&mut *lock(&done));
     let interrupted = done.len() < chosen.len();
-    let device = machine::device_record(context.device().info());
+    print(args, &device, &done, interrupted)?;
+    context.close()?;
+    if interrupted { Err(Error::Interrupted) } else { judged(&done) }
+}
+
+fn lock(done: &Mutex<Vec<Outcome>>) -> MutexGuard<'_, Vec<Outcome>> {
+    done.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn print(args: &StressArgs, device: &Device, done: &[Outcome], interrupted: bool) -> Result<()> {
     output::text(&if args.json {
         output::json_text(&json!({
             "schema": SCHEMA_VERSION, "nimbus": env!("CARGO_PKG_VERSION"),
@@ -54,12 +74,10 @@ pub fn run(args: &StressArgs) -> Result<()> {
             "cpu": machine::cpu(), "interrupted": interrupted, "cases": done,
         }))?
     } else if args.csv {
-        csv(&done)?
+        csv(done)?
     } else {
-        text(&device, &done, interrupted)
-    })?;
-    context.close()?;
-    if interrupted { Err(Error::Interrupted) } else { judged(&done) }
+        text(device, done, interrupted)
+    })
 }
 
 /// Returns the families with a line each, the cases of one family with a line each, or all about

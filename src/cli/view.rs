@@ -6,9 +6,10 @@ use std::sync::atomic::AtomicBool;
 use serde_json::{Value, json};
 
 use super::args::ViewArgs;
+use super::interrupt::{self, PATIENCE_WITH_CHILDREN};
 use super::output::{self, header};
 use super::scene::{device_choice, load_with_files, typed_overrides};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::measure::stats::Summary;
 use crate::viewer::scene_window::{self, LoopTimes, Options, SceneSource, WindowTimes};
 
@@ -25,6 +26,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         first: Arc::new(loaded.scene),
         files,
     };
+    let _keeping = interrupt::keep(PATIENCE_WITH_CHILDREN, || Error::Interrupted);
     let WindowTimes { loops, panels_ms } = scene_window::run(Options {
         source,
         choice: device_choice(&args.options),

@@ -5,6 +5,7 @@ use super::cost::{Amounts, PieceAmounts, Workload};
 use super::cut::{Cut, CutOptions, ShardSize};
 use super::work::{AnyWork, ReferenceWork, Work};
 use crate::error::Result;
+use crate::io::console::say;
 use crate::io::image::ImageKind;
 use crate::io::scene_file::LoadedScene;
 use crate::reference::picture::ReferenceKind;
@@ -100,7 +101,7 @@ impl ReferenceDivision {
             (work, now_s) = found;
         }
         if now_s > most_s {
-            eprintln!(
+            say!(
                 "note: the longest piece takes {now_s:.0} s, more than {most_s:.0}: light that \
                  every piece computes for itself"
             );

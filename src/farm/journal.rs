@@ -1,6 +1,5 @@
 //! Records as JSON: append-only files of lines that several processes share, and whole files.
 
-use std::fs;
 use std::io;
 use std::path::Path;
 
@@ -8,8 +7,11 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
-use crate::io::atomic;
+use crate::io::{atomic, input_file};
 use crate::timing::json;
+
+/// Largest journal: half a million lines of 128 bytes.
+const LARGEST_JOURNAL: u64 = 64 << 20;
 
 /// Appends `record` as a line and syncs the file. The line is written by a single call, so that
 /// lines of two processes never mix.
@@ -35,7 +37,7 @@ pub fn write<T: Serialize>(path: &Path, record: &T) -> Result<()> {
 /// # Errors
 /// When the file cannot be read.
 pub fn read<T: DeserializeOwned>(path: &Path) -> io::Result<Vec<T>> {
-    let bytes = fs::read(path)?;
+    let bytes = input_file::read(path, LARGEST_JOURNAL)?;
     let text = String::from_utf8_lossy(&bytes);
     Ok(text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect())
 }

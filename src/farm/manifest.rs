@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 
 use super::transient::io_error;
 use crate::error::Error;
+use crate::io::input_file;
 use crate::timing::machine::{Cpu, Device};
 
 /// The manifest's name in a shard's folder.
@@ -105,7 +106,7 @@ impl FileRecord {
             let what = format!("{name} has {} bytes, {MANIFEST_FILE} says {bytes}", about.len());
             return Err(Defect::Broken(what));
         }
-        let content = fs::read(&path).map_err(|cause| Defect::new(&path, cause))?;
+        let content = input_file::read(&path, *bytes).map_err(|cause| Defect::new(&path, cause))?;
         if FileRecord::new(name, &content) != *self {
             let begin: String = sha256.chars().take(8).collect();
             return Err(Defect::Broken(format!(

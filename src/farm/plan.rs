@@ -119,7 +119,7 @@ impl Plan {
             revision: machine::revision().into(),
             code: CODE.into(),
             date: machine::utc_now(),
-            command: std::env::args().collect(),
+            command: machine::command_line(),
             scene,
             device,
             work: cut.work,

@@ -49,9 +49,9 @@ impl Pool<'_> {
         let next = AtomicUsize::new(0);
         std::thread::scope(|scope| {
             let (sender, receiver) = channel();
-            for _ in 0..self.n_processes {
+            for i_thread in 0..self.n_processes.min(indices.len()) {
                 let (sender, next) = (sender.clone(), &next);
-                scope.spawn(move || {
+                let work = move || {
                     while let Some(&index) = indices.get(next.fetch_add(1, Ordering::Relaxed)) {
                         let ended = self.try_shard(index, stop);
                         let ended = ended.map(|exit_code| Ended { index, exit_code });
@@ -60,7 +60,15 @@ impl Pool<'_> {
                             break;
                         }
                     }
-                });
+                };
+                let started = std::thread::Builder::new().spawn_scoped(scope, work);
+                if let Err(cause) = started {
+                    // The threads that were started do all shards.
+                    if i_thread == 0 {
+                        return Err(Error::of_io(self.program, &cause));
+                    }
+                    break;
+                }
             }
             drop(sender);
             receiver.into_iter().inspect(|_| on_end()).collect()

@@ -13,7 +13,8 @@ use super::plan::{Plan, Shard};
 use super::transient::io_error;
 use super::workplace::Workplace;
 use crate::error::{Error, Result};
-use crate::io::atomic;
+use crate::io::text_file::RECORD_LIMIT;
+use crate::io::{atomic, input_file};
 
 /// The state of a shard's result.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,7 +74,8 @@ impl<'a> Store<'a> {
     fn verify(&self, folder: &Path, shard: &Shard) -> std::result::Result<Manifest, Defect> {
         let path = folder.join(MANIFEST_FILE);
         let broken = |what: String| Err(Defect::Broken(format!("{MANIFEST_FILE}{what}")));
-        let text = fs::read(&path).map_err(|cause| Defect::new(&path, cause))?;
+        let text =
+            input_file::read(&path, RECORD_LIMIT).map_err(|cause| Defect::new(&path, cause))?;
         let manifest: Manifest = match serde_json::from_slice(&text) {
             Ok(manifest) => manifest,
             Err(cause) => return broken(format!(": {cause}")),

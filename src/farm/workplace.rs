@@ -8,7 +8,8 @@ use super::journal;
 use super::manifest::{FileRecord, MANIFEST_FILE, Manifest};
 use super::transient::io_error;
 use crate::error::{Error, Result};
-use crate::io::atomic;
+use crate::io::text_file::{RECORD_LIMIT, TABLE_LIMIT};
+use crate::io::{atomic, input_file};
 use crate::timing::machine::Device;
 
 /// A [`FileRecord`] a line, for each file that is finished.
@@ -71,7 +72,9 @@ impl Workplace {
         let class =
             serde_json::to_string(&device.class()).map_err(|cause| Error::io(&self.path, cause))?;
         for other in std::mem::take(&mut self.earlier) {
-            if fs::read_to_string(other.join(DEVICE_FILE)).is_ok_and(|found| found == class) {
+            if input_file::read_string(&other.join(DEVICE_FILE), RECORD_LIMIT)
+                .is_ok_and(|found| found == class)
+            {
                 let adopted = self.adopt(&other);
                 // Counted after a failure too: this attempt has not made those files.
                 self.n_resumed = self.files.len();
@@ -136,7 +139,7 @@ impl Workplace {
         for entry in fs::read_dir(folder).map_err(&failed)? {
             let entry = entry.map_err(&failed)?;
             let name = entry.file_name().to_string_lossy().into_owned();
-            self.add(&name, &fs::read(entry.path()).map_err(&failed)?)?;
+            self.add(&name, &input_file::read(&entry.path(), TABLE_LIMIT).map_err(&failed)?)?;
         }
         fs::remove_dir_all(folder).map_err(failed)
     }

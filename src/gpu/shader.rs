@@ -1,11 +1,26 @@
 //! GLSL sources, and their compilation to SPIR-V at run time by shaderc, cached on disk by content.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
+use crate::io::input_file;
+
+/// Largest text of a shader of `--shaders`, bytes. The longest built-in one has 14 KiB.
+const LARGEST_TEXT: u64 = 256 << 10;
+/// Most lines of such a text.
+const MOST_LINES: usize = 10_000;
+/// Most brackets within each other in such a text: the compiler recurses into each of them.
+const DEEPEST_NESTING: usize = 200;
+/// Most includes of a shader, those of its includes counted; the built-in shaders have up to ten.
+/// Without a bound an include of itself never ends.
+const MOST_INCLUDES: u32 = 64;
+/// Largest SPIR-V of a shader in the cache.
+const LARGEST_BINARY: u64 = 64 << 20;
 
 /// Shader texts by file name (`include/x.glsl` for includes).
 #[derive(Debug, Clone)]
@@ -30,10 +45,15 @@ impl Sources {
         let mut n_found = 0;
         for (name, text) in &mut self.0 {
             let path = dir.join(name);
-            if path.is_file() {
-                *text = std::fs::read_to_string(&path).map_err(|e| Error::io(&path, e))?;
-                n_found += 1;
+            match input_file::read_string(&path, LARGEST_TEXT) {
+                Ok(own) => *text = own,
+                Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+                    continue;
+                }
+                Err(e) => return Err(Error::io(&path, e)),
             }
+            check_text(text).map_err(|what| Error::io(&path, what))?;
+            n_found += 1;
         }
         if n_found == 0 {
             let names: Vec<&str> = self.names().collect();
@@ -148,6 +168,33 @@ fn is_shader(name: &str) -> bool {
     EXTENSIONS.contains(&extension.as_str())
 }
 
+/// Checks a text before the compiler gets it, which does not survive every text.
+fn check_text(text: &str) -> std::result::Result<(), String> {
+    if let Some(at) = text.find('\0') {
+        let line = text[..at].matches('\n').count() + 1;
+        return Err(format!("line {line}: not a text file: it holds a zero byte"));
+    }
+    let n_lines = text.lines().count();
+    if n_lines > MOST_LINES {
+        return Err(format!("{n_lines} lines, the limit is {MOST_LINES}"));
+    }
+    let (mut depth, mut deepest) = (0usize, 0);
+    for c in text.bytes() {
+        match c {
+            b'(' | b'[' | b'{' => depth += 1,
+            b')' | b']' | b'}' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        deepest = deepest.max(depth);
+    }
+    if deepest > DEEPEST_NESTING {
+        return Err(format!(
+            "{deepest} brackets within each other, the limit is {DEEPEST_NESTING}"
+        ));
+    }
+    Ok(())
+}
+
 /// How SPIR-V is optimised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Optimize {
@@ -212,10 +259,13 @@ impl Compiler {
             _ => return Err(fail("expected a file ending in .comp, .vert or .frag".into())),
         };
         let key = || self.key(file, text, optimize, macros);
+        check_text(text).map_err(fail)?;
         let cached = self.cache.as_ref().map(|dir| dir.join(format!("{}.spv", key())));
         if let Some(words) = cached.as_deref().and_then(read_cached) {
             return Ok(words);
         }
+        // Declared before the options, which borrow it.
+        let n_includes = Cell::new(0);
         let mut options = shaderc::CompileOptions::new().map_err(|e| fail(e.to_string()))?;
         options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
         options.set_optimization_level(match optimize {
@@ -228,6 +278,13 @@ impl Compiler {
         options.set_warnings_as_errors();
         options.set_include_callback(|name, _, _, _| {
             let full = format!("include/{name}");
+            n_includes.set(n_includes.get() + 1);
+            if n_includes.get() > MOST_INCLUDES {
+                return Err(format!(
+                    "more than {MOST_INCLUDES} includes: {full} includes itself, directly or \
+                     through others"
+                ));
+            }
             let content = self.sources.0.get(&full).cloned().ok_or(format!("no include {full}"))?;
             Ok(shaderc::ResolvedInclude { resolved_name: full, content })
         });
@@ -263,7 +320,7 @@ pub fn hex(bytes: &[u8]) -> String {
 
 /// Reads a cached file: words after their SHA-256. Any other content counts as missing.
 fn read_cached(path: &Path) -> Option<Vec<u32>> {
-    let bytes = std::fs::read(path).ok()?;
+    let bytes = input_file::read(path, LARGEST_BINARY).ok()?;
     let (sum, words) = bytes.split_at_checked(32)?;
     if words.len() % 4 != 0 || Sha256::digest(words).as_slice() != sum {
         return None;

@@ -103,6 +103,10 @@ pub fn append_synced(path: &Path, line: &str) -> Result<()> {
     let append = |mut file: File| {
         file.write_all(format!("{line}\n").as_bytes()).and_then(|()| file.sync_data())
     };
+    if fs::metadata(path).is_ok_and(|about| !about.is_file()) {
+        // Opening a pipe waits for its reader.
+        return Err(Error::io(path, "exists and is not a regular file"));
+    }
     let file = OpenOptions::new().create(true).append(true).open(path);
     file.and_then(append).map_err(|cause| Error::of_io(path, &cause))
 }

@@ -1,7 +1,7 @@
 //! Images: PNG for looking at, EXR for measuring. Images are written from premultiplied linear RGBA
 //! pixels, row 0 at the top, and read with the numbers of the file.
 
-use std::io::{Seek, Write};
+use std::io::{Cursor, Seek, Write};
 use std::path::Path;
 
 use glam::DVec3;
@@ -12,8 +12,12 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::atomic::write_atomic;
+use super::input_file::{self, PICTURE_LIMIT};
 use crate::error::{Error, Result};
 use crate::model::film::{Film, dither};
+
+/// Most pixels of a picture that is read: 4096 x 2048. Comparing two of them takes 1.5 GiB.
+pub const MOST_PIXELS: u64 = 1 << 23;
 
 /// Format of an image file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,11 +81,17 @@ pub fn read(path: &Path) -> Result<Image> {
         ImageKind::Png => ImageFormat::Png,
         ImageKind::Exr => ImageFormat::OpenExr,
     };
-    let mut reader = image::ImageReader::open(path).map_err(|e| Error::io(path, e))?;
-    reader.set_format(format);
-    let decoded = reader
-        .decode()
-        .map_err(|e| Error::io(path, format!("cannot be read as a picture: {e}")))?;
+    let bytes = input_file::read(path, PICTURE_LIMIT).map_err(|e| Error::io(path, e))?;
+    let unread =
+        |e: image::ImageError| Error::io(path, format!("cannot be read as a picture: {e}"));
+    let reader = || image::ImageReader::with_format(Cursor::new(&bytes), format);
+    // A few bytes can declare a picture that fills the memory.
+    let (width, height) = reader().into_dimensions().map_err(unread)?;
+    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+        let what = format!("{width} x {height} pixels, the limit is {MOST_PIXELS} pixels in all");
+        return Err(Error::io(path, what));
+    }
+    let decoded = reader().decode().map_err(unread)?;
     let (width, height, has_alpha) =
         (decoded.width(), decoded.height(), decoded.color().has_alpha());
     let rgba = match decoded.color() {
@@ -145,7 +155,7 @@ pub fn encoded(
     height: u32,
     rgba: &[f32],
 ) -> Result<Vec<u8>> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut bytes = Cursor::new(Vec::new());
     encode(&mut bytes, kind, film, [width, height], rgba).map_err(not_encoded)?;
     Ok(bytes.into_inner())
 }

@@ -3,7 +3,8 @@
 //! Inputs: a scene ([`scene_file`]), which names box files ([`box_file`]), particle lists
 //! ([`particle_file`]) and the output of weather models ([`weather`]). Outputs: images ([`image`])
 //! and results. Every file is written through [`atomic`], so that it is the old one or the new one
-//! whole, and files that belong together through [`folder`].
+//! whole, and files that belong together through [`folder`]. Every file that a user names is opened
+//! by [`input_file`].
 //!
 //! Every complaint about an input says file:line:column, or the `--set` argument, and what was
 //! expected. A scene is read in two steps: `document` turns text and `--set` arguments into a tree
@@ -12,9 +13,11 @@
 pub mod atomic;
 pub mod bounds;
 pub mod box_file;
+pub mod console;
 mod document;
 pub mod folder;
 pub mod image;
+pub mod input_file;
 pub mod particle_file;
 pub mod plain_text;
 pub mod scene_file;

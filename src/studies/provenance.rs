@@ -58,7 +58,7 @@ impl Provenance {
             revision: machine::revision().into(),
             code: env!("NIMBUS_CODE").into(),
             date: machine::utc_now(),
-            command: std::env::args().collect(),
+            command: machine::command_line(),
             scene_file: scene_file.display().to_string(),
             scene_hash: scene.hash.clone(),
             scene: scene.resolved.clone(),

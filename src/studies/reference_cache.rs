@@ -11,11 +11,15 @@ use sha2::{Digest, Sha256};
 use crate::error::Result;
 use crate::gpu::cache_folder;
 use crate::io::atomic::write_atomic;
+use crate::io::input_file;
 use crate::model::basis::Sampling;
 use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::scene::{Gather, Lighting, Pairs, Scene, Simulate, Threading, Threads};
 use crate::model::sums::Sums;
 use crate::reference::picture::{OnProgress, Pixels, Reference, ReferenceKind};
+
+/// Largest file of the cache: 32 bytes for each pixel of the largest picture of a study.
+const LARGEST_FILE: u64 = 512 << 20;
 
 /// A reference, and whether it was computed now.
 #[derive(Debug, Clone, PartialEq)]
@@ -131,7 +135,7 @@ fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
 }
 
 fn read(path: &Path, hash: &str, n_pixels: usize) -> Option<Reference> {
-    let bytes = fs::read(path).ok()?;
+    let bytes = input_file::read(path, LARGEST_FILE).ok()?;
     let end = bytes.iter().position(|b| *b == b'\n')?;
     let head: Head = serde_json::from_slice(&bytes[..end]).ok()?;
     let numbers = &bytes[end + 1..];

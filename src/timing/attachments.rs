@@ -1,6 +1,5 @@
 //! Files beside `run.json`: a picture of every case, and charts.
 
-use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::io::folder;
 use crate::io::image::write_bytes;
+use crate::io::input_file::{self, PICTURE_LIMIT};
 
 /// File name of the chart of the passes' times.
 pub const PASSES_CHART: &str = "passes.svg";
@@ -75,7 +75,8 @@ impl Attachments {
             write_bytes(&folder.join(picture_file(*i_case)), *width, *height, rgb)?;
         }
         for (name, from) in &self.copies {
-            let bytes = fs::read(from).map_err(|cause| Error::io(from, cause))?;
+            let bytes =
+                input_file::read(from, PICTURE_LIMIT).map_err(|cause| Error::io(from, cause))?;
             write_atomic(&folder.join(name), |file| file.write_all(&bytes))?;
         }
         for (name, text) in &self.charts {

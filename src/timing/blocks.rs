@@ -1,8 +1,8 @@
 //! Runs the frames of a bench, in interleaved blocks: each case in each of its loops.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use sha2::{Digest, Sha256};
 
@@ -78,8 +78,6 @@ pub struct Outcome {
 pub struct Finished {
     /// Stage of the last case; none if creating it failed.
     pub stage: Option<Stage>,
-    /// Samples.
-    pub outcome: Outcome,
     /// The error that ended the bench early.
     pub failure: Option<Error>,
 }
@@ -104,6 +102,7 @@ pub fn n_frames_total(cases: &[Case], plan: &BenchPlan) -> u64 {
 
 /// Runs the plan on `stage`, which holds the first case.
 ///
+/// Every sample is put into `outcome` as soon as its frame has ended, where other threads find it.
 /// `tick` is called after every frame. The run ends early, and keeps its samples, once `stop` is
 /// set or a block fails.
 pub fn run(
@@ -111,11 +110,12 @@ pub fn run(
     cases: &[Case],
     plan: &BenchPlan,
     stop: &AtomicBool,
+    outcome: &Mutex<Outcome>,
     tick: &mut dyn FnMut(),
 ) -> Finished {
     let mut bench = Bench {
         stage: Some(stage),
-        outcome: Outcome::default(),
+        outcome,
         cases,
         plan,
         stop,
@@ -134,11 +134,16 @@ pub fn run(
             break;
         }
         if stop.load(Ordering::Relaxed) {
-            bench.outcome.interrupted = true;
+            lock(outcome).interrupted = true;
             break;
         }
     }
-    Finished { stage: bench.stage, outcome: bench.outcome, failure }
+    Finished { stage: bench.stage, failure }
+}
+
+/// Locks an outcome. A panic elsewhere leaves whole samples in it.
+pub fn lock(outcome: &Mutex<Outcome>) -> MutexGuard<'_, Outcome> {
+    outcome.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A block that is about to run.
@@ -156,7 +161,7 @@ struct NextBlock {
 struct Bench<'a> {
     /// None after creating a stage has failed.
     stage: Option<Stage>,
-    outcome: Outcome,
+    outcome: &'a Mutex<Outcome>,
     cases: &'a [Case],
     plan: &'a BenchPlan,
     stop: &'a AtomicBool,
@@ -181,29 +186,31 @@ impl Bench<'_> {
         let named = |note: &String| {
             if has_several { format!("{}: {note}", case.name()) } else { note.clone() }
         };
-        self.outcome.chosen.extend(stage.take_chosen().iter().map(named));
+        lock(self.outcome).chosen.extend(stage.take_chosen().iter().map(named));
         let is_stopped = || self.stop.load(Ordering::Relaxed);
-        run_frames(stage, &mut self.outcome.samples, block, (case, self.plan), &mut || {
+        run_frames(stage, self.outcome, block, (case, self.plan), &mut || {
             (self.tick)();
             !is_stopped()
         })?;
         // The last frame of a block that was cut short is another one.
         let image_hash = if is_stopped() { None } else { Some(image_hash(&mut stage.renderer)?) };
-        self.outcome.blocks.push(Block { i_case: block.i_case, of: block.of, image_hash });
+        lock(self.outcome).blocks.push(Block { i_case: block.i_case, of: block.of, image_hash });
         if block.is_last {
-            let last = self.outcome.samples.last().map(|s| &s.times);
-            let last = last.map(|t| DrawnFrame { time_s: t.time_s, n_shown: t.n_kept });
+            let last = lock(self.outcome)
+                .samples
+                .last()
+                .map(|s| DrawnFrame { time_s: s.times.time_s, n_shown: s.times.n_kept });
             let unseen = last.map(|frame| unseen_on(stage, frame)).transpose()?.flatten();
-            self.outcome.notes.extend(unseen.iter().map(named));
-            self.outcome.notes.extend(light_notes(stage)?.iter().map(named));
+            let notes = light_notes(stage)?;
+            lock(self.outcome).notes.extend(unseen.iter().chain(&notes).map(named));
             let counts = Counts::new(&mut stage.renderer, &stage.device, &stage.scene)?;
-            self.outcome.counts.insert(block.i_case, counts);
+            lock(self.outcome).counts.insert(block.i_case, counts);
             if self.plan.pictures && !is_stopped() {
                 let film = case.scene.film;
                 let (width, height) = (film.width, film.height);
                 let rgb = display_bytes(&film, width, height, &stage.renderer.image()?);
                 let picture = CasePicture { i_case: block.i_case, width, height, rgb };
-                self.outcome.pictures.push(picture);
+                lock(self.outcome).pictures.push(picture);
             }
         }
         Ok(())
@@ -221,7 +228,7 @@ fn with_drawing(scene: &Arc<Scene>, chosen: Option<Draw>) -> Arc<Scene> {
 /// Runs the frames of a block; `tick` says whether to go on.
 fn run_frames(
     stage: &mut Stage,
-    samples: &mut Vec<Sample>,
+    outcome: &Mutex<Outcome>,
     &NextBlock { i_case, i_block, of, .. }: &NextBlock,
     (case, plan): (&Case, &BenchPlan),
     tick: &mut dyn FnMut() -> bool,
@@ -232,9 +239,10 @@ fn run_frames(
         return Err(Error::usage(what));
     }
     stage.set_skip(of.skip);
-    let n_before = samples.len();
+    let n_before = lock(outcome).samples.len();
     let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
         let image_hash = if plan.hash_frames { Some(image_hash(renderer)?) } else { None };
+        let samples = &mut lock(outcome).samples;
         let warm_up = samples.len() - n_before < plan.n_warm_up as usize;
         samples.push(Sample { i_case, of, i_block, warm_up, times, image_hash });
         Ok(tick())

@@ -17,6 +17,7 @@ pub mod difference;
 pub mod frame_rows;
 mod intervals;
 pub mod json;
+pub mod limits;
 pub mod machine;
 pub mod names;
 pub mod outcome;

@@ -9,7 +9,7 @@ use super::scene::SceneArgs;
 use super::values::at_least_one;
 
 /// Arguments of `nimbus bench`.
-#[derive(Debug, ClapArgs)]
+#[derive(Debug, Clone, ClapArgs)]
 #[command(after_help = "Time against particles and picture size:\n  \
     nimbus bench scenes/threads.toml --sweep draw.particles=500,5000,50000 \\\n      \
     --sweep size=800x600,1024x768\n\n\

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 /// Arguments of `nimbus stress`.
-#[derive(Debug, ClapArgs)]
+#[derive(Debug, Clone, ClapArgs)]
 #[command(after_help = "The families of cases, the cases of one, and what one case checks:\n  \
     nimbus stress --list\n  nimbus stress --list functions\n  \
     nimbus stress --list functions/division\n\n\

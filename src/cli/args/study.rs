@@ -12,7 +12,7 @@ use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::front::Metric;
 
 /// Arguments of `nimbus error`.
-#[derive(Debug, ClapArgs)]
+#[derive(Debug, Clone, ClapArgs)]
 #[command(after_help = "Examples:\n  \
     nimbus error scenes/study-cloud.toml\n  \
     nimbus error scenes/study-light.toml --knob lighting.bases=2,4,8,16 \\\n      \
@@ -119,7 +119,7 @@ pub struct ErrorArgs {
 }
 
 /// Arguments of `nimbus ledger`.
-#[derive(Debug, ClapArgs)]
+#[derive(Debug, Clone, ClapArgs)]
 #[command(after_help = "Examples:\n  \
     nimbus ledger scenes/study-both.toml\n  \
     nimbus ledger scenes/cubes-554.toml --plain --size 200x150 --out ledger\n\n\

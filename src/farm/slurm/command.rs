@@ -62,7 +62,7 @@ pub fn output_of(
 /// Reads a pipe to its end on a thread.
 fn read(pipe: Option<impl Read + Send + 'static>) -> Receiver<String> {
     let (sender, receiver) = channel();
-    std::thread::spawn(move || {
+    let drain = move || {
         let mut bytes = Vec::new();
         if let Some(mut pipe) = pipe {
             // The program's exit status tells of failures.
@@ -70,7 +70,10 @@ fn read(pipe: Option<impl Read + Send + 'static>) -> Receiver<String> {
         }
         // Sending fails only after the caller has given up.
         let _ = sender.send(String::from_utf8_lossy(&bytes).trim().to_owned());
-    });
+    };
+    // Without a thread the sender is dropped, so that the program counts as one that does not
+    // answer.
+    let _ = std::thread::Builder::new().name("pipe".into()).spawn(drain);
     receiver
 }
 

@@ -2,7 +2,6 @@
 //! the picture that `nimbus render --reference` draws, to the byte.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
@@ -14,6 +13,7 @@ use crate::farm::transient::io_error;
 use crate::io::atomic;
 use crate::io::folder::replace_files;
 use crate::io::image::{ImageKind, encoded, image_hash};
+use crate::io::input_file;
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::Scene;
 use crate::reference::picture::{
@@ -24,6 +24,8 @@ use crate::timing::machine::{self, Device};
 
 /// The greatest number of pieces. A plan with as many shards is about as large as a plan may be.
 const MOST_PIECES: u64 = 40_000;
+/// Largest file of a piece: the sums of a tile of the largest picture.
+const LARGEST_SUMS: u64 = 512 << 20;
 /// The description of the merged picture and of its error.
 const ABOUT_FILE: &str = "reference.json";
 
@@ -106,7 +108,7 @@ impl ReferenceWork {
             results.iter().flat_map(|result| result.items.clone().map(move |k| (result, k)));
         for (result, k) in pieces {
             let path = result.folder.join(sums_file(k));
-            let bytes = fs::read(&path).map_err(io_error(&path))?;
+            let bytes = input_file::read(&path, LARGEST_SUMS).map_err(io_error(&path))?;
             let (tile, samples) = self.piece(k);
             let pixels = self.pixels(tile);
             let Some(sums) = SampleSums::from_bytes(&bytes, pixels.at.len(), samples.len() as u32)

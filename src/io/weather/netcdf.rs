@@ -1,7 +1,6 @@
 //! NetCDF of every kind through the crate `netcdf-reader`: classic, 64-bit offset, 64-bit data
 //! (CDF-5) and NetCDF-4 (HDF5).
 
-use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
@@ -13,6 +12,7 @@ use netcdf_reader::{
 
 use super::container::{Attribute, Checked, Dimension, Value, Variable};
 use crate::error::{Error, Place, Result};
+use crate::io::input_file;
 
 /// Most numbers that one part of a variable may have: those of a step of the largest grid.
 const MOST_NUMBERS: u64 = 1 << 25;
@@ -41,17 +41,11 @@ pub struct NetCdf {
 /// # Errors
 /// When the file cannot be read or is no NetCDF file.
 pub fn open(path: &Path) -> Result<NetCdf> {
-    let about = fs::metadata(path).map_err(|e| match e.kind() {
+    // Only the parts that are asked for are read, so that the size has no limit.
+    let file = input_file::open(path, u64::MAX).map_err(|e| match e.kind() {
         ErrorKind::NotFound => Error::io(path, "no such file"),
         _ => Error::io(path, e),
     })?;
-    if about.is_dir() {
-        return Err(Error::io(path, "is a folder, expected a NetCDF file"));
-    }
-    if !about.is_file() {
-        return Err(Error::io(path, "is not a regular file"));
-    }
-    let file = File::open(path).map_err(|e| Error::io(path, e))?;
     // Read by ranges and not mapped: a mapped file that is cut off while it is read ends the
     // process.
     let storage = FileStorage::from_file(file).map_err(|e| Error::io(path, e))?;

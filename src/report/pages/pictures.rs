@@ -1,6 +1,5 @@
 //! Pictures embedded in the page, and differences of two pictures.
 
-use std::fs;
 use std::path::Path;
 
 use base64::Engine;
@@ -9,6 +8,7 @@ use maud::{Markup, html};
 
 use crate::error::{Error, Result};
 use crate::io::image::{self, png_bytes};
+use crate::io::input_file::{self, PICTURE_LIMIT};
 use crate::measure::picture::flip::{PIXELS_PER_DEGREE, flip};
 use crate::measure::picture::{Errors, errors};
 use crate::report::charts::number;
@@ -37,7 +37,7 @@ impl Png {
                 format!("names the picture \"{name}\"; expected a file in that folder"),
             ));
         }
-        match fs::read(&path) {
+        match input_file::read(&path, PICTURE_LIMIT) {
             Ok(bytes) => Png::of(bytes).map(Some).ok_or_else(|| Error::io(&path, "is no PNG file")),
             Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(cause) => Err(Error::io(&path, cause)),

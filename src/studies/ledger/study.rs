@@ -1,8 +1,8 @@
 //! Makes the pictures of a ledger, from the one that the device draws to the whole model, compares
 //! each with the next, and times those that the device draws.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::DVec3;
 
@@ -39,6 +39,21 @@ pub struct LedgerStudy<'a> {
     pub n_reflections: u32,
     /// Ends the study early once it is set.
     pub stop: &'a AtomicBool,
+    /// What is finished, which other threads may look at.
+    pub parts: &'a Mutex<LedgerParts>,
+}
+
+/// The pictures and times of a ledger so far.
+#[derive(Default)]
+pub struct LedgerParts {
+    chain: Chain,
+    /// The blocks of each round by configuration.
+    rounds: Vec<Vec<TimedBlock>>,
+}
+
+/// Locks the parts of a ledger. A panic elsewhere leaves whole pictures in it.
+pub fn lock(parts: &Mutex<LedgerParts>) -> MutexGuard<'_, LedgerParts> {
+    parts.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A picture at the pixels that are compared.
@@ -85,19 +100,24 @@ impl LedgerStudy<'_> {
     pub fn run(&self, made: Provenance, listener: OnProgress) -> Result<Ledger> {
         let approximations = approximations(self.scene);
         let mut runner = DeviceRunner::new(self.gpu, self.frames);
-        let mut chain = Chain::default();
         let scenes = approximations.iter().map(|a| &a.without);
         let scenes: Vec<&Scene> = std::iter::once(self.scene).chain(scenes).collect();
         scenes.iter().for_each(|scene| runner.add(&Arc::new(Scene::clone(scene))));
         for i in 0..scenes.len() {
             let rgba = sampled(self.pixels, &runner.picture(i)?);
+            let chain = &mut lock(self.parts).chain;
             chain.pictures.push(ChainPicture { rgba, own_error: 0.0 });
         }
-        chain.links.extend(approximations.iter().map(|a| Link::new(a.name, &a.from, &a.to)));
+        let links = approximations.iter().map(|a| Link::new(a.name, &a.from, &a.to));
+        lock(self.parts).chain.links.extend(links);
         let last = scenes.len() - 1;
-        self.add_references(&mut runner, last, scenes[last], &mut chain, listener)?;
-        let rounds = self.time(&mut runner, scenes.len())?;
-        self.summarize(made, &chain, &rounds)
+        self.add_references(&mut runner, last, scenes[last], listener)?;
+        self.time(&mut runner, scenes.len())?;
+        lock(self.parts).ledger(made, self.frames, self.pixels, self.is_stopped())
+    }
+
+    fn add(&self, link: Link, drawn: RenderedPixels) {
+        lock(self.parts).chain.add(link, drawn);
     }
 
     fn is_stopped(&self) -> bool {
@@ -110,7 +130,6 @@ impl LedgerStudy<'_> {
         runner: &mut DeviceRunner<'_>,
         i: usize,
         scene: &Scene,
-        chain: &mut Chain,
         listener: OnProgress,
     ) -> Result<()> {
         let scene = &ReferenceKind::without_approximations(scene);
@@ -128,10 +147,10 @@ impl LedgerStudy<'_> {
         let draw = |light: &FrameReference, drawing: BlobModel| {
             render_lit_scene(scene, light, drawing, self.pixels, PixelSample::CENTER, listener)
         };
-        chain.add(Link::new("drawing", "f32", "f64"), draw(&by_device, BlobModel::Thin));
+        self.add(Link::new("drawing", "f32", "f64"), draw(&by_device, BlobModel::Thin));
         if scene.n_particles() > 0 && !self.is_stopped() {
             let link = Link::new("thin sprites", "sprites", "volume");
-            chain.add(link, draw(&by_device, BlobModel::Volume));
+            self.add(link, draw(&by_device, BlobModel::Volume));
         }
         if !is_lit || self.is_stopped() {
             return Ok(());
@@ -144,21 +163,21 @@ impl LedgerStudy<'_> {
         };
         let (second, second_error) = (by_device.second, Vec::new());
         let first = FrameReference { second, second_error, ..exact.clone() };
-        chain.add(link, draw(&first, BlobModel::Volume));
+        self.add(link, draw(&first, BlobModel::Volume));
         if n_reflections(scene) > 1 {
             let link = Link::new("second reflection", "pairs in f32", "areas in f64");
-            chain.add(link, draw(&exact, BlobModel::Volume));
+            self.add(link, draw(&exact, BlobModel::Volume));
         }
-        self.add_models(scene, chain, listener)
+        self.add_models(scene, listener)
     }
 
     /// Adds the pictures that are lit by the model itself.
-    fn add_models(&self, scene: &Scene, chain: &mut Chain, listener: OnProgress) -> Result<()> {
-        let mut add = |link: Link, is_by_facet: bool, n: u32| -> Result<()> {
+    fn add_models(&self, scene: &Scene, listener: OnProgress) -> Result<()> {
+        let add = |link: Link, is_by_facet: bool, n: u32| -> Result<()> {
             if !self.is_stopped() {
                 let (time_s, pixels) = (self.frames.time_s, self.pixels);
                 let how = ModelDrawing { n_reflections: n, by_facet: is_by_facet };
-                chain.add(link, render_model(how, scene, time_s, pixels, listener)?);
+                self.add(link, render_model(how, scene, time_s, pixels, listener)?);
             }
             Ok(())
         };
@@ -176,9 +195,7 @@ impl LedgerStudy<'_> {
     }
 
     /// Times rounds of one block for each configuration, every second round in reverse order.
-    /// Returns the blocks of each round by configuration.
-    fn time(&self, runner: &mut DeviceRunner<'_>, n: usize) -> Result<Vec<Vec<TimedBlock>>> {
-        let mut rounds = Vec::new();
+    fn time(&self, runner: &mut DeviceRunner<'_>, n: usize) -> Result<()> {
         for i_round in 0..if n > 1 { self.n_rounds } else { 0 } {
             if self.is_stopped() {
                 break;
@@ -187,20 +204,33 @@ impl LedgerStudy<'_> {
             let mut blocks: Vec<TimedBlock> =
                 order.map(|i| runner.block(i, i_round)).collect::<Result<_>>()?;
             blocks.sort_by_key(|block| block.i_configuration);
-            rounds.push(blocks);
+            lock(self.parts).rounds.push(blocks);
         }
-        Ok(rounds)
+        Ok(())
+    }
+}
+
+impl LedgerParts {
+    /// Returns whether there is an approximation whose error is known.
+    pub fn has_row(&self) -> bool {
+        !self.chain.links.is_empty() && self.chain.pictures.len() > 1
     }
 
-    fn summarize(
+    /// Returns the ledger of the pictures so far, at `pixels` of a frame.
+    ///
+    /// # Errors
+    /// Fails if a picture is not finite, or there is none.
+    pub fn ledger(
         &self,
         made: Provenance,
-        chain: &Chain,
-        rounds: &[Vec<TimedBlock>],
+        frames: FrameChoice,
+        pixels: &Pixels,
+        interrupted: bool,
     ) -> Result<Ledger> {
+        let LedgerParts { chain, rounds } = self;
         let compare = |a: &ChainPicture, b: &ChainPicture| {
             let own_error = a.own_error + b.own_error;
-            let error = picture_error(self.pixels, &a.rgba, &b.rgba, own_error);
+            let error = picture_error(pixels, &a.rgba, &b.rgba, own_error);
             let what = "a picture of the scene holds values that are no finite numbers";
             error.map(|e| (e.rmse, own_error)).ok_or_else(|| Error::usage(what))
         };
@@ -226,11 +256,11 @@ impl LedgerStudy<'_> {
         let (total, _) = compare(first, last)?;
         Ok(Ledger {
             made,
-            frame: self.frames.i_frame,
-            time_s: self.frames.time_s,
-            width: self.pixels.width,
-            height: self.pixels.height,
-            n_pixels: self.pixels.at.len(),
+            frame: frames.i_frame,
+            time_s: frames.time_s,
+            width: pixels.width,
+            height: pixels.height,
+            n_pixels: pixels.at.len(),
             magnitude,
             rows: chain.links.iter().zip(&errors).enumerate().map(row).collect(),
             total,
@@ -239,7 +269,7 @@ impl LedgerStudy<'_> {
             // The root mean square is a norm, so that the triangle inequality holds but for the
             // rounding of both sides.
             holds: total.value <= sum * (1.0 + 1e-9) + 1e-15,
-            interrupted: self.is_stopped(),
+            interrupted,
         })
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 use crate::io::box_file;
+use crate::io::console::say;
 use crate::viewer::editor::{Document, Session};
 use crate::viewer::free_path::free_path;
 use crate::viewer::sync::lock;
@@ -34,8 +35,8 @@ impl Rescue {
         let Some((path, document)) = lock(&self.0).take() else { return };
         let path = free_path(|n| path.with_extension(format!("unsaved-{n}.dat")));
         match box_file::write(&path, &document.boxes) {
-            Ok(()) => eprintln!("unsaved changes were written to {}", path.display()),
-            Err(error) => eprintln!("unsaved changes are lost: {error}"),
+            Ok(()) => say!("unsaved changes were written to {}", path.display()),
+            Err(error) => say!("unsaved changes are lost: {error}"),
         }
     }
 }

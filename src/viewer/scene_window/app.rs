@@ -26,6 +26,7 @@ use super::view_state::{Response, ViewState};
 use crate::error::{Error, Result};
 use crate::frame::DeviceChoice;
 use crate::gpu::PresentMode;
+use crate::io::console::{self, say};
 use crate::viewer::display_loss;
 use crate::viewer::egui_layer::{EguiLayer, SharedWidgets};
 use crate::viewer::messages::Messages;
@@ -329,7 +330,7 @@ impl App {
                 let source = &self.options.source;
                 let path = source.path.display().to_string();
                 let line = self.state().command_line(&path, &source.first);
-                println!("{line}");
+                console::write_line_to_stdout(&line);
                 self.layer.iter().for_each(|layer| layer.copy(&line));
                 self.show(&format!("copied, and printed on the terminal: {line}"));
             }
@@ -360,7 +361,7 @@ impl App {
 
     fn print(&self, text: &str) {
         if !self.options.is_quiet {
-            eprintln!("{}", text.trim_end());
+            say!("{}", text.trim_end());
         }
     }
 }

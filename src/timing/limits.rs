@@ -1,0 +1,90 @@
+//! Limits of a bench and of a study, checked before anything is allocated for it.
+
+use super::blocks::{BenchPlan, n_frames_total};
+use super::cases::Case;
+use crate::error::{Error, Result};
+use crate::model::cloud::CloudSource;
+use crate::model::scene::Scene;
+
+/// Most frames of a bench, warm-up included. A frame's record, its row and its text take about
+/// 3 KiB together.
+pub const MOST_FRAMES: u64 = 500_000;
+/// Most blocks of a bench. `run.json` lists each of them in about 100 bytes.
+pub const MOST_BLOCKS: u64 = 100_000;
+/// Most cases of a sweep, and most configurations of a study.
+pub const MOST_CASES: u64 = 4096;
+/// Most bytes of the particles that all scenes of a run hold, and of the pictures that it keeps.
+pub const MOST_BYTES: u64 = 512 << 20;
+
+/// Bytes of a particle of a list.
+const PARTICLE_BYTES: u64 = 128;
+
+/// Returns an error unless a sweep or a study has few enough cases. `flag` names the argument that
+/// multiplies them.
+///
+/// # Errors
+/// Fails if the numbers of values in `axes` multiply to more than [`MOST_CASES`].
+pub fn check_cases(flag: &str, axes: impl Iterator<Item = usize>) -> Result<()> {
+    let n = axes.fold(1u64, |n, values| n.saturating_mul(values as u64));
+    if n > MOST_CASES {
+        return Err(Error::limit(format!(
+            "{flag}: {n} combinations, expected at most {MOST_CASES}; run them in parts"
+        )));
+    }
+    Ok(())
+}
+
+/// Sums what the scenes of a run hold in memory.
+#[derive(Debug, Default)]
+pub struct SceneMemory(u64);
+
+impl SceneMemory {
+    /// Adds a scene.
+    ///
+    /// # Errors
+    /// Fails if all scenes together hold more than [`MOST_BYTES`].
+    pub fn add(&mut self, scene: &Scene) -> Result<()> {
+        let of_list = |source: &CloudSource| match source {
+            CloudSource::Particles(list) => list.len() as u64 * PARTICLE_BYTES,
+            _ => 0,
+        };
+        self.0 += scene.clouds.iter().map(|cloud| of_list(&cloud.source)).sum::<u64>();
+        if self.0 > MOST_BYTES {
+            return Err(Error::limit(format!(
+                "the particle lists of all cases take more than {} MiB; run the cases in parts",
+                MOST_BYTES >> 20
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// Checks that the frames, blocks and pictures of a bench fit in memory.
+///
+/// # Errors
+/// Fails if there are too many; the error says how many there may be.
+pub fn check_bench(cases: &[Case], plan: &BenchPlan) -> Result<()> {
+    let n_frames = n_frames_total(cases, plan);
+    let n_loops: u64 = cases.iter().map(|case| case.loops.len() as u64).sum();
+    let n_blocks = n_loops.saturating_mul(u64::from(plan.n_rounds));
+    if n_frames > MOST_FRAMES || n_blocks > MOST_BLOCKS {
+        return Err(Error::limit(format!(
+            "{n_frames} frames in {n_blocks} blocks: the records of {MOST_FRAMES} frames, warm-up \
+             included, and of {MOST_BLOCKS} blocks fit in memory; expected less of --repeat, \
+             --frames, --warmup or --sweep"
+        )));
+    }
+    let pixels =
+        |case: &Case| 3 * u64::from(case.scene.film.width) * u64::from(case.scene.film.height);
+    let bytes: u64 = cases.iter().map(pixels).sum();
+    if plan.pictures && bytes > MOST_BYTES {
+        return Err(Error::limit(format!(
+            "the last pictures of {} cases take {} MiB, the limit is {} MiB; run the cases in \
+             parts or without --out",
+            cases.len(),
+            bytes >> 20,
+            MOST_BYTES >> 20
+        )));
+    }
+    Ok(())
+}

@@ -116,7 +116,7 @@ impl Recorder {
             device: machine::device_record(&self.info),
             cpu: machine::cpu(),
             environment: machine::environment(),
-            clocks: self.clocks.clone(),
+            clocks: self.clocks,
             block_order: outcome.block_order(),
             cases: outcome.cases(&self.cases, &self.plan),
             chosen: outcome.chosen.clone(),

@@ -11,7 +11,9 @@ use super::error_table;
 use super::interrupt::{self, PATIENCE, graceful_stop};
 use super::output::{self, refuse_existing};
 use super::progress::{ReferenceProgress, progress};
-use super::scene::{StudyScene, load_study, open_for_study, print_sizes, with_texture_hint};
+use super::scene::{
+    StudyScene, load_study, open_for_study, pixels, print_sizes, with_texture_hint,
+};
 use crate::error::{Error, Result};
 use crate::io::console::say;
 use crate::io::image;
@@ -57,7 +59,7 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         n_rounds: args.rounds as usize,
         part: args.part.map(|part| part.first as usize..part.end as usize),
     };
-    let pixels = Pixels::sample(film.width, film.height, args.pixels);
+    let pixels = pixels(&scene, args.pixels)?;
     let cached = reference(args, &scene, time_s, &pixels)?;
     let mut study = Study {
         made: Provenance::now(Study::SCHEMA, &args.scene, &loaded, gpu.device.info(), clocks),

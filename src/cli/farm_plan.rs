@@ -7,9 +7,9 @@ use super::farm_told;
 use super::output::{self, refuse_existing};
 use super::progress::progress;
 use super::scene::{print_warnings, typed_overrides};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::farm::{
-    AnyWork, Cut, CutOptions, Estimate, FileModel, Frames, Plan, PlanRequest, Rate,
+    AnyWork, Cut, CutOptions, Estimate, FileModel, Frames, MOST_ITEMS, Plan, PlanRequest, Rate,
     ReferenceDivision, RunOptions, ShardSize, calibrate, calibrate_by_farms, frames_workload,
     n_frames,
 };
@@ -97,6 +97,13 @@ fn cut(args: &PlanArgs, set: &[String], loaded: &LoadedScene) -> Result<Cut> {
         (farm_told::sweep(args, set)?, args.shard_cases, USUAL_CONFIGURATIONS)
     } else {
         let Span { first, end } = args.frames.unwrap_or_else(|| all_frames(loaded));
+        if end - first > MOST_ITEMS {
+            return Err(Error::limit(format!(
+                "--frames {first}..{end}: {} frames, expected at most {MOST_ITEMS}, whose amounts \
+                 of work are counted one by one; make several plans",
+                end - first
+            )));
+        }
         let format = format(ImageKind::Png);
         let work = AnyWork::Frames(Frames { first, n: end - first, format });
         ((work, frames_workload(loaded, first..end)?), args.shard_frames, USUAL_FRAMES)

@@ -4,11 +4,12 @@ use super::args::{BasisArg, InspectArgs};
 use super::output::{self, header, or_dash};
 use super::progress::spinner;
 use super::scene::{check_time, device_choice, load, print_notes, print_sizes};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame::Stage;
 use crate::inspect::{air, basis, stages as inspect};
 use crate::io::console::say;
 use crate::model::scene::Scene;
+use crate::reference::picture::check_memory;
 
 /// Frames that `--plan` shows: the first runs every pass, the second those that a step of time
 /// requires, and the third shows that later frames do the same.
@@ -28,6 +29,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     if args.air {
         return output::text(&output::rows(&[air::row(&scene)], args.json)?);
     }
+    check_rows(args, &scene)?;
     check_time(&scene, scene.time.at(args.frame.unwrap_or(0)))?;
     let waiting = spinner("inspecting", args.options.quiet);
     // The text is complete before any of it is printed.
@@ -63,6 +65,20 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     }
     output::text(&text)?;
     stage.close()
+}
+
+/// Refuses tables that do not fit in memory.
+fn check_rows(args: &InspectArgs, scene: &Scene) -> Result<()> {
+    /// Most frames of `--plan`, each a row for every pass.
+    const MOST_FRAMES: u32 = 10_000;
+    if let Some(n) = args.frame.filter(|n| args.plan && *n > MOST_FRAMES) {
+        return Err(Error::limit(format!(
+            "--plan --frame {n}: expected at most {MOST_FRAMES} frames, whose rows fit in memory"
+        )));
+    }
+    let n_particles = if args.particles || args.reference { scene.n_particles() } else { 0 };
+    let n_facets = if args.facets { scene.n_facets() } else { 0 };
+    check_memory(0, 1, n_particles.max(n_facets))
 }
 
 /// Returns the rows of facets, or their means over each surface.

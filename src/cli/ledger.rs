@@ -6,7 +6,7 @@ use super::args::LedgerArgs;
 use super::interrupt::{self, PATIENCE, graceful_stop};
 use super::output::{self, header, interval, or_dash, refuse_existing, scientific};
 use super::progress::ReferenceProgress;
-use super::scene::{StudyScene, load_study, open_for_study, with_texture_hint};
+use super::scene::{StudyScene, load_study, open_for_study, pixels, with_texture_hint};
 use crate::error::{Error, Result};
 use crate::io::atomic::check_place;
 use crate::io::console::say;
@@ -44,7 +44,7 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
     let stop = graceful_stop();
     let frames =
         FrameChoice { i_frame: args.frame, time_s, n_frames: args.frames, as_played: false };
-    let pixels = Pixels::sample(scene.film.width, scene.film.height, args.pixels);
+    let pixels = pixels(scene, args.pixels)?;
     let parts = Arc::new(Mutex::new(LedgerParts::default()));
     let mut keeping = {
         let (args, made, pixels, parts) =

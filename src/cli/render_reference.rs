@@ -14,7 +14,8 @@ use crate::io::console::say;
 use crate::io::image::{self, image_hash};
 use crate::model::scene::Scene;
 use crate::reference::picture::{
-    self, BlobModel, DrawnPicture, Pixels, ReferenceKind, ReferenceRequest, drawn_as_set,
+    self, BlobModel, DrawnPicture, Pixels, ReferenceKind, ReferenceRequest, check_memory,
+    drawn_as_set,
 };
 
 /// A picture in f64 and the JSON keys that only its kind has.
@@ -28,6 +29,9 @@ struct Computed {
 /// # Errors
 /// Fails if the scene has no such reference or the file cannot be written.
 pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -> Result<()> {
+    let film = scene.film;
+    let n_pixels = u64::from(film.width) * u64::from(film.height);
+    check_memory(n_pixels, args.samples, scene.n_particles())?;
     // The picture may take minutes; a file that cannot be written is reported before.
     atomic::check_place(&args.output)?;
     if args.options.verbose {
@@ -48,7 +52,6 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
         let n = rgba.len();
         say!("warning: {n_bad} of {n} values of the picture are not finite");
     }
-    let film = scene.film;
     image::write(&args.output, &film, film.width, film.height, &rgba)?;
     if !args.json {
         return Ok(());

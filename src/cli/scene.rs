@@ -11,6 +11,7 @@ use crate::io::bounds::{GREATEST, is_carried_place, shortest};
 use crate::io::console::say;
 use crate::io::scene_file::{self, LoadedScene};
 use crate::model::scene::Scene;
+use crate::reference::picture::{Pixels, check_memory};
 use crate::timing::machine::{Clocks, clocks_record};
 use crate::timing::names::Setting;
 use crate::timing::sweep::{SIZE_KEY, overrides};
@@ -109,6 +110,17 @@ pub fn load_study(path: &Path, args: &SceneArgs, plain: bool, i_frame: u32) -> R
     let scene = loaded.clone().at_frame(i_frame);
     check_time(&scene, time_s)?;
     Ok(StudyScene { options, loaded, scene, time_s })
+}
+
+/// Selects at most `most` pixels of the picture, at which a study computes its reference.
+///
+/// # Errors
+/// Fails if the reference at so many pixels would not fit in memory.
+pub fn pixels(scene: &Scene, most: usize) -> Result<Pixels> {
+    let film = scene.film;
+    let n_all = u64::from(film.width) * u64::from(film.height);
+    check_memory(n_all.min(most as u64), 1, scene.n_particles())?;
+    Ok(Pixels::sample(film.width, film.height, most))
 }
 
 /// Opens the device of a study, checks that it has room for the scene, and measures its clocks.

@@ -19,7 +19,13 @@ use crate::model::weather::{steps, sun};
 pub fn run(args: &WeatherArgs) -> Result<()> {
     let file = wrf::open(&args.file)?;
     let wanted = match args.step {
-        Some(i_step) => i_step..i_step + 1,
+        Some(i_step) => {
+            if i_step >= file.n_steps {
+                // Reading a step beyond the last says how many there are.
+                file.step(i_step)?;
+            }
+            i_step..i_step.saturating_add(1)
+        }
         None => 0..file.n_steps,
     };
     let progress = LateProgress::new(wanted.len() as u64, "reading steps", args.quiet);

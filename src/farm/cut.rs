@@ -4,7 +4,12 @@ use super::calibration::FileModel;
 use super::cost::{Amounts, Workload, split};
 use super::manifest::Class;
 use super::work::AnyWork;
-use crate::error::Result;
+use crate::error::{Error, Result};
+
+/// Most shards of a plan: `plan.json` has at least 300 bytes for each.
+const MOST_SHARDS: usize = 50_000;
+/// Most frames, configurations or cases of a plan. The amounts of each are counted.
+pub const MOST_ITEMS: u32 = 1_000_000;
 
 /// The conditions by which a cost model divides work.
 #[derive(Debug, Clone)]
@@ -84,6 +89,13 @@ impl Cut {
                 chunks.map(|items| items.len() as u32).collect()
             }
         };
+        if sizes.len() > MOST_SHARDS {
+            return Err(Error::limit(format!(
+                "{} shards, expected at most {MOST_SHARDS}, which plan.json has room for: expected \
+                 longer ones",
+                sizes.len()
+            )));
+        }
         let mut rest = &items[..];
         let part = |n: u32| {
             let (own, after) = rest.split_at(n as usize);

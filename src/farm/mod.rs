@@ -38,7 +38,7 @@ pub(crate) use calibration::FileModel;
 pub(crate) use cost::{
     Estimate, Rate, StudyTurns, Workload, bench_workload, frames_workload, study_workload,
 };
-pub(crate) use cut::{Cut, CutOptions, ShardSize};
+pub(crate) use cut::{Cut, CutOptions, MOST_ITEMS, ShardSize};
 pub(crate) use cut_reference::ReferenceDivision;
 pub(crate) use gc::{GcOptions, gc};
 pub(crate) use merge::{MergeOptions, merge};

@@ -21,6 +21,9 @@ use crate::model::terrain::Terrain;
 use crate::passes::second::MIN_BLOCK;
 use crate::passes::{grid, sort, texture};
 
+/// Most pixels of a picture: 8192 x 4096. Reading one back takes 20 bytes a pixel on the host.
+const MOST_PIXELS: u64 = 1 << 25;
+
 /// Returns the bytes of the buffers and images that grow with the scene. Light tensors and the
 /// scratch of the tile passes are not among them; they are checked when they are made.
 ///
@@ -31,6 +34,13 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     if u32::try_from(n).is_err() {
         return Err(Error::limit(format!(
             "the scene's {n} particles; nimbus numbers them with 32 bits"
+        )));
+    }
+    let pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
+    if pixels > MOST_PIXELS {
+        return Err(Error::limit(format!(
+            "a picture of {} x {} pixels; expected at most {MOST_PIXELS} pixels in all",
+            scene.film.width, scene.film.height
         )));
     }
     if scene.lighting.sums.precision == Precision::F64 && !limits.has_float64 {

@@ -6,7 +6,11 @@ use clap::{Args as ClapArgs, ValueEnum};
 
 use super::farm_plan::{Span, parse_span};
 use super::scene::SceneArgs;
-use super::values::at_least_one;
+use super::values::limited;
+use crate::timing::limits::{MOST_BLOCKS, MOST_FRAMES};
+
+/// Why frames have a limit.
+const FRAMES: &str = "the records of all frames are kept in memory";
 
 /// Arguments of `nimbus bench`.
 #[derive(Debug, Clone, ClapArgs)]
@@ -33,17 +37,27 @@ pub struct BenchArgs {
     #[arg(long, value_name = "KEY=VALUE,…")]
     pub sweep: Vec<String>,
     /// Timed frames in a block [default: the scene's, or the phase's]
-    #[arg(long, value_name = "N", value_parser = at_least_one())]
+    #[arg(long, value_name = "N", value_parser = limited(1, MOST_FRAMES as u32, FRAMES))]
     pub frames: Option<u32>,
     /// Warm-up frames at the start of every block, which are not counted
-    #[arg(long, value_name = "N", default_value_t = 10)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 10,
+        value_parser = limited(0, MOST_FRAMES as u32, FRAMES)
+    )]
     pub warmup: u32,
     /// Do not time the loop without skipping, unless nothing moves: takes less time, but `saved`
     /// stays unknown
     #[arg(long, conflicts_with = "no_skip")]
     pub no_saved: bool,
     /// Blocks of each loop, in the order A B, B A, …; with an even number a steady drift cancels
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = at_least_one())]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 2,
+        value_parser = limited(1, MOST_BLOCKS as u32, "run.json lists every block")
+    )]
     pub repeat: u32,
     /// Time only these cases, counted from 0, after the first of all; for the nodes of a farm (one
     /// scene)

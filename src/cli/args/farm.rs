@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Subcommand, ValueEnum};
 
 use super::farm_plan::{CalibrateArgs, PlanArgs};
-use super::values::at_least_one;
+use super::values::{at_least_one, limited};
 
 /// Arguments of `nimbus farm`.
 #[derive(Debug, ClapArgs)]
@@ -99,7 +99,13 @@ pub struct LocalArgs {
     #[arg(long, value_name = "DIR")]
     pub plan: PathBuf,
     /// Processes at a time. One is enough for a device; a software device uses all cores
-    #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = at_least_one())]
+    #[arg(
+        short,
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        value_parser = limited(1, 1024, "a thread waits for each")
+    )]
     pub jobs: u32,
     /// Tries of a shard that fails in a way that another try may not
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one())]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
 
-use super::values::{at_least_one, parse_size};
+use super::values::{at_least_one, limited, parse_size};
 use crate::reference::picture::{MAX_SAMPLES, ReferenceKind};
 
 /// Arguments of `nimbus farm plan`.
@@ -74,7 +74,7 @@ pub struct PlanArgs {
         long,
         value_name = "N",
         requires = "model",
-        value_parser = at_least_one(),
+        value_parser = limited(1, 10_000, "shards are assigned to each of them"),
         help_heading = "Cost"
     )]
     pub nodes: Option<u32>,
@@ -173,7 +173,7 @@ pub struct CalibrateArgs {
         long,
         value_name = "N",
         default_value_t = 12,
-        value_parser = clap::value_parser!(u32).range(2..)
+        value_parser = limited(2, 10_000, "calibration takes seconds, not days")
     )]
     pub frames: u32,
     /// Set any key of the scenes (repeatable)

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::values::{parse_limit, parse_positive};
+use super::values::{parse_density, parse_limit};
 use crate::timing::difference::Condition;
 
 /// Arguments of `nimbus compare`.
@@ -43,7 +43,7 @@ pub struct CompareArgs {
     #[arg(long, requires = "output", help_heading = "Pictures")]
     pub force: bool,
     /// Pixels a degree of the field of view, for FLIP [default: 67]
-    #[arg(long, value_name = "N", value_parser = parse_positive, help_heading = "Pictures")]
+    #[arg(long, value_name = "N", value_parser = parse_density, help_heading = "Pictures")]
     pub pixels_per_degree: Option<f64>,
     /// Exit with 1 if a metric is greater: rmse, max, relmse, flip, alpha_rmse, alpha_max or
     /// not_finite (repeatable)

@@ -6,7 +6,7 @@ use clap::Args as ClapArgs;
 
 use super::farm_plan::{Span, parse_span};
 use super::scene::SceneArgs;
-use super::values::{at_least_one, parse_positive};
+use super::values::{parse_block, parse_positive, parse_rounds};
 use crate::reference::picture::ReferenceKind;
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::front::Metric;
@@ -63,7 +63,7 @@ pub struct ErrorArgs {
         long,
         value_name = "N",
         default_value_t = 10,
-        value_parser = at_least_one(),
+        value_parser = parse_rounds,
         help_heading = "Time"
     )]
     pub rounds: u32,
@@ -72,7 +72,7 @@ pub struct ErrorArgs {
         long,
         value_name = "N",
         default_value_t = 3,
-        value_parser = at_least_one(),
+        value_parser = parse_block,
         help_heading = "Time"
     )]
     pub frames: u32,
@@ -146,10 +146,10 @@ pub struct LedgerArgs {
     )]
     pub reflections: u32,
     /// Timed blocks of each picture that the device draws
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = at_least_one())]
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = parse_rounds)]
     pub rounds: u32,
     /// Timed frames of a block
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = at_least_one())]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = parse_block)]
     pub frames: u32,
     /// Folder for ledger.json and ledger.svg
     #[arg(long, value_name = "DIR")]

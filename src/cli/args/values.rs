@@ -10,6 +10,30 @@ pub fn at_least_one() -> RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..)
 }
 
+/// Parses a number from `least` to `most`; the message says why there are no more.
+pub fn limited(
+    least: u32,
+    most: u32,
+    why: &'static str,
+) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let n = text.parse().ok().filter(|n| (least..=most).contains(n));
+        n.ok_or_else(|| {
+            format!("expected a number from {least} to {most} ({why}), found \"{text}\"")
+        })
+    }
+}
+
+/// Parses the number of timed blocks of a configuration.
+pub fn parse_rounds(text: &str) -> Result<u32, String> {
+    limited(1, 10_000, "the times of all blocks are kept in memory")(text)
+}
+
+/// Parses the number of frames of a block of a study.
+pub fn parse_block(text: &str) -> Result<u32, String> {
+    limited(1, 10_000, "the times of all frames are kept in memory")(text)
+}
+
 /// Parses WIDTHxHEIGHT.
 pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let wrong = || {
@@ -35,6 +59,12 @@ pub fn parse_samples(text: &str) -> Result<u32, String> {
 pub fn parse_positive(text: &str) -> Result<f64, String> {
     let value = text.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0);
     value.ok_or_else(|| format!("expected a number above 0, found \"{text}\""))
+}
+
+/// Parses pixels a degree, for FLIP, whose filters have about as many pixels.
+pub fn parse_density(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|v| (1.0..=500.0).contains(v));
+    value.ok_or_else(|| format!("expected a number from 1 to 500, found \"{text}\""))
 }
 
 /// Parses METRIC=VALUE.

@@ -18,12 +18,14 @@ use crate::io::scene_file::LoadedScene;
 use crate::model::scene::Scene;
 use crate::reference::picture::{
     self, MAX_SAMPLES, N_VALUES, PairwiseSum, Pixels, ReferenceKind, ReferenceRequest, SampleSums,
-    Tile,
+    Tile, check_memory,
 };
 use crate::timing::machine::{self, Device};
 
 /// The greatest number of pieces. A plan with as many shards is about as large as a plan may be.
 const MOST_PIECES: u64 = 40_000;
+/// Most pixels of a picture, whose sums are merged in memory: 4096 x 2048.
+const MOST_PIXELS: u64 = 1 << 23;
 /// Largest file of a piece: the sums of a tile of the largest picture.
 const LARGEST_SUMS: u64 = 512 << 20;
 /// The description of the merged picture and of its error.
@@ -161,6 +163,10 @@ impl Work for ReferenceWork {
         if [*width, *height, tile[0], tile[1]].contains(&0) {
             return Err("a picture or a tile without pixels".into());
         }
+        let n_pixels = u64::from(*width) * u64::from(*height);
+        if n_pixels > MOST_PIXELS {
+            return Err(format!("{n_pixels} pixels, expected at most {MOST_PIXELS}"));
+        }
         if !(1..=MAX_SAMPLES).contains(n_samples) {
             return Err(format!("{n_samples} samples, expected 1 to {MAX_SAMPLES}"));
         }
@@ -179,6 +185,8 @@ impl Work for ReferenceWork {
     fn check_scene(&self, loaded: &LoadedScene) -> Result<()> {
         self.check().map_err(Error::usage)?;
         let scene = self.scene(loaded);
+        let n_pixels = u64::from(self.tile[0].min(self.width)) * u64::from(self.tile[1]);
+        check_memory(n_pixels, self.range, scene.n_particles())?;
         if (self.width, self.height) != (scene.film.width, scene.film.height) {
             return Err(Error::usage("the picture has another size than the scene's film"));
         }

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::frame::FrameReference;
 use super::kind::ReferenceKind;
+use super::limits::check_memory;
 use super::model_light::{ModelLight, ModelScene, RadianceEstimate};
 use super::model_picture::{ModelDrawing, ModelPicture};
 use super::pixels::Pixels;
@@ -39,6 +40,7 @@ impl ReferenceKind {
 
 /// Checks that the references can draw `scene` with that blob model.
 pub(super) fn check_scene(scene: &Scene, time_s: f64, model: BlobModel) -> Result<()> {
+    check_memory(0, 1, scene.n_particles())?;
     let textured = scene.clouds.iter().position(|c| !c.texture.is_none());
     if let Some(i) = textured.filter(|_| model == BlobModel::Volume) {
         return Err(Error::usage(format!(

@@ -136,6 +136,8 @@ fn difference(a: &Path, b: &Path) -> Result<Option<Difference>> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

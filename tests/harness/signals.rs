@@ -52,3 +52,23 @@ pub fn interrupt(child: Child, is_begun: impl Fn() -> bool) -> (Output, f64) {
     let (_, after) = state(pid);
     (child.wait_with_output().expect("an output"), after - before)
 }
+
+/// Sends SIGINT to `child` once its threads have used `after_s` seconds of the processor, unless it
+/// has ended before. Returns its output, and the seconds of the processor that it used from the
+/// signal to its end; none if it had ended before.
+pub fn interrupt_after(child: Child, after_s: f64) -> (Output, Option<f64>) {
+    let pid = child.id();
+    while state(pid).0 != 'Z' && (state(pid).1 < after_s || !catches_interrupt(pid)) {
+        pause();
+    }
+    let (is_running, before) = (state(pid).0 != 'Z', state(pid).1);
+    if is_running {
+        let killed = Command::new("kill").args(["-INT", &pid.to_string()]).status();
+        assert!(killed.expect("kill").success());
+    }
+    while state(pid).0 != 'Z' {
+        pause();
+    }
+    let used = state(pid).1 - before;
+    (child.wait_with_output().expect("an output"), is_running.then_some(used))
+}

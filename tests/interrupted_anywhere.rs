@@ -1,0 +1,157 @@
+//! Ctrl-C at generated moments of every long command: the command ends soon, its results are whole
+//! or absent, and nothing temporary stays. `NIMBUS_TEST_MOMENTS` is the number of moments of each
+//! command (2 by default).
+
+#[path = "harness/fixtures.rs"]
+mod fixtures;
+#[path = "harness/signals.rs"]
+mod signals;
+
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+
+use fixtures::{Fixtures, check_end};
+use signals::interrupt_after;
+
+/// Seconds of the processor, on each of its cores, that a command may use after the signal. It gets
+/// 0.4 s to end its present step; writing what is finished takes the rest.
+const MOST_S: f64 = 1.0;
+
+/// The commands, with the place of their results: OUT.
+const COMMANDS: [&str; 14] = [
+    "bench s.toml --frames 20000 --out OUT --set lighting.grid=24",
+    "bench s.toml --frames 20000 --out OUT --force --sweep draw.cutoff=2,3 --threading serial",
+    "bench s.toml --size 2048x2048 --frames 1000 --out OUT",
+    "error s.toml --rounds 500 --frames 20 --out OUT --set cloud.0.radius_scale=0.9",
+    "ledger s.toml --size 160x120 --rounds 400 --frames 20 --out OUT",
+    "ledger heavy.toml --pixels all --out OUT",
+    "render heavy.toml --reference reflections=4 --samples 64 -o OUT.png",
+    "render s.toml --size 4000x4000 -o OUT.exr",
+    "inspect heavy.toml --facets --reference",
+    "stress",
+    "weather w.nc",
+    "compare big.png big.png -o OUT.png",
+    "farm calibrate s.toml --frames 500 -o OUT.json",
+    "report run run run run -o OUT.html --force",
+];
+
+/// Numbers from 0 to 1, the same in every run.
+fn uniform(i: u64) -> f64 {
+    let mut x = i.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    (x >> 11) as f64 / (1u64 << 53) as f64
+}
+
+fn n_moments() -> u64 {
+    std::env::var("NIMBUS_TEST_MOMENTS").map_or(2, |n| n.parse().expect("a number"))
+}
+
+fn prepared() -> Fixtures {
+    let fixtures = Fixtures::with_results();
+    let scene = fixtures::SCENE.replace("[2, 2]", "[24, 24]");
+    let scene = scene.replace("width = 32\nheight = 24", "width = 256\nheight = 192");
+    fs::write(fixtures.dir.path().join("heavy.toml"), scene).expect("room");
+    let output = fixtures.run("render s.toml -o big.png --size 1600x1200 -q".split(' '));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    fixtures
+}
+
+#[test]
+fn every_long_command_ends_soon_after_ctrl_c() {
+    let fixtures = prepared();
+    let n_cores = std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64);
+    let names = |at: &Path| -> Vec<String> {
+        let entries = fs::read_dir(at).expect("a folder").map(|e| e.expect("an entry"));
+        entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect()
+    };
+    let before = names(fixtures.dir.path()).len();
+    for (i, line) in COMMANDS.iter().enumerate() {
+        for k in 0..n_moments() {
+            // From 0.02 to 3 s, as many in each decade.
+            let after_s = 0.02 * 150f64.powf(uniform(k * 100 + i as u64));
+            let what = format!("{line} interrupted after {after_s:.2} s");
+            let args = line.split(' ').map(|word| word.replace("OUT", "out"));
+            let mut command = fixtures.command(args);
+            let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+            let (output, used_s) = interrupt_after(child.expect("a child"), after_s);
+            check_end(&what, &output);
+            let (code, errors) = (output.status.code(), String::from_utf8_lossy(&output.stderr));
+            let expected = if used_s.is_some() { &[130, 0, 1][..] } else { &[0, 1] };
+            assert!(code.is_some_and(|code| expected.contains(&code)), "{what}: {code:?} {errors}");
+            let used_s = used_s.unwrap_or(0.0);
+            assert!(used_s < MOST_S * n_cores, "{what}: {used_s} s of the processor: {errors}");
+            check_results(&fixtures, &what);
+            assert_eq!(names(fixtures.dir.path()).len(), before, "{what}: something stays");
+        }
+    }
+}
+
+/// Checks that the results can be read or are absent, and removes them.
+fn check_results(fixtures: &Fixtures, what: &str) {
+    let at = |name: &str| fixtures.dir.path().join(name);
+    let out = at("out");
+    let is_empty = || fs::read_dir(&out).is_ok_and(|mut entries| entries.next().is_none());
+    if out.exists() && !is_empty() {
+        let output = fixtures.run("report out -o page.html".split(' '));
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{what}: {errors}");
+        fs::remove_file(at("page.html")).expect("a page");
+    }
+    let _ = fs::remove_dir_all(&out);
+    for name in ["out.png", "out.exr"] {
+        if at(name).exists() {
+            let read = nimbus::io::image::read(&at(name));
+            // Pictures above the limit of reading are whole if they have a header.
+            assert!(read.is_ok() || name == "out.exr", "{what}: {read:?}");
+            fs::remove_file(at(name)).expect("a picture");
+        }
+    }
+    let _ = fs::remove_file(at("out.json"));
+    if let Ok(page) = fs::read_to_string(at("out.html")) {
+        assert!(page.trim_end().ends_with("</html>"), "{what}: half a page");
+        fs::remove_file(at("out.html")).expect("a page");
+    }
+}
+
+/// A farm keeps its finished items, and ends with 75 where another try goes on.
+#[test]
+fn a_farm_ends_soon_after_ctrl_c() {
+    let fixtures = Fixtures::new();
+    let n_cores = std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64);
+    for (k, plan) in [
+        "farm plan s.toml -o frames --frames 0..5000 --shard-frames 5000",
+        "farm plan s.toml -o reference --reference model --samples 65536 --size 256x192",
+        "farm plan s.toml -o bench --bench -- --frames 20000",
+    ]
+    .iter()
+    .enumerate()
+    {
+        let name = plan.split(' ').nth(4).expect("a name");
+        let output = fixtures.run(plan.split(' '));
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        for moment in 0..n_moments() {
+            let after_s = 0.05 + uniform(moment * 10 + k as u64);
+            for (run, code) in [("run --shard 0", 75), ("local", 130)] {
+                let line = format!("farm {run} --plan {name}");
+                let mut command = fixtures.command(line.split(' '));
+                let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+                // A pool waits and uses no processor: it is interrupted at once.
+                let after_s = if code == 75 && k < 2 { after_s } else { 0.0 };
+                let (output, used_s) = interrupt_after(child.expect("a child"), after_s);
+                let what = format!("{line} interrupted after {after_s:.2} s");
+                check_end(&what, &output);
+                let errors = String::from_utf8_lossy(&output.stderr);
+                let ended = output.status.code();
+                // Before the plan is read there is nothing to keep.
+                let expected = [Some(code), Some(130), Some(0)];
+                assert!(expected.contains(&ended), "{what}: {ended:?} {errors}");
+                let used_s = used_s.unwrap_or(0.0);
+                assert!(used_s < MOST_S * n_cores, "{what}: {used_s} s of the processor");
+            }
+        }
+        let status = fixtures.run(["farm", "status", "--plan", name]);
+        assert!(status.status.success(), "{}", String::from_utf8_lossy(&status.stderr));
+    }
+}

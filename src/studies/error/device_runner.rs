@@ -30,6 +30,10 @@ const N_WARM_NEW: u32 = 3;
 /// Share of the device's memory that the cached renderers may take.
 const MEMORY_SHARE: f64 = 0.25;
 
+/// Most renderers that are cached. On a software device the compiled pipelines of each take some
+/// 35 MiB of the host's memory.
+const MOST_CACHED: usize = 32;
+
 /// Returns the number of frames that a configuration is drawn in: its picture, and its blocks with
 /// their warm-up.
 pub fn n_frames_drawn(n_rounds: u32, n_frames: u32) -> u32 {
@@ -75,7 +79,8 @@ impl<'a> DeviceRunner<'a> {
         let n_bytes = limits::check(&self.scenes[i], limits)?;
         let most = (MEMORY_SHARE * limits.device_memory_bytes as f64) as u64;
         while !self.cache.is_empty()
-            && self.cache.iter().map(|c| c.n_bytes).sum::<u64>() + n_bytes > most
+            && (self.cache.len() >= MOST_CACHED
+                || self.cache.iter().map(|c| c.n_bytes).sum::<u64>() + n_bytes > most)
         {
             self.cache.remove(0);
         }

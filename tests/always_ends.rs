@@ -93,10 +93,10 @@ fn paths_that_are_not_utf_8_are_paths_like_others() {
     let lines = [
         vec![word("render"), scene.clone(), word("-o"), picture.clone(), word("--json")],
         vec![word("compare"), picture.clone(), picture.clone(), word("--json")],
-        [&["bench", "--frames", "1", "--warmup", "0", "--out"].map(word)[..], &[
-            out.clone(),
-            scene.clone(),
-        ]]
+        [
+            &["bench", "--frames", "1", "--warmup", "0", "--out"].map(word)[..],
+            &[out.clone(), scene.clone()],
+        ]
         .concat(),
         vec![word("compare"), out.clone(), out.clone()],
         vec![word("report"), out, word("-o"), page],

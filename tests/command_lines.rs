@@ -40,9 +40,8 @@ struct Choices {
 fn choices() -> impl Strategy<Value = Choices> {
     let share = || 0.0..1.0f64;
     let flags = prop::collection::vec((share(), share(), prop::bool::weighted(0.1)), 0..5);
-    (share(), flags, prop::option::weighted(0.8, (share(), share()))).prop_map(
-        |(command, flags, hostile)| Choices { command, flags, hostile },
-    )
+    (share(), flags, prop::option::weighted(0.8, (share(), share())))
+        .prop_map(|(command, flags, hostile)| Choices { command, flags, hostile })
 }
 
 fn pick<T>(all: &[T], share: f64) -> &T {
@@ -96,17 +95,73 @@ fn good(name: &str, id: &str) -> &'static [&'static str] {
 /// Values that make sense for no argument, or are at an end of what makes sense.
 fn hostile() -> Vec<OsString> {
     let mut all: Vec<OsString> = [
-        "", " ", "-", "--", "-1", "0", "1000000000", "4294967295", "4294967296",
-        "18446744073709551615", "99999999999999999999999", "1e300", "-1e300", "nan", "inf", "-inf",
-        "1e-300", "0..1000000000", "5..3", "4294967290..4294967295", "16384x16384", "16384x1",
-        "99999x99999", "0x0", "1x", "missing", "dir", "pipe", "/dev/zero", "/dev/full",
-        "/proc/self/mem", "empty", "binary", "a.png", "p.csv", "missing/x.png", "dir/", "..", "/",
-        "\u{1b}[31mred", "a\nb", "\u{7f}\u{8}", "ünïcödé", "=", "a=", "=1", "a=b=c", "film=1",
-        "film.width=16384", "film.width=99999999999", "draw.particles=4294967295",
-        "time.frames=4294967295", "lighting.grid=512", "cloud.9999999999.seed=1",
-        "camera.position=[1e308,0,0]", "cloud.*.seed=1,2,3", "draw.cutoff=nan",
-        "lighting.bases=1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16", "title='x", "[[[[[[[[", "}",
-        "reflections=64", "reflections=99999999", "rmse=nan", "%s%n", "$(id)", "*",
+        "",
+        " ",
+        "-",
+        "--",
+        "-1",
+        "0",
+        "1000000000",
+        "4294967295",
+        "4294967296",
+        "18446744073709551615",
+        "99999999999999999999999",
+        "1e300",
+        "-1e300",
+        "nan",
+        "inf",
+        "-inf",
+        "1e-300",
+        "0..1000000000",
+        "5..3",
+        "4294967290..4294967295",
+        "16384x16384",
+        "16384x1",
+        "99999x99999",
+        "0x0",
+        "1x",
+        "missing",
+        "dir",
+        "pipe",
+        "/dev/zero",
+        "/dev/full",
+        "/proc/self/mem",
+        "empty",
+        "binary",
+        "a.png",
+        "p.csv",
+        "missing/x.png",
+        "dir/",
+        "..",
+        "/",
+        "\u{1b}[31mred",
+        "a\nb",
+        "\u{7f}\u{8}",
+        "ünïcödé",
+        "=",
+        "a=",
+        "=1",
+        "a=b=c",
+        "film=1",
+        "film.width=16384",
+        "film.width=99999999999",
+        "draw.particles=4294967295",
+        "time.frames=4294967295",
+        "lighting.grid=512",
+        "cloud.9999999999.seed=1",
+        "camera.position=[1e308,0,0]",
+        "cloud.*.seed=1,2,3",
+        "draw.cutoff=nan",
+        "lighting.bases=1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16",
+        "title='x",
+        "[[[[[[[[",
+        "}",
+        "reflections=64",
+        "reflections=99999999",
+        "rmse=nan",
+        "%s%n",
+        "$(id)",
+        "*",
     ]
     .iter()
     .map(OsString::from)
@@ -115,7 +170,9 @@ fn hostile() -> Vec<OsString> {
     all.push(OsStr::from_bytes(b"draw.cutoff=\xff").to_owned());
     all.push("x".repeat(5000).into());
     all.push("9".repeat(400).into());
-    all.push(format!("draw.cutoff={}", (1..3000).map(|i| format!("{i},")).collect::<String>()).into());
+    all.push(
+        format!("draw.cutoff={}", (1..3000).map(|i| format!("{i},")).collect::<String>()).into(),
+    );
     all
 }
 
@@ -133,9 +190,8 @@ fn line(choices: &Choices) -> Vec<OsString> {
         command.get_arguments().filter(|a| !matches!(a.get_id().as_str(), "help")).collect();
     arguments.extend(choices.flags.iter().map(|(which, ..)| *pick(&options, *which)));
     let i_hostile = choices.hostile.map(|(which, value)| {
-        let with_value: Vec<usize> = (0..arguments.len())
-            .filter(|&i| arguments[i].get_action().takes_values())
-            .collect();
+        let with_value: Vec<usize> =
+            (0..arguments.len()).filter(|&i| arguments[i].get_action().takes_values()).collect();
         let i = if with_value.is_empty() { 0 } else { *pick(&with_value, which) };
         (i, pick(&hostile_values, value).clone())
     });

@@ -23,7 +23,7 @@ const COMMANDS: [&str; 14] = [
     "bench s.toml --frames 20000 --out OUT --set lighting.grid=24",
     "bench s.toml --frames 20000 --out OUT --force --sweep draw.cutoff=2,3 --threading serial",
     "bench s.toml --size 2048x2048 --frames 1000 --out OUT",
-    "error s.toml --rounds 500 --frames 20 --out OUT --set cloud.0.radius_scale=0.9",
+    "error s.toml --rounds 500 --frames 20 --out OUT",
     "ledger s.toml --size 160x120 --rounds 400 --frames 20 --out OUT",
     "ledger heavy.toml --pixels all --out OUT",
     "render heavy.toml --reference reflections=4 --samples 64 -o OUT.png",

@@ -18,7 +18,7 @@ height = 24
 [time]
 frames = 3
 [lighting]
-mode = \"two_reflection\"
+mode = \"two-reflection\"
 grid = 8
 bases = 2
 [[cloud]]
@@ -27,9 +27,9 @@ file = \"p.csv\"
 texture = \"none\"
 wind = [0.1, 0.0, 0.0]
 [[surface]]
-origin = [-1.0, -1.0, -1.0]
-edge_u = [2.0, 0.0, 0.0]
-edge_v = [0.0, 0.0, 2.0]
+center = [0.0, -1.0, 0.0]
+u = [0.0, 0.0, 2.0]
+v = [2.0, 0.0, 0.0]
 subdivide = [2, 2]
 ";
 /// Eight particles.

@@ -89,21 +89,16 @@ fn paths_that_are_not_utf_8_are_paths_like_others() {
     fs::copy(at(OsStr::new("s.toml")), at(&scene)).expect("room");
     fs::copy(at(OsStr::new("w.nc")), at(&name(b"\xfe.nc"))).expect("room");
     let (picture, out, page) = (name(b"\xff.png"), name(b"out\xff"), name(b"\xfd.html"));
-    let word = |text: &str| OsString::from(text);
-    let lines = [
-        vec![word("render"), scene.clone(), word("-o"), picture.clone(), word("--json")],
-        vec![word("compare"), picture.clone(), picture.clone(), word("--json")],
-        [
-            &["bench", "--frames", "1", "--warmup", "0", "--out"].map(word)[..],
-            &[out.clone(), scene.clone()],
-        ]
-        .concat(),
-        vec![word("compare"), out.clone(), out.clone()],
-        vec![word("report"), out, word("-o"), page],
-        vec![word("inspect"), scene.clone()],
-        vec![word("weather"), name(b"\xfe.nc"), word("--step"), word("0")],
-        [&["ledger", "--rounds", "1", "--frames", "1", "--json"].map(word)[..], &[scene.clone()]]
-            .concat(),
+    let words = |text: &'static str| text.split(' ').map(OsString::from);
+    let lines: [Vec<OsString>; 8] = [
+        words("render --json -o").chain([picture.clone(), scene.clone()]).collect(),
+        words("compare --json").chain([picture.clone(), picture]).collect(),
+        words("bench --frames 1 --warmup 0 --out").chain([out.clone(), scene.clone()]).collect(),
+        words("compare").chain([out.clone(), out.clone()]).collect(),
+        words("report -o").chain([page, out]).collect(),
+        words("inspect").chain([scene.clone()]).collect(),
+        words("weather --step 0").chain([name(b"\xfe.nc")]).collect(),
+        words("ledger --rounds 1 --frames 1 --json").chain([scene.clone()]).collect(),
     ];
     for line in lines {
         let output = fixtures.run(&line);
@@ -112,8 +107,7 @@ fn paths_that_are_not_utf_8_are_paths_like_others() {
         assert_eq!(output.status.code(), Some(0), "{line:?}: {errors}");
     }
     // JSON has no form for such a path, and nodes get it as text.
-    let plan = [word("farm"), word("plan"), scene, word("-o"), word("farm")];
-    let output = fixtures.run(&plan);
+    let output = fixtures.run(words("farm plan -o farm").chain([scene]));
     check_end("farm plan", &output);
 }
 

@@ -19,7 +19,7 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
 /// Command lines of the short test.
-const N_SHORT: usize = 150;
+const N_SHORT: usize = 100;
 /// Duration of the long test.
 const LONG: Duration = Duration::from_secs(600);
 /// Limit of a run's data, KiB: 2 GiB, and the stacks and code of its threads.

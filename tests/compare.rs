@@ -11,11 +11,9 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use nimbus::measure::stats::Summary;
-use nimbus::timing::attachments::Attachments;
 use nimbus::timing::frame_rows::{FRAMES_FILE, FrameRow, FrameTable};
 use nimbus::timing::records::Run;
-use nimbus::timing::results::read_results;
-use nimbus::timing::results::{RUN_FILE, write_results};
+use nimbus::timing::results::{RUN_FILE, read_results};
 use serde_json::{Value, json};
 
 const N_FRAMES: u32 = 60;
@@ -54,7 +52,7 @@ fn run() -> Run {
 
 fn write(folder: &Path, run: &Run, rows: Vec<FrameRow>) {
     let table = FrameTable { pass_names: ["grid", "sort"].map(str::to_owned).to_vec(), rows };
-    write_results(folder, run, &table, &Attachments::default()).expect("results");
+    results::write(folder, run, &table).expect("results");
 }
 
 /// A results folder in `dir` whose serial frames take `ms`, and parallel ones 0.9 of it.

@@ -7,9 +7,9 @@ use std::fs;
 use std::path::Path;
 
 use nimbus::frame::Counts;
+use nimbus::io::result_folder::Existing;
 use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::Summary;
-use nimbus::timing::attachments::Attachments;
 use nimbus::timing::frame_rows::{FRAMES_FILE, FrameRow, FrameTable};
 use nimbus::timing::json::{read, write};
 use nimbus::timing::machine::{Cpu, cpu, environment, revision, utc_now};
@@ -18,7 +18,7 @@ use nimbus::timing::overlap::{Overlap, SerialFrame};
 use nimbus::timing::records::{
     BaseTime, Case, Measured, Mode, PartRecord, Pass, Ratio, Reason, Run, Skipping,
 };
-use nimbus::timing::results::{RUN_FILE, prepare_out_dir, write_results};
+use nimbus::timing::results::{RUN_FILE, open_results};
 use serde_json::{Value, json};
 
 fn schema() -> Value {
@@ -242,16 +242,14 @@ fn keys_and_their_order_match_the_schema() {
 fn a_run_is_read_as_it_was_written() {
     let folder = tempfile::tempdir().unwrap();
     let out_dir = folder.path().join("a/b");
-    prepare_out_dir(&out_dir, false).unwrap();
     let pass_names = ["sort".to_owned(), "first".to_owned()].to_vec();
     let table = FrameTable { pass_names, rows: vec![row(0), row(3)] };
-    write_results(&out_dir, &sample_at("2024-02-29T12:34:56Z"), &table, &Attachments::default())
-        .unwrap();
+    results::write(&out_dir, &sample_at("2024-02-29T12:34:56Z"), &table).unwrap();
     assert_eq!(read::<Run>(&out_dir).unwrap(), sample_at("2024-02-29T12:34:56Z"));
     assert_eq!(read::<Run>(&out_dir.join(RUN_FILE)).unwrap(), sample_at("2024-02-29T12:34:56Z"));
     let names: Vec<_> =
         fs::read_dir(&out_dir).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-    assert_eq!(names.len(), 2, "nothing temporary is left: {names:?}");
+    assert_eq!(names.len(), 3, "record, list and rows, nothing temporary: {names:?}");
     assert_eq!(
         fs::read_to_string(out_dir.join(FRAMES_FILE)).unwrap(),
         "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,\
@@ -271,14 +269,16 @@ fn sample_at(date: &str) -> Run {
 #[test]
 fn an_existing_folder_is_refused_unless_forced() {
     let folder = tempfile::tempdir().unwrap();
-    let refused = prepare_out_dir(folder.path(), false).unwrap_err();
+    let open = |place: &Path, existing| open_results(place, existing, 1, true);
+    let refused = open(folder.path(), Existing::Refuse).unwrap_err();
     assert!(refused.to_string().contains("--force"), "{refused}");
     assert_eq!(refused.exit_code(), 2);
-    prepare_out_dir(folder.path(), true).unwrap();
+    open(folder.path(), Existing::Replace).unwrap();
     let file = folder.path().join("file");
     fs::write(&file, "mine").unwrap();
-    assert!(prepare_out_dir(&file, false).is_err());
-    assert!(prepare_out_dir(&file, true).is_err(), "a file is never replaced by a folder");
+    for existing in [Existing::Refuse, Existing::Replace, Existing::Extend] {
+        assert!(open(&file, existing).is_err(), "a file is never replaced by a folder");
+    }
     assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
 }
 
@@ -299,7 +299,7 @@ fn another_schema_version_and_another_file_are_named() {
 fn a_row_with_too_few_pass_times_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let table = FrameTable { pass_names: vec!["sort".to_owned()], rows: vec![row(0)] };
-    assert!(write_results(folder.path(), &sample(), &table, &Attachments::default()).is_err());
+    assert!(results::write(folder.path(), &sample(), &table).is_err());
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 

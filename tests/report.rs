@@ -18,9 +18,7 @@ use browser::Browser;
 use nimbus::io::image::png_bytes;
 use nimbus::studies::error::front::Front;
 use nimbus::studies::error::records::Study;
-use nimbus::timing::attachments::Attachments;
 use nimbus::timing::frame_rows::{FrameRow, FrameTable};
-use nimbus::timing::results::write_results;
 use program::{nimbus, path, run};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -279,8 +277,7 @@ fn page_of_a_run_without_data() {
     fs::create_dir(&folder).expect("a folder");
     let rows = vec![FrameRow { warm_up: false, ..results::row("serial", 0) }];
     let run = results::run(vec![results::mode("serial", 1, 0)]);
-    write_results(&folder, &run, &FrameTable { pass_names: vec![], rows }, &Attachments::default())
-        .expect("results");
+    results::write(&folder, &run, &FrameTable { pass_names: vec![], rows }).expect("results");
     let bare = folder.to_str().expect("UTF-8").to_owned();
     let empty = dir.path().join("empty");
     fs::create_dir(&empty).expect("a folder");

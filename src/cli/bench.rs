@@ -10,18 +10,18 @@ use super::args::{BenchArgs, SceneArgs};
 use super::bench_cases::{BenchCases, bench_cases};
 use super::bench_record::{Recorder, Runs, print_json};
 use super::interrupt::{self, PATIENCE};
-use super::output::refuse_existing;
+use super::output::{claim_file, refuse_existing};
 use super::progress::progress;
 use super::scene::{device_choice, print_sizes};
 use crate::error::{Error, Result};
 use crate::frame::{Stage, limits};
-use crate::io::atomic;
+use crate::io::result_folder::Existing;
 use crate::measure::zones::Zones;
 use crate::timing::blocks::{self, BenchPlan, Finished, Outcome};
 use crate::timing::cases::Case;
 use crate::timing::limits::check_bench;
 use crate::timing::machine;
-use crate::timing::results::prepare_out_dir;
+use crate::timing::results::open_results;
 
 /// Readings of the device's clock and the host's, before the frames and again after them.
 const N_CLOCK_READINGS: usize = 8;
@@ -49,10 +49,7 @@ pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
         }
     }
     let outs = out_dirs(args)?;
-    if let Some(file) = &args.trace {
-        refuse_existing(file, args.force)?;
-        atomic::check_place(file)?;
-    }
+    let _claim = args.trace.as_ref().map(|file| claim_file(file, args.force)).transpose()?;
     // All scenes are loaded before the first is timed, so that a fault in the last one is reported
     // at once and no folder is made for results that will not come.
     let quiet = SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
@@ -126,7 +123,7 @@ fn bench_scene(
         args,
         color,
         path,
-        out,
+        folder: Mutex::new(None),
         cases,
         scene_hash,
         resolved,
@@ -142,17 +139,18 @@ fn bench_scene(
         let (recorder, outcome, runs) = (recorder.clone(), outcome.clone(), runs.clone());
         interrupt::keep(PATIENCE, move || recorder.keep(&outcome, &runs))
     };
-    if let Some(dir) = &recorder.out {
-        // An existing folder was refused, or --force was given.
-        prepare_out_dir(dir, true)?;
+    if let Some(dir) = &out {
+        let Recorder { args, cases, .. } = &*recorder;
+        let existing = if args.force { Existing::Replace } else { Existing::Refuse };
+        let folder = open_results(dir, existing, cases.len(), args.plot)?;
+        *recorder.folder() = Some(folder);
     }
     let ended = time(stage, &recorder, context.stop, &outcome);
     keeping.finish();
     let outcome = std::mem::take(&mut *blocks::lock(&outcome));
     let Finished { stage, failure } = ended;
     if let (Some(failure), true) = (&failure, outcome.samples.is_empty()) {
-        // An empty folder would only be refused by the next run.
-        let _ = recorder.out.as_ref().map(std::fs::remove_dir);
+        drop(recorder.folder().take());
         return Err(failure.clone());
     }
     let later = match (&recorder.args.trace, &stage) {

@@ -1,7 +1,7 @@
 //! Turns the samples of a bench into its record, files and tables, at its end or at Ctrl-C.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use clap::ColorChoice;
 
@@ -9,7 +9,9 @@ use super::args::BenchArgs;
 use super::{bench_plot, bench_table, output};
 use crate::error::{Error, Result};
 use crate::gpu::{ClockFit, ClockSample, DeviceInfo};
+use crate::io::claim::command_line;
 use crate::io::console::say;
+use crate::io::result_folder::ResultFolder;
 use crate::measure::zones::Zones;
 use crate::timing::attachments::Attachments;
 use crate::timing::blocks::{self, BenchPlan, Outcome};
@@ -29,8 +31,8 @@ pub struct Recorder {
     pub color: ColorChoice,
     /// The scene file.
     pub path: PathBuf,
-    /// The results folder.
-    pub out: Option<PathBuf>,
+    /// The results folder, from when it is claimed.
+    pub folder: Mutex<Option<ResultFolder>>,
     /// The cases that are timed.
     pub cases: Vec<Case>,
     /// SHA-256 of the scene without a sweep.
@@ -63,7 +65,7 @@ impl Recorder {
     pub fn record(&self, outcome: &Outcome, later: &[ClockSample], is_cut: bool) -> Result<Run> {
         let Recorder { args, cases, .. } = self;
         let run = self.run(outcome, is_cut);
-        let needs_table = self.out.is_some() || args.plot;
+        let needs_table = args.out.is_some() || args.plot;
         let table = if needs_table { outcome.table(cases) } else { FrameTable::default() };
         let written = self.write(&run, &table, outcome);
         // The tables appear even where the files cannot be written.
@@ -93,8 +95,7 @@ impl Recorder {
         let mut outcome = blocks::lock(outcome).clone();
         outcome.interrupted = true;
         if outcome.samples.is_empty() {
-            // An empty folder would only be refused by the next run.
-            let _ = self.out.as_ref().map(std::fs::remove_dir);
+            drop(self.folder().take());
             return Error::Interrupted;
         }
         let printed = self.record(&outcome, &[], true).and_then(|run| {
@@ -110,7 +111,7 @@ impl Recorder {
             nimbus: env!("CARGO_PKG_VERSION").into(),
             revision: machine::revision().into(),
             date: self.date.clone(),
-            command: machine::command_line(),
+            command: command_line(),
             scene_hash: self.scene_hash.clone(),
             scene: self.resolved.clone(),
             device: machine::device_record(&self.info),
@@ -126,10 +127,19 @@ impl Recorder {
     }
 
     fn write(&self, run: &Run, table: &FrameTable, outcome: &Outcome) -> Result<()> {
-        let Some(dir) = &self.out else { return Ok(()) };
+        let mut folder = self.folder();
+        let Some(folder) = &mut *folder else { return Ok(()) };
         let charts = if self.args.plot { bench_plot::files(run, &table.rows)? } else { vec![] };
         let pictures = outcome.pictures.clone();
-        write_results(dir, run, table, &Attachments { pictures, charts, copies: vec![] })
+        let attachments = Attachments { pictures, charts, copies: vec![] };
+        let written = write_results(folder, run, table, &attachments);
+        output::kept_apart(folder, self.args.options.quiet);
+        written
+    }
+
+    /// Locks the results folder.
+    pub fn folder(&self) -> MutexGuard<'_, Option<ResultFolder>> {
+        self.folder.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Prints the tables.

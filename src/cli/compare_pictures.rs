@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde_json::{Map, Value, json};
 
 use super::args::CompareArgs;
-use super::output::{self, or_dash, refuse_existing};
+use super::output::{self, claim_file, or_dash};
 use crate::error::{Error, Result};
 use crate::io::image::{self, Image, ImageKind};
 use crate::measure::picture::flip::{self, Flip};
@@ -72,6 +72,7 @@ pub fn has_pictures(args: &CompareArgs) -> Result<bool> {
 pub fn run(args: &CompareArgs) -> Result<()> {
     check_names(&args.fail_above, &OF_DIFFERENCE, "--fail-above")?;
     check_names(&args.fail_below, &OF_LIKENESS, "--fail-below")?;
+    let mut _claim = None;
     if let Some(path) = &args.output {
         if ImageKind::of(path) != Ok(ImageKind::Png) {
             return Err(Error::usage(format!(
@@ -79,7 +80,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
                 path.display()
             )));
         }
-        refuse_existing(path, args.force)?;
+        _claim = claim_file(path, args.force)?;
     }
     let (a, b) = (image::read(&args.a)?, image::read(&args.b)?);
     check_alike(args, &a, &b)?;

@@ -9,7 +9,7 @@ use super::args::ErrorArgs;
 use super::error_configurations::{axes, design, load_configuration};
 use super::error_table;
 use super::interrupt::{self, PATIENCE, graceful_stop};
-use super::output::{self, refuse_existing};
+use super::output::{self, SharedFolder, kept_apart, lock_folder, refuse_existing};
 use super::progress::{ReferenceProgress, progress};
 use super::scene::{
     StudyScene, load_study, open_for_study, pixels, print_sizes, with_texture_hint,
@@ -17,22 +17,22 @@ use super::scene::{
 use crate::error::{Error, Result};
 use crate::io::console::say;
 use crate::io::image;
+use crate::io::result_folder::Existing;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;
 use crate::model::scene::Scene;
 use crate::reference::picture::Pixels;
-use crate::report::charts;
+use crate::report::charts::{self, Chart};
 use crate::studies::error::blocks::TimeKind;
-use crate::studies::error::design::best_within;
+use crate::studies::error::design::{best_within, settings};
 use crate::studies::error::device_runner::{DeviceRunner, FrameChoice};
-use crate::studies::error::files;
+use crate::studies::error::files::{self, REFERENCE_FILE};
 use crate::studies::error::records::{Budget, Configuration, Study};
 use crate::studies::error::study::{ErrorStudy, Event, StudyPlan, StudyResults};
 use crate::studies::provenance::{Provenance, ReferenceRecord};
 use crate::studies::reference_cache::{self, CachedReference};
 use crate::timing::json::ResultFile;
 use crate::timing::names::Setting;
-use crate::timing::results::prepare_out_dir;
 
 /// Runs `nimbus error`.
 ///
@@ -60,6 +60,20 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         part: args.part.map(|part| part.first as usize..part.end as usize),
     };
     let pixels = pixels(&scene, args.pixels)?;
+    let existing = match (args.resume, args.force) {
+        (true, _) => Existing::Extend,
+        (false, true) => Existing::Replace,
+        (false, false) => Existing::Refuse,
+    };
+    let stop = graceful_stop();
+    let folder = SharedFolder::default();
+    let mut keeping = {
+        let folder = folder.clone();
+        interrupt::keep(PATIENCE, move || cut_short(&folder))
+    };
+    // Claimed before the reference is computed, which may take minutes.
+    let open = |out| files::open(out, existing, n_configurations(args, &plan));
+    *lock_folder(&folder) = args.out.as_deref().map(open).transpose()?;
     let cached = reference(args, &scene, time_s, &pixels)?;
     let mut study = Study {
         made: Provenance::now(Study::SCHEMA, &args.scene, &loaded, gpu.device.info(), clocks),
@@ -77,17 +91,12 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     };
     let mut results = earlier(args, &study)?;
     update(args, &mut study, &results);
-    if let Some(out) = &args.out {
-        prepare_out_dir(out, true)?;
-        if !args.resume {
-            files::remove_earlier(out)?;
-        }
-        write_reference(&out.join("reference.png"), &film, &pixels, &cached.reference.rgba)?;
-        files::write(out, &study, &results)?;
+    if let Some(folder) = &mut *lock_folder(&folder) {
+        folder.add(REFERENCE_FILE, |path| {
+            write_reference(path, &film, &pixels, &cached.reference.rgba)
+        })?;
+        files::write(folder, &study, &results)?;
     }
-    let stop = graceful_stop();
-    let out = args.out.clone();
-    let mut keeping = interrupt::keep(PATIENCE, move || cut_short(out.as_deref()));
     let (n_frames, as_played) = (args.frames, args.as_played);
     let frames = FrameChoice { i_frame: args.frame, time_s, n_frames, as_played };
     let mut runner = DeviceRunner::new(&gpu, frames);
@@ -97,7 +106,7 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     let bar = progress(0, "configurations", args.options.quiet);
     let done = {
         let mut recorder = Recorder {
-            args,
+            folder: &folder,
             study: &mut study,
             film: &film,
             pixels: &pixels,
@@ -111,25 +120,34 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     drop(runner);
     study.interrupted = !matches!(done, Ok(true));
     update(args, &mut study, &results);
-    if let Some(out) = &args.out {
-        files::write(out, &study, &results)?;
-        output::write_chart(&out.join("front.svg"), &charts::error::chart(&study))?;
+    // The table appears even if the results cannot be written.
+    let mut written = Ok(());
+    if let Some(folder) = &mut *lock_folder(&folder) {
+        let chart = charts::error::chart(&study);
+        let svg = chart.svg(chart.size())?;
+        written = files::write_last(folder, &study, &results, &svg, &[]);
+        kept_apart(folder, args.options.quiet);
+    }
+    if done.is_ok() || study.configurations.iter().any(|c| c.n_turns > 0) {
+        print(args, color, &study)?;
     }
     done?;
-    print(args, color, &study)?;
+    written?;
     gpu.close()?;
     if study.interrupted { Err(Error::Interrupted) } else { Ok(()) }
 }
 
 /// Says what is kept of a study whose present step takes too long to stop.
-fn cut_short(out: Option<&Path>) -> Error {
-    match out {
-        Some(out) => say!(
+fn cut_short(folder: &SharedFolder) -> Error {
+    let mut folder = lock_folder(folder);
+    match folder.as_ref().and_then(|folder| folder.unfinished_at()) {
+        Some(at) => say!(
             "the step under way was cut short; {} has the rounds before it, and --resume goes on",
-            out.display()
+            at.display()
         ),
-        None => say!("the step under way was cut short; without --out nothing is kept"),
+        None => say!("the step under way was cut short; nothing is kept"),
     }
+    drop(folder.take());
     Error::Interrupted
 }
 
@@ -171,6 +189,14 @@ fn time_kind(args: &ErrorArgs, has_timestamps: bool) -> Result<TimeKind> {
         Some(time) => Ok(time),
         None => Ok(if has_timestamps { TimeKind::Gpu } else { TimeKind::Frame }),
     }
+}
+
+/// Returns the greatest number of configurations that the study in `--out` may have in the end.
+fn n_configurations(args: &ErrorArgs, plan: &StudyPlan) -> usize {
+    let earlier = args.out.as_ref().filter(|_| args.resume);
+    let earlier = earlier.and_then(|out| files::read_earlier(out).ok());
+    let n_earlier = earlier.map_or(0, |(study, _)| study.configurations.len());
+    n_earlier + settings(&plan.axes, plan.design).len()
 }
 
 /// Returns the results in `--out` if they are to be resumed.
@@ -220,7 +246,7 @@ fn update(args: &ErrorArgs, study: &mut Study, results: &StudyResults) {
 
 /// Shows the progress of a study and saves its results on the way.
 struct Recorder<'a> {
-    args: &'a ErrorArgs,
+    folder: &'a SharedFolder,
     study: &'a mut Study,
     film: &'a Film,
     pixels: &'a Pixels,
@@ -235,15 +261,13 @@ impl Recorder<'_> {
             Event::Block => self.bar.inc(1),
             Event::Picture { i, rgba, results } => {
                 self.bar.inc(1);
-                if let Some(out) = &self.args.out {
-                    self.write_picture(out, i, rgba, &mut results.configurations[i])?;
-                }
+                self.write_picture(i, rgba, &mut results.configurations[i])?;
             }
             Event::Round(results) => {
-                if let Some(out) = &self.args.out {
+                if let Some(folder) = &mut *lock_folder(self.folder) {
                     self.study.configurations = results.configurations.clone();
                     self.study.rounds = results.n_rounds;
-                    files::write(out, self.study, results)?;
+                    files::write(folder, self.study, results)?;
                 }
             }
         }
@@ -253,14 +277,15 @@ impl Recorder<'_> {
     /// Writes the picture of a configuration, and the map of its error.
     fn write_picture(
         &self,
-        out: &Path,
         i: usize,
         rgba: &[f32],
         configuration: &mut Configuration,
     ) -> Result<()> {
+        let mut folder = lock_folder(self.folder);
+        let Some(folder) = &mut *folder else { return Ok(()) };
         let (Film { width, height, .. }, pixels) = (*self.film, self.pixels);
-        let [picture, map] = [format!("picture-{i}.png"), format!("error-{i}.png")];
-        image::write(&out.join(&picture), self.film, width, height, rgba)?;
+        let [picture, map] = files::picture_files(i);
+        folder.add(&picture, |path| image::write(path, self.film, width, height, rgba))?;
         let at = |k: usize| &rgba[4 * pixels.index(pixels.at[k])..][..4];
         let error = |(k, r): (usize, &[f64; 4])| {
             let sum: f64 = at(k).iter().zip(r).map(|(a, b)| (f64::from(*a) - b).powi(2)).sum();
@@ -268,7 +293,7 @@ impl Recorder<'_> {
         };
         let errors: Vec<f64> = self.reference.iter().enumerate().map(error).collect();
         let colors = error_map(width, height, &pixels.spread(&errors));
-        image::write_bytes(&out.join(&map), width, height, &colors)?;
+        folder.add(&map, |path| image::write_bytes(path, width, height, &colors))?;
         (configuration.picture, configuration.error_map) = (Some(picture), Some(map));
         Ok(())
     }

@@ -9,8 +9,8 @@ use super::progress::{progress, spinner};
 use super::{farm_jobs, farm_plan, output};
 use crate::error::{Error, Result};
 use crate::farm::{
-    self, Ended, GcOptions, MergeOptions, Outcome, Plan, Pool, RunOptions, ShardStatus, State,
-    Status, process,
+    self, Ended, GcOptions, MergeOptions, Merged, Outcome, Plan, Pool, RunOptions, ShardStatus,
+    State, Status, process,
 };
 use crate::frame::DeviceChoice;
 
@@ -172,10 +172,15 @@ fn merge(args: &MergeArgs) -> Result<()> {
     let plan = Plan::read(&args.plan)?;
     let merging = spinner("merging", false);
     let options = MergeOptions { out: &args.output, force: args.force, mixed: args.mixed };
-    let n = farm::merge(&args.plan, &plan, &options)?;
+    let Merged { n, summary, written } = farm::merge(&args.plan, &plan, &options)?;
     drop(merging);
-    let summary = plan.work.summary(&args.output)?;
-    output::text(&format!("{n} {} in {}\n{summary}", plan.work.noun(), args.output.display()))
+    let (noun, out) = (plan.work.noun(), args.output.display());
+    let (of, place) = match &written {
+        Ok(()) => ("in", out.to_string()),
+        Err(_) => ("merged, but not written to", out.to_string()),
+    };
+    output::text(&format!("{n} {noun} {of} {place}\n{summary}"))?;
+    written
 }
 
 fn gc(args: &GcArgs) -> Result<()> {

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::args::{CalibrateArgs, FormatArg, PlanArgs, Span};
 use super::farm_told;
-use super::output::{self, refuse_existing};
+use super::output::{self, claim_file};
 use super::progress::progress;
 use super::scene::{print_warnings, typed_overrides};
 use crate::error::{Error, Result};
@@ -14,7 +14,6 @@ use crate::farm::{
     n_frames,
 };
 use crate::frame::DeviceChoice;
-use crate::io::atomic;
 use crate::io::image::ImageKind;
 use crate::io::scene_file::{self, LoadedScene};
 
@@ -126,8 +125,7 @@ fn all_frames(loaded: &LoadedScene) -> Span {
 /// # Errors
 /// When a run fails, the runs do not determine a model, or the file cannot be written.
 pub fn calibrated(args: &CalibrateArgs) -> Result<()> {
-    atomic::check_place(&args.output)?;
-    refuse_existing(&args.output, args.force)?;
+    let _claim = claim_file(&args.output, args.force)?;
     let choice = DeviceChoice { device: args.device.clone(), ..DeviceChoice::default() };
     let bar = progress(n_frames(args.scenes.len(), args.frames), "frames", args.quiet);
     let never = AtomicBool::new(false);

@@ -1,15 +1,18 @@
 //! `nimbus ledger SCENE`.
 
+use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use super::args::LedgerArgs;
 use super::interrupt::{self, PATIENCE, graceful_stop};
-use super::output::{self, header, interval, or_dash, refuse_existing, scientific};
+use super::output::{
+    self, SharedFolder, header, interval, lock_folder, or_dash, refuse_existing, scientific,
+};
 use super::progress::ReferenceProgress;
 use super::scene::{StudyScene, load_study, open_for_study, pixels, with_texture_hint};
 use crate::error::{Error, Result};
-use crate::io::atomic::check_place;
 use crate::io::console::say;
+use crate::io::result_folder::{Existing, ResultFolder};
 use crate::reference::picture::{Pixels, ReferenceKind, n_reflections};
 use crate::report::charts;
 use crate::studies::error::device_runner::FrameChoice;
@@ -17,7 +20,10 @@ use crate::studies::ledger::records::{Ledger, Row};
 use crate::studies::ledger::study::{LedgerParts, LedgerStudy, lock};
 use crate::studies::provenance::Provenance;
 use crate::timing::json::{self, ResultFile};
-use crate::timing::results::prepare_out_dir;
+
+const CHART: &str = "ledger.svg";
+/// Files of a ledger; the record is last.
+const FILES: [&str; 2] = [CHART, Ledger::FILE];
 
 /// Runs `nimbus ledger`.
 ///
@@ -46,15 +52,15 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
         FrameChoice { i_frame: args.frame, time_s, n_frames: args.frames, as_played: false };
     let pixels = pixels(scene, args.pixels)?;
     let parts = Arc::new(Mutex::new(LedgerParts::default()));
+    let folder = SharedFolder::default();
     let mut keeping = {
-        let (args, made, pixels, parts) =
-            (args.clone(), made.clone(), pixels.clone(), parts.clone());
-        interrupt::keep(PATIENCE, move || cut_short(&args, made, frames, &pixels, &parts))
+        let (args, made, pixels, parts, folder) =
+            (args.clone(), made.clone(), pixels.clone(), parts.clone(), folder.clone());
+        interrupt::keep(PATIENCE, move || cut_short(&args, &folder, made, frames, &pixels, &parts))
     };
-    if let Some(out) = &args.out {
-        prepare_out_dir(out, true)?;
-        check_place(&out.join(Ledger::FILE))?;
-    }
+    let existing = if args.force { Existing::Replace } else { Existing::Refuse };
+    let open = |out| ResultFolder::open(out, "ledger", existing, &FILES.map(str::to_owned));
+    *lock_folder(&folder) = args.out.as_deref().map(open).transpose()?;
     let shown = ReferenceProgress::new(args.options.quiet);
     let study = LedgerStudy {
         gpu: &gpu,
@@ -69,7 +75,7 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
     let ledger = study.run(made, &|work, n| shown.advance(work, n))?;
     keeping.finish();
     drop(shown);
-    deliver(args, &ledger)?;
+    deliver(args, &folder, &ledger)?;
     gpu.close()?;
     if ledger.interrupted {
         return Err(Error::Interrupted);
@@ -86,6 +92,7 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
 /// that the program ends with.
 fn cut_short(
     args: &LedgerArgs,
+    folder: &SharedFolder,
     made: Provenance,
     frames: FrameChoice,
     pixels: &Pixels,
@@ -94,27 +101,31 @@ fn cut_short(
     let parts = lock(parts);
     if !parts.has_row() {
         say!("no row was finished, nothing is kept");
-        // An empty folder would only be refused by the next run.
-        let _ = args.out.as_ref().map(std::fs::remove_dir);
+        drop(lock_folder(folder).take());
         return Error::Interrupted;
     }
-    let kept = parts.ledger(made, frames, pixels, true).and_then(|ledger| deliver(args, &ledger));
+    let ledger = parts.ledger(made, frames, pixels, true);
+    let kept = ledger.and_then(|ledger| deliver(args, folder, &ledger));
     kept.err().unwrap_or(Error::Interrupted)
 }
 
 /// Prints the ledger and writes its files.
-fn deliver(args: &LedgerArgs, ledger: &Ledger) -> Result<()> {
-    // The table appears even where the files cannot be written.
-    if args.json {
-        output::object(ledger)?;
-    } else {
-        output::text(&report(ledger))?;
+fn deliver(args: &LedgerArgs, folder: &SharedFolder, ledger: &Ledger) -> Result<()> {
+    // The table appears even where the files cannot be written, and the other way round.
+    let printed = if args.json { output::object(ledger) } else { output::text(&report(ledger)) };
+    if let Some(folder) = &mut *lock_folder(folder) {
+        let write = |folder: &Path| {
+            output::write_chart(&folder.join(CHART), &charts::ledger::chart(ledger))?;
+            json::write(&folder.join(Ledger::FILE), ledger)
+        };
+        let written = match ledger.interrupted {
+            true => folder.replace(&FILES, write),
+            false => folder.finish(&FILES, write),
+        };
+        output::kept_apart(folder, args.options.quiet);
+        written?;
     }
-    if let Some(out) = &args.out {
-        json::write(&out.join(Ledger::FILE), ledger)?;
-        output::write_chart(&out.join("ledger.svg"), &charts::ledger::chart(ledger))?;
-    }
-    Ok(())
+    printed
 }
 
 /// Returns the text for people.

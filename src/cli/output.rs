@@ -2,14 +2,17 @@
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use clap::ColorChoice;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::io::atomic::write_atomic;
-use crate::io::console;
+use crate::io::atomic::{check_place, write_atomic};
+use crate::io::claim::Claim;
+use crate::io::console::{self, say};
 use crate::io::plain_text::{plain, plain_json};
+use crate::io::result_folder::ResultFolder;
 use crate::report::charts::Chart;
 use crate::studies::figure::Figure;
 
@@ -135,6 +138,35 @@ pub fn refuse_existing(path: &Path, force: bool) -> Result<()> {
         return Err(Error::io(path, "exists; --force replaces it"));
     }
     Ok(())
+}
+
+/// Claims the place of a file that a command writes, before its work.
+///
+/// # Errors
+/// Fails if the file exists and `force` is not set, it cannot be written, or another run writes it.
+pub fn claim_file(path: &Path, force: bool) -> Result<Option<Claim>> {
+    refuse_existing(path, force)?;
+    check_place(path)?;
+    let claim = Claim::take(path)?;
+    // Another run may have written it meanwhile.
+    refuse_existing(path, force)?;
+    Ok(claim)
+}
+
+/// A results folder that the thread of Ctrl-C may take over; none before it is claimed.
+pub type SharedFolder = Arc<Mutex<Option<ResultFolder>>>;
+
+/// Locks a shared folder.
+pub fn lock_folder(folder: &SharedFolder) -> MutexGuard<'_, Option<ResultFolder>> {
+    folder.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Says where unfinished results are that have not replaced earlier ones.
+pub fn kept_apart(folder: &ResultFolder, quiet: bool) {
+    if let Some(apart) = folder.apart().filter(|_| !quiet) {
+        let place = folder.place().display();
+        say!("note: {place} keeps its earlier results; the new ones are in {}", apart.display());
+    }
 }
 
 /// Returns the rows of a table that has only its header yet.

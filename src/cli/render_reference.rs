@@ -9,7 +9,6 @@ use super::output;
 use super::progress::ReferenceProgress;
 use super::scene::print_sizes;
 use crate::error::Result;
-use crate::io::atomic;
 use crate::io::console::say;
 use crate::io::image::{self, image_hash};
 use crate::model::scene::Scene;
@@ -32,8 +31,6 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
     let film = scene.film;
     let n_pixels = u64::from(film.width) * u64::from(film.height);
     check_memory(n_pixels, args.samples, scene.n_particles())?;
-    // The picture may take minutes; a file that cannot be written is reported before.
-    atomic::check_place(&args.output)?;
     if args.options.verbose {
         print_sizes(scene, None);
     }

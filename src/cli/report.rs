@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use super::args::ReportArgs;
-use super::output::refuse_existing;
+use super::output::claim_file;
 use super::progress::spinner;
 use crate::error::{Error, Result};
 use crate::io::atomic;
@@ -27,8 +27,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
             args.output.display()
         )));
     }
-    refuse_existing(&args.output, args.force)?;
-    atomic::check_place(&args.output)?;
+    let _claim = claim_file(&args.output, args.force)?;
     check_sizes(&args.runs)?;
     let mut sources = Vec::new();
     for path in &args.runs {

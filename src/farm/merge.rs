@@ -6,8 +6,9 @@ use std::path::Path;
 use super::plan::Plan;
 use super::ranges::ranges;
 use super::store::{ResultState, Store};
-use super::work::{Merge, ShardResult};
+use super::work::{Merge, Merged, ShardResult};
 use crate::error::{Error, Result};
+use crate::io::result_folder::Existing;
 
 /// The place of a merged result, and what is allowed there.
 #[derive(Debug, Clone, Copy)]
@@ -20,12 +21,12 @@ pub struct MergeOptions<'a> {
     pub mixed: bool,
 }
 
-/// Verifies all results of the plan in `folder`, merges them, and returns the number of items.
+/// Verifies all results of the plan in `folder` and merges them.
 ///
 /// # Errors
 /// When a shard is not done, results do not fit together, or the folder exists and is not to be
 /// replaced. Nothing is written then.
-pub fn merge(folder: &Path, plan: &Plan, options: &MergeOptions<'_>) -> Result<usize> {
+pub fn merge(folder: &Path, plan: &Plan, options: &MergeOptions<'_>) -> Result<Merged> {
     let MergeOptions { out, force, mixed } = *options;
     if !force && out.symlink_metadata().is_ok() {
         return Err(Error::io(out, "exists; --force replaces it"));
@@ -37,7 +38,7 @@ pub fn merge(folder: &Path, plan: &Plan, options: &MergeOptions<'_>) -> Result<u
     plan.work.merge(&Merge {
         results: &results,
         out,
-        force,
+        existing: if force { Existing::Replace } else { Existing::Refuse },
         scene: &plan.scene,
         build: [&plan.nimbus, &plan.revision, &plan.code],
         load: &|| plan.scene_as_planned(),

@@ -47,4 +47,4 @@ pub(crate) use pool::{Ended, Pool};
 pub(crate) use ranges::ranges;
 pub(crate) use run::{Outcome, RunOptions, give_up_after, run};
 pub(crate) use status::{ShardStatus, State, Status};
-pub(crate) use work::{AnyWork, Frames, Study, Sweep};
+pub(crate) use work::{AnyWork, Frames, Merged, Study, Sweep};

@@ -1,7 +1,8 @@
 //! Names of this machine and of the Slurm task that this process belongs to.
 
 use std::env;
-use std::fs;
+
+use crate::io::claim::host_name;
 
 /// Separates a task's name from the number of its restart.
 const RESTART: &str = " restart ";
@@ -9,9 +10,7 @@ const RESTART: &str = " restart ";
 /// Returns this machine's name, as Slurm or else the kernel has it. All its characters may stand
 /// in a file name.
 pub fn node_name() -> String {
-    let kernel = || fs::read_to_string("/proc/sys/kernel/hostname").ok();
-    // HOSTNAME comes last: a shell on another machine may have exported it.
-    let name = variable("SLURMD_NODENAME").or_else(kernel).or_else(|| variable("HOSTNAME"));
+    let name = variable("SLURMD_NODENAME").or_else(host_name);
     let fit = |c: char| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '-' };
     let name: String = name.unwrap_or_default().trim().chars().map(fit).collect();
     if name.is_empty() { "node".to_owned() } else { name }

@@ -14,6 +14,7 @@ use super::scene_source::SceneSource;
 use super::work::AnyWork;
 use crate::error::{Error, Result};
 use crate::io::atomic;
+use crate::io::claim::command_line;
 use crate::io::scene_file::LoadedScene;
 use crate::io::text_file::RECORD_LIMIT;
 use crate::timing::json::{self, ResultFile};
@@ -119,7 +120,7 @@ impl Plan {
             revision: machine::revision().into(),
             code: CODE.into(),
             date: machine::utc_now(),
-            command: machine::command_line(),
+            command: command_line(),
             scene,
             device,
             work: cut.work,

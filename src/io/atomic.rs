@@ -150,6 +150,7 @@ fn beside(path: &Path) -> Result<(Temporary, File)> {
 
 /// A temporary file or folder. Dropping it, or [`abandon`], removes what its path names then: after
 /// a rename, nothing.
+#[derive(Debug)]
 pub(super) struct Temporary {
     pub path: PathBuf,
 }
@@ -186,6 +187,12 @@ impl Temporary {
         let (made, path) = make()?;
         paths.push(path.clone());
         Ok((made, Temporary { path }))
+    }
+
+    /// Takes over a file that exists already, to be removed with the temporaries.
+    pub(super) fn registered(path: PathBuf) -> Temporary {
+        in_progress().push(path.clone());
+        Temporary { path }
     }
 
     /// Keeps what lies at the path now. `paths` is the locked list of [`in_progress`].

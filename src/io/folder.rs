@@ -28,20 +28,20 @@ pub fn replace_files(
     if exchanged(folder, files, &write)? { Ok(()) } else { one_by_one(folder, files, &write) }
 }
 
-/// Returns the names of all entries of `folder`; none if it cannot be read.
-pub fn names(folder: &Path) -> impl Iterator<Item = String> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries.filter_map(|entry| entry.file_name().into_string().ok())
-}
-
 /// Checks that files can be made in `folder`.
 ///
 /// # Errors
 /// When they cannot.
 pub fn check_writable(folder: &Path) -> Result<()> {
-    let made = Temporary::folder(folder, "results");
-    made.map(drop)
-        .map_err(|cause| Error::io(folder, format!("nothing can be written in it: {cause}")))
+    // Without a file for trial, which a kill would leave behind.
+    #[cfg(target_os = "linux")]
+    let checked = {
+        use rustix::fs::{Access, access};
+        access(folder, Access::WRITE_OK | Access::EXEC_OK).map_err(std::io::Error::from)
+    };
+    #[cfg(not(target_os = "linux"))]
+    let checked = Temporary::folder(folder, "results").map(drop);
+    checked.map_err(|cause| Error::io(folder, format!("nothing can be written in it: {cause}")))
 }
 
 /// Moves the last file away, replaces the others, and puts the new last file there.

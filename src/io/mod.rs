@@ -4,7 +4,8 @@
 //! ([`particle_file`]) and the output of weather models ([`weather`]). Outputs: images ([`image`])
 //! and results. Every file is written through [`atomic`], so that it is the old one or the new one
 //! whole, and files that belong together through [`folder`]. Every file that a user names is opened
-//! by [`input_file`].
+//! by [`input_file`]. A run claims the place of its results ([`claim`]) and keeps a list of the
+//! files that it wrote ([`result_folder`]).
 //!
 //! Every complaint about an input says file:line:column, or the `--set` argument, and what was
 //! expected. A scene is read in two steps: `document` turns text and `--set` arguments into a tree
@@ -13,6 +14,7 @@
 pub mod atomic;
 pub mod bounds;
 pub mod box_file;
+pub mod claim;
 pub mod console;
 mod document;
 pub mod folder;
@@ -20,6 +22,7 @@ pub mod image;
 pub mod input_file;
 pub mod particle_file;
 pub mod plain_text;
+pub mod result_folder;
 pub mod scene_file;
 pub mod scene_keys;
 pub mod scene_view;

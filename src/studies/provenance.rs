@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::picture_error::magnitude;
 use super::reference_cache::CachedReference;
 use crate::gpu::DeviceInfo;
+use crate::io::claim::command_line;
 use crate::io::scene_file::LoadedScene;
 use crate::reference::picture::{Pixels, ReferenceKind};
 use crate::timing::machine::{self, Clocks, Cpu, Device};
@@ -58,7 +59,7 @@ impl Provenance {
             revision: machine::revision().into(),
             code: env!("NIMBUS_CODE").into(),
             date: machine::utc_now(),
-            command: machine::command_line(),
+            command: command_line(),
             scene_file: scene_file.display().to_string(),
             scene_hash: scene.hash.clone(),
             scene: scene.resolved.clone(),

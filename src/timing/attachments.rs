@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
-use crate::io::folder;
 use crate::io::image::write_bytes;
 use crate::io::input_file::{self, PICTURE_LIMIT};
 
@@ -58,6 +57,16 @@ pub fn frames_chart(i: usize, n: usize) -> String {
     if n == 1 { FRAMES_CHART.to_owned() } else { format!("frames-{i}.svg") }
 }
 
+/// Returns the names of the files that a bench of `n_cases` may write beside its record.
+pub fn planned(n_cases: usize, has_charts: bool) -> Vec<String> {
+    let mut names: Vec<String> = (0..n_cases).map(picture_file).collect();
+    if has_charts {
+        names.extend((0..n_cases).map(|i| frames_chart(i, n_cases)));
+        names.extend([FRAMES_CHART, PASSES_CHART].map(str::to_owned));
+    }
+    names
+}
+
 impl Attachments {
     /// Returns the names of all files.
     pub(super) fn names(&self) -> Vec<String> {
@@ -83,44 +92,5 @@ impl Attachments {
             write_atomic(&folder.join(name), |file| file.write_all(text.as_bytes()))?;
         }
         Ok(())
-    }
-}
-
-/// Returns the names of the files in `folder` that are named as attachments.
-pub(super) fn names_in(folder: &Path) -> Vec<String> {
-    folder::names(folder).filter(|name| is_attachment(name)).collect()
-}
-
-fn is_attachment(name: &str) -> bool {
-    let is_numbered = |before: &str, after: &str| {
-        let number = name.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
-        number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
-    };
-    [PASSES_CHART, FRAMES_CHART].contains(&name)
-        || is_numbered("frames-", ".svg")
-        || is_numbered("case-", ".png")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn files_of_other_names_are_no_attachments() {
-        let ours = [frames_chart(0, 1), frames_chart(12, 20), picture_file(0), picture_file(137)];
-        for name in ours.iter().map(String::as_str).chain([PASSES_CHART]) {
-            assert!(is_attachment(name), "{name}");
-        }
-        for name in [
-            "case-.png",
-            "case-a.png",
-            "case-1.png.bak",
-            "picture-1.png",
-            "my-frames.svg",
-            "frames-1x.svg",
-            "a.png",
-        ] {
-            assert!(!is_attachment(name), "{name}");
-        }
     }
 }

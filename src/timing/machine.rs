@@ -11,11 +11,6 @@ use crate::frame::Renderer;
 use crate::gpu::DeviceInfo;
 use crate::measure::clock::ClockQuality;
 
-/// Returns the command line. Arguments that are not UTF-8 are shown as an editor would show them.
-pub fn command_line() -> Vec<String> {
-    std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
-}
-
 /// A Vulkan device, as results name it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Device {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::Path;
 
-use super::attachments::{PictureCopy, names_in, picture_file};
+use super::attachments::{PictureCopy, picture_file};
 use super::difference::{Facts, fact_differences, short};
 use super::frame_rows::{FRAMES_FILE, FrameRow, FrameTable, parse_frames};
 use super::intervals::spread;
@@ -69,7 +69,9 @@ impl Part {
             let what = format!("a row is not of block {} as run.json names it", row.block);
             return Err(Error::io(&path, what));
         }
-        Ok(Part { name, node, range, run, table, pictures: names_in(folder) })
+        let pictures = (0..run.cases.len()).map(picture_file);
+        let pictures = pictures.filter(|name| folder.join(name).exists()).collect();
+        Ok(Part { name, node, range, run, table, pictures })
     }
 
     fn record(&self) -> PartRecord {

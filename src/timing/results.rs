@@ -12,7 +12,7 @@ use super::json::{self, ResultFile};
 use super::names::{case_name, mode_name};
 use super::records::Run;
 use crate::error::{Error, Result};
-use crate::io::folder::{check_writable, replace_files};
+use crate::io::result_folder::{Existing, ResultFolder};
 use crate::io::text_file::{TABLE_LIMIT, read_result};
 
 /// File name of the record of a run.
@@ -57,49 +57,42 @@ pub struct Measure {
     pub ms: Vec<f64>,
 }
 
-/// Creates the folder of results before anything is measured.
-///
-/// An existing folder is accepted only with `force`; its results are replaced once the new ones are
-/// complete, and its other files stay.
+/// Claims the folder for the results of a bench of `n_cases` before anything is measured.
 ///
 /// # Errors
-/// Fails if the path exists and `force` is not set, or it cannot be a folder to write in.
-pub fn prepare_out_dir(path: &Path, force: bool) -> Result<()> {
-    match fs::symlink_metadata(path) {
-        Ok(_) if !force => {
-            let expected = "name another folder, or add --force to overwrite it";
-            Err(Error::usage(format!("{}: exists already; {expected}", path.display())))
-        }
-        Ok(_) if !path.is_dir() => Err(Error::io(path, "is not a folder; results need one")),
-        Ok(_) => check_writable(path),
-        Err(_) => fs::create_dir_all(path).map_err(|cause| Error::io(path, cause)),
-    }
+/// Fails as [`ResultFolder::open`].
+pub fn open_results(
+    place: &Path,
+    existing: Existing,
+    n_cases: usize,
+    has_charts: bool,
+) -> Result<ResultFolder> {
+    let mut planned = attachments::planned(n_cases, has_charts);
+    planned.extend([FRAMES_FILE, RUN_FILE].map(str::to_owned));
+    ResultFolder::open(place, "run", existing, &planned)
 }
 
-/// Writes all files of a result at once, and removes the pictures and charts of an earlier one.
+/// Writes all files of a bench together. Results of a run that ended early do not replace earlier
+/// ones.
 ///
 /// # Errors
-/// Fails if a file cannot be written; an earlier result then stays.
+/// Fails as [`ResultFolder::finish`].
 pub fn write_results(
-    out_dir: &Path,
+    folder: &mut ResultFolder,
     run: &Run,
     table: &FrameTable,
     attachments: &Attachments,
 ) -> Result<()> {
     let mut names = attachments.names();
-    for name in attachments::names_in(out_dir) {
-        if !names.contains(&name) {
-            names.push(name);
-        }
-    }
     // The record is last: a folder that has it has everything.
     names.extend([FRAMES_FILE, RUN_FILE].map(str::to_owned));
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    replace_files(out_dir, &names, |folder| {
+    let write = |folder: &Path| {
         attachments.write(folder)?;
         write_frames(&folder.join(FRAMES_FILE), table)?;
         json::write(&folder.join(RUN_FILE), run)
-    })
+    };
+    if run.interrupted { folder.replace(&names, write) } else { folder.finish(&names, write) }
 }
 
 /// Reads a folder that `nimbus bench --out` wrote.

@@ -1,12 +1,24 @@
 //! Results of an imaginary bench.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
-use nimbus::timing::frame_rows::FrameRow;
+use nimbus::error::Result;
+use nimbus::io::result_folder::Existing;
+use nimbus::timing::attachments::Attachments;
+use nimbus::timing::frame_rows::{FrameRow, FrameTable};
 use nimbus::timing::json::ResultFile;
 use nimbus::timing::machine::{Clocks, Cpu, Device};
 use nimbus::timing::records::{Block, Case, Mode, Run};
+use nimbus::timing::results::{open_results, write_results};
 use serde_json::json;
+
+/// Writes results over earlier ones, which tests may have changed.
+#[allow(dead_code, reason = "not every test binary writes results")]
+pub fn write(folder: &Path, run: &Run, table: &FrameTable) -> Result<()> {
+    let mut folder = open_results(folder, Existing::Extend, run.cases.len(), false)?;
+    write_results(&mut folder, run, table, &Attachments::default())
+}
 
 /// Returns a loop of `frames` timed frames without measurements.
 pub fn mode(threading: &str, frames: usize, warm_up: usize) -> Mode {

@@ -103,7 +103,7 @@ impl Tiny {
     }
 
     /// Runs the program in the scene's folder.
-    fn command(&self, args: &[&str]) -> std::process::Command {
+    pub fn command(&self, args: &[&str]) -> std::process::Command {
         let mut command = nimbus(args);
         command.current_dir(self.dir.path()).env("NIMBUS_CACHE_DIR", self.cache());
         command

@@ -1,6 +1,5 @@
 //! Frames of an animation: the pictures that `nimbus render` draws, to the byte.
 
-use std::collections::HashSet;
 use std::fs;
 use std::ops::Range;
 use std::path::Path;
@@ -9,13 +8,13 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::task::{Merge, ShardResult, Task, Work};
+use super::task::{Merge, Merged, ShardResult, Task, Work};
 use crate::error::{Error, Result};
 use crate::farm::transient::io_error;
 use crate::frame::{GpuContext, Player};
 use crate::io::atomic;
-use crate::io::folder::{self, replace_files};
 use crate::io::image::{ImageKind, encoded};
+use crate::io::result_folder::ResultFolder;
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{Impostors, Scene};
 use crate::timing::machine::{Device, device_record};
@@ -110,16 +109,13 @@ impl Work for Frames {
         Ok(device)
     }
 
-    fn merge(&self, merge: &Merge<'_>) -> Result<usize> {
+    fn merge(&self, merge: &Merge<'_>) -> Result<Merged> {
         let files = merge.results.iter().flat_map(|result| &result.manifest.files);
-        let names: Vec<&str> = files.map(|file| file.name.as_str()).collect();
-        let kept: HashSet<&str> = names.iter().copied().collect();
-        let earlier: Vec<String> =
-            folder::names(merge.out).filter(|name| is_file_name(name)).collect();
-        let removed = earlier.iter().map(String::as_str).filter(|name| !kept.contains(name));
-        let replaced: Vec<&str> = removed.chain(names.iter().copied()).collect();
-        replace_files(merge.out, &replaced, |staged| copy_all(merge.results, staged))?;
-        Ok(names.len())
+        let planned: Vec<String> = files.map(|file| file.name.clone()).collect();
+        let mut folder = ResultFolder::open(merge.out, "frames", merge.existing, &planned)?;
+        let names: Vec<&str> = planned.iter().map(String::as_str).collect();
+        let written = folder.finish(&names, |staged| copy_all(merge.results, staged));
+        Ok(Merged { n: names.len(), summary: String::new(), written })
     }
 }
 
@@ -132,12 +128,6 @@ fn scene_at(loaded: &LoadedScene, i_frame: u32) -> Scene {
 /// Returns a frame's file name. Names sort as the frames do.
 fn file_name(i_frame: u32, format: ImageKind) -> String {
     format!("frame-{i_frame:08}.{}", format.extension())
-}
-
-fn is_file_name(name: &str) -> bool {
-    let stem = name.strip_suffix(".png").or(name.strip_suffix(".exr"));
-    let number = stem.and_then(|stem| stem.strip_prefix("frame-"));
-    number.is_some_and(|digits| digits.len() >= 8 && digits.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Copies all files to a folder and verifies each copy.

@@ -16,7 +16,7 @@ pub use frames::Frames;
 pub use reference::ReferenceWork;
 pub use study::Study;
 pub use sweep::Sweep;
-pub use task::{Merge, ShardResult, Task, Work};
+pub use task::{Merge, Merged, ShardResult, Task, Work};
 
 /// Work of any kind, as `plan.json` describes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -7,13 +7,13 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::task::{Merge, ShardResult, Task, Work};
+use super::task::{Merge, Merged, ShardResult, Task, Work};
 use crate::error::{Error, Result};
 use crate::farm::transient::io_error;
 use crate::io::atomic;
-use crate::io::folder::replace_files;
 use crate::io::image::{ImageKind, encoded, image_hash};
 use crate::io::input_file;
+use crate::io::result_folder::ResultFolder;
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::Scene;
 use crate::reference::picture::{
@@ -215,7 +215,7 @@ impl Work for ReferenceWork {
         Ok(device)
     }
 
-    fn merge(&self, merge: &Merge<'_>) -> Result<usize> {
+    fn merge(&self, merge: &Merge<'_>) -> Result<Merged> {
         let scene = self.scene(&(merge.load)()?);
         let mean = self.total(merge.results)?.mean();
         let rgba = picture::to_f32(&mean.rgba);
@@ -239,15 +239,13 @@ impl Work for ReferenceWork {
             "nodes": nodes, "processors": processors,
             "seconds": manifests().map(|m| m.seconds).sum::<f64>(),
         });
-        // A picture in the other format, of an earlier merge, goes.
-        let mut files = vec![file.as_str(), ABOUT_FILE];
-        let other = ["reference.png", "reference.exr"].into_iter().find(|name| *name != file);
-        files.splice(0..0, other.filter(|name| merge.out.join(name).exists()));
-        replace_files(merge.out, &files, |staged| {
+        let planned = [file.clone(), ABOUT_FILE.to_owned()];
+        let mut folder = ResultFolder::open(merge.out, "reference", merge.existing, &planned)?;
+        let written = folder.finish(&[&file, ABOUT_FILE], |staged| {
             atomic::write_synced(&staged.join(&file), &picture)?;
             atomic::write_synced(&staged.join(ABOUT_FILE), format!("{about:#}\n").as_bytes())
-        })?;
-        Ok(self.n_pieces() as usize)
+        });
+        Ok(Merged { n: self.n_pieces() as usize, summary: String::new(), written })
     }
 }
 

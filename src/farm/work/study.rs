@@ -1,25 +1,20 @@
 //! Configurations of an error study: each shard is a `nimbus error --part`, and all shards together
 //! are the study that one `nimbus error` makes.
 
-use std::fs;
-use std::io::Write;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::subprocess;
-use super::task::{Merge, ShardResult, Task, Work};
+use super::task::{Merge, Merged, ShardResult, Task, Work};
 use crate::error::{Error, Result};
-use crate::farm::transient::io_error;
-use crate::io::atomic::write_atomic;
 use crate::report::charts::{self, Chart};
-use crate::studies::error::files::{self, CONFIGURATIONS_FILE, TIMES_FILE};
+use crate::studies::error::files::{self, CONFIGURATIONS_FILE, REFERENCE_FILE, TIMES_FILE};
 use crate::studies::error::parts::{Joined, Part, differences, join};
 use crate::studies::error::records;
 use crate::timing::json::{self, ResultFile};
 use crate::timing::machine::Device;
-use crate::timing::results::prepare_out_dir;
 
 /// An error study.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -62,8 +57,8 @@ impl Work for Study {
         Ok(subprocess::run("error", &self.arguments, task, read)?.made.device)
     }
 
-    fn merge(&self, merge: &Merge<'_>) -> Result<usize> {
-        let Merge { results, out, force, .. } = merge;
+    fn merge(&self, merge: &Merge<'_>) -> Result<Merged> {
+        let results = merge.results;
         let read = |result: &ShardResult| {
             let (study, results) = files::read_earlier(&result.folder)?;
             Ok(Part { name: result.name(), study, results })
@@ -73,20 +68,15 @@ impl Work for Study {
         let Some(Joined { study, results: joined, pictures }) = join(&parts) else {
             return Err(Error::usage("the plan has no shards"));
         };
-        prepare_out_dir(out, *force)?;
-        files::remove_earlier(out)?;
-        let copy = |i_part: usize, from: &str, to: &str| {
-            let to = out.join(to);
-            fs::copy(results[i_part].folder.join(from), &to).map_err(io_error(&to))
-        };
-        for picture in &pictures {
-            copy(picture.i_part, &picture.from, &picture.to)?;
-        }
-        copy(0, "reference.png", "reference.png")?;
-        files::write(out, &study, &joined)?;
+        let n = study.configurations.len();
+        let mut folder = files::open(merge.out, merge.existing, n)?;
+        let from = |i_part: usize, name: &str| results[i_part].folder.join(name);
+        let mut copies: Vec<_> =
+            pictures.iter().map(|p| (p.to.clone(), from(p.i_part, &p.from))).collect();
+        copies.push((REFERENCE_FILE.to_owned(), from(0, REFERENCE_FILE)));
         let chart = charts::error::chart(&study);
         let svg = chart.svg(chart.size())?;
-        write_atomic(&out.join("front.svg"), |file| file.write_all(svg.as_bytes()))?;
-        Ok(study.configurations.len())
+        let written = files::write_last(&mut folder, &study, &joined, &svg, &copies);
+        Ok(Merged { n, summary: String::new(), written })
     }
 }

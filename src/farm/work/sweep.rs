@@ -3,21 +3,20 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
-use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::subprocess;
-use super::task::{Merge, ShardResult, Task, Work};
+use super::task::{Merge, Merged, ShardResult, Task, Work};
 use crate::error::{Error, Result};
 use crate::timing::attachments::{Attachments, picture_file};
 use crate::timing::frame_rows::FRAMES_FILE;
 use crate::timing::json;
 use crate::timing::machine::Device;
 use crate::timing::parts::{Part, base_spread, differences, join, numbers};
-use crate::timing::records::{Case, Run};
-use crate::timing::results::{RUN_FILE, prepare_out_dir, write_results};
+use crate::timing::records::{Case, PartRecord, Run};
+use crate::timing::results::{RUN_FILE, open_results, write_results};
 
 /// A bench of several cases.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -62,7 +61,7 @@ impl Work for Sweep {
         Ok(subprocess::run("bench", &self.arguments, task, json::read::<Run>)?.device)
     }
 
-    fn merge(&self, merge: &Merge<'_>) -> Result<usize> {
+    fn merge(&self, merge: &Merge<'_>) -> Result<Merged> {
         let results = merge.results;
         let read = |result: &ShardResult| {
             let node = result.manifest.node.clone();
@@ -79,31 +78,31 @@ impl Work for Sweep {
             let what = format!("the parts' cases ({found}) are not the plan's ({planned})");
             return Err(Error::Check { what });
         }
-        prepare_out_dir(merge.out, merge.force)?;
+        let n = joined.run.cases.len();
+        let mut folder = open_results(merge.out, merge.existing, n, false)?;
         let pictures = joined.pictures.iter();
         let copies = pictures
             .map(|moved| (moved.to.clone(), results[moved.i_part].folder.join(&moved.from)));
         let beside = Attachments { copies: copies.collect(), ..Attachments::default() };
-        write_results(merge.out, &joined.run, &joined.table, &beside)?;
-        Ok(joined.run.cases.len())
+        let written = write_results(&mut folder, &joined.run, &joined.table, &beside);
+        Ok(Merged { n, summary: summary(&joined.run.parts), written })
     }
+}
 
-    /// Tells by how much the nodes differ in the first case, which every shard times.
-    fn summary(&self, merged: &Path) -> Result<String> {
-        let parts = json::read::<Run>(merged)?.parts;
-        let spread = base_spread(&parts);
-        if spread.is_empty() {
-            return Ok(String::new());
-        }
-        let nodes: BTreeSet<&str> = parts.iter().map(|part| part.node.as_str()).collect();
-        let each: Vec<String> = spread.iter().map(|(name, by)| format!("{name} {by:.3}")).collect();
-        let (n, n_nodes, s) = (parts.len(), nodes.len(), if nodes.len() == 1 { "" } else { "s" });
-        Ok(format!(
-            "the first case, timed in each of {n} shards on {n_nodes} node{s}: ratio of the \
-             greatest median frame time to the least: {}\n",
-            each.join(", ")
-        ))
+/// Tells by how much the nodes differ in the first case, which every shard times.
+fn summary(parts: &[PartRecord]) -> String {
+    let spread = base_spread(parts);
+    if spread.is_empty() {
+        return String::new();
     }
+    let nodes: BTreeSet<&str> = parts.iter().map(|part| part.node.as_str()).collect();
+    let each: Vec<String> = spread.iter().map(|(name, by)| format!("{name} {by:.3}")).collect();
+    let (n, n_nodes, s) = (parts.len(), nodes.len(), if nodes.len() == 1 { "" } else { "s" });
+    format!(
+        "the first case, timed in each of {n} shards on {n_nodes} node{s}: ratio of the greatest \
+         median frame time to the least: {}\n",
+        each.join(", ")
+    )
 }
 
 fn as_usize(items: Range<u32>) -> Range<usize> {

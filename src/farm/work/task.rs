@@ -11,6 +11,7 @@ use crate::farm::manifest::Manifest;
 use crate::farm::scene_source::SceneSource;
 use crate::farm::workplace::Workplace;
 use crate::frame::DeviceChoice;
+use crate::io::result_folder::Existing;
 use crate::io::scene_file::LoadedScene;
 use crate::timing::machine::Device;
 
@@ -64,19 +65,21 @@ pub trait Work {
     /// When a file cannot be made, or the run is to stop.
     fn run(&self, task: &mut Task<'_>) -> Result<Device>;
 
-    /// Puts the results of all shards together and returns the number of merged items.
+    /// Puts the results of all shards together.
     ///
     /// # Errors
-    /// When results do not fit together, or the merged one cannot be written.
-    fn merge(&self, merge: &Merge<'_>) -> Result<usize>;
+    /// When results do not fit together, or the place of the merged one is not free.
+    fn merge(&self, merge: &Merge<'_>) -> Result<Merged>;
+}
 
-    /// Returns lines about a merged result for the user.
-    ///
-    /// # Errors
-    /// When the merged result cannot be read.
-    fn summary(&self, _merged: &Path) -> Result<String> {
-        Ok(String::new())
-    }
+/// The outcome of a merge.
+pub struct Merged {
+    /// The number of items.
+    pub n: usize,
+    /// Lines about the merged result for the user.
+    pub summary: String,
+    /// Whether the merged result was written.
+    pub written: Result<()>,
 }
 
 /// A shard to be done, and the means to do it.
@@ -144,8 +147,8 @@ pub struct Merge<'a> {
     pub results: &'a [ShardResult],
     /// The folder that gets the merged result.
     pub out: &'a Path,
-    /// Whether results of an earlier merge are replaced.
-    pub force: bool,
+    /// The rule for results of an earlier merge.
+    pub existing: Existing,
     /// The scene's file and settings.
     pub scene: &'a SceneSource,
     /// Version, revision and digest of the build that made the plan.

@@ -5,7 +5,7 @@
 
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ use super::records::{Configuration, Study};
 use super::study::StudyResults;
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
-use crate::io::folder::replace_files;
+use crate::io::result_folder::{Existing, ResultFolder};
 use crate::io::text_file::{TABLE_LIMIT, read_result};
 use crate::studies::figure::Figure;
 use crate::timing::json::{self, ResultFile};
@@ -37,37 +37,68 @@ struct TimeRow {
     frame_ms: f64,
 }
 
-/// Writes the study and its tables, all together or not at all.
+/// The reference as a picture.
+pub const REFERENCE_FILE: &str = "reference.png";
+/// The chart of time against error, which finished and interrupted studies have.
+pub const CHART_FILE: &str = "front.svg";
+
+/// Returns the file names of the picture of configuration `i` and of the map of its error.
+pub fn picture_files(i: usize) -> [String; 2] {
+    [format!("picture-{i}.png"), format!("error-{i}.png")]
+}
+
+/// Claims the folder for the results of a study of at most `n` configurations.
+///
+/// # Errors
+/// Fails as [`ResultFolder::open`].
+pub fn open(place: &Path, existing: Existing, n: usize) -> Result<ResultFolder> {
+    let fixed = [TIMES_FILE, CONFIGURATIONS_FILE, Study::FILE, REFERENCE_FILE, CHART_FILE];
+    let pictures = (0..n).flat_map(picture_files);
+    let planned: Vec<String> =
+        fixed.iter().map(|name| (*name).to_owned()).chain(pictures).collect();
+    ResultFolder::open(place, "study", existing, &planned)
+}
+
+/// Writes the study and its tables together, while it runs or when it ended early.
 ///
 /// # Errors
 /// Fails if a file cannot be written.
-pub fn write(folder: &Path, study: &Study, results: &StudyResults) -> Result<()> {
-    replace_files(folder, &[TIMES_FILE, CONFIGURATIONS_FILE, Study::FILE], |folder| {
-        let rows = results.blocks.iter().enumerate().flat_map(|(i, b)| time_rows(study, i, b));
-        write_csv(&folder.join(TIMES_FILE), rows)?;
-        write_csv(&folder.join(CONFIGURATIONS_FILE), study.configurations.iter().map(csv_row))?;
-        json::write(&folder.join(Study::FILE), study)
+pub fn write(folder: &mut ResultFolder, study: &Study, results: &StudyResults) -> Result<()> {
+    folder.replace(&[TIMES_FILE, CONFIGURATIONS_FILE, Study::FILE], |to| {
+        write_tables(to, study, results)
     })
 }
 
-/// Removes the pictures and charts of an earlier study from a folder.
+/// Writes the study and its tables, a chart of it and `more` files together. A finished study
+/// replaces an earlier one.
 ///
 /// # Errors
-/// Fails if the folder cannot be read or a file cannot be removed.
-pub fn remove_earlier(folder: &Path) -> Result<()> {
-    let is_ours = |name: &str| {
-        let number = |begin| name.strip_prefix(begin).and_then(|rest| rest.strip_suffix(".png"));
-        let of_configuration = number("picture-").or(number("error-"));
-        of_configuration.is_some_and(|n| n.parse::<usize>().is_ok())
-            || ["front.svg", "reference.png"].contains(&name)
-    };
-    for entry in fs::read_dir(folder).map_err(|cause| Error::io(folder, cause))? {
-        let entry = entry.map_err(|cause| Error::io(folder, cause))?;
-        if entry.file_name().to_str().is_some_and(is_ours) {
-            fs::remove_file(entry.path()).map_err(|cause| Error::io(&entry.path(), cause))?;
+/// Fails as [`ResultFolder::finish`].
+pub fn write_last(
+    folder: &mut ResultFolder,
+    study: &Study,
+    results: &StudyResults,
+    chart: &str,
+    more: &[(String, PathBuf)],
+) -> Result<()> {
+    let copied = more.iter().map(|(name, _)| name.as_str());
+    let names: Vec<&str> =
+        copied.chain([CHART_FILE, TIMES_FILE, CONFIGURATIONS_FILE, Study::FILE]).collect();
+    let write = |to: &Path| {
+        for (name, from) in more {
+            fs::copy(from, to.join(name)).map_err(|cause| Error::of_io(from, &cause))?;
         }
-    }
-    Ok(())
+        write_atomic(&to.join(CHART_FILE), |file| file.write_all(chart.as_bytes()))?;
+        write_tables(to, study, results)
+    };
+    if study.interrupted { folder.replace(&names, write) } else { folder.finish(&names, write) }
+}
+
+fn write_tables(folder: &Path, study: &Study, results: &StudyResults) -> Result<()> {
+    let rows = results.blocks.iter().enumerate().flat_map(|(i, b)| time_rows(study, i, b));
+    write_csv(&folder.join(TIMES_FILE), rows)?;
+    write_csv(&folder.join(CONFIGURATIONS_FILE), study.configurations.iter().map(csv_row))?;
+    json::write(&folder.join(Study::FILE), study)
 }
 
 fn time_rows(study: &Study, i_block: usize, block: &TimedBlock) -> Vec<TimeRow> {

@@ -3,12 +3,13 @@ use std::collections::BTreeMap;
 use serde_json::json;
 
 use super::*;
+use crate::io::result_folder::Existing;
 use crate::measure::stats::Summary;
 use crate::timing::json::ResultFile;
 use crate::timing::machine::{Cpu, Device};
 use crate::timing::names::Setting;
 use crate::timing::records::Measured;
-use crate::timing::results::write_results;
+use crate::timing::results::{open_results, write_results};
 
 const LOOPS: [&str; 2] = ["serial", "parallel"];
 const N_WARM_UP: usize = 1;
@@ -314,7 +315,10 @@ fn a_missing_or_repeated_part_is_listed() {
 fn a_part_is_read_as_it_was_written_and_checked_against_its_range() {
     let dir = tempfile::tempdir().unwrap();
     let Part { run, table, name, node, range, .. } = part(2..4);
-    let write = |table: &FrameTable| write_results(dir.path(), &run, table, &Default::default());
+    let write = |table: &FrameTable| {
+        let mut folder = open_results(dir.path(), Existing::Extend, 0, false)?;
+        write_results(&mut folder, &run, table, &Default::default())
+    };
     let read = |range: Range<usize>| Part::read(dir.path(), name.clone(), node.clone(), range);
     write(&table).unwrap();
     std::fs::write(dir.path().join("case-1.png"), "a picture").unwrap();

@@ -1,0 +1,161 @@
+//! Places that one run of nimbus writes to at a time.
+//!
+//! A run locks the file `.NAME.claim` beside the place that it is going to write, from before its
+//! work until its results are there. The system releases the lock when the process ends, however it
+//! ends, so a claim that a killed run left behind keeps nobody out. A lock holds on one machine and
+//! on file servers that share locks (NFS does since version 4). A file system without locks takes
+//! no claims.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, ErrorKind, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use super::atomic::{self, Temporary};
+use crate::error::{Error, Result};
+
+/// Most characters of a claim that a message shows.
+const N_SHOWN: usize = 300;
+
+/// A place that this run alone may write to, until the claim is dropped.
+#[derive(Debug)]
+pub struct Claim {
+    /// The locked file. It is removed before it is closed, so that no other run locks it between.
+    _temporary: Temporary,
+    _file: File,
+}
+
+impl Claim {
+    /// Claims a file or folder that need not exist yet. Its parent folder must exist. Returns none
+    /// where the file system has no locks.
+    ///
+    /// # Errors
+    /// [`Error::Transient`] when another run has claimed the place, and [`Error::Io`] when nothing
+    /// can be written there.
+    pub fn take(place: &Path) -> Result<Option<Claim>> {
+        let failed = |cause: io::Error| Error::io(place, format!("cannot be written: {cause}"));
+        let path = path_of(place).map_err(failed)?;
+        loop {
+            let (mut file, path) = match open(&path) {
+                // The folder may be writable though its parent is not.
+                Err(_) if place.is_dir() => {
+                    let inside = place.join(".nimbus.claim");
+                    (open(&inside).map_err(failed)?, inside)
+                }
+                opened => (opened.map_err(failed)?, path.clone()),
+            };
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => return Err(taken(place, &mut file)),
+                Err(TryLockError::Error(_)) => {
+                    let _ = fs::remove_file(&path);
+                    return Ok(None);
+                }
+            }
+            // The run that held the lock may have removed the file before this one locked it.
+            if !is_at(&file, &path) {
+                continue;
+            }
+            let temporary = Temporary::registered(path);
+            let written = file.set_len(0).and_then(|()| file.write_all(owner().as_bytes()));
+            written.map_err(failed)?;
+            return Ok(Some(Claim { _temporary: temporary, _file: file }));
+        }
+    }
+}
+
+fn open(path: &Path) -> io::Result<File> {
+    OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path)
+}
+
+/// Returns the path of the claim of a place; different spellings of a place have one claim.
+fn path_of(place: &Path) -> io::Result<PathBuf> {
+    let place = match fs::canonicalize(place) {
+        Ok(whole) => whole,
+        Err(_) => {
+            let name = place.file_name().ok_or(ErrorKind::InvalidInput)?;
+            fs::canonicalize(atomic::folder_of(place))?.join(name)
+        }
+    };
+    let mut name = std::ffi::OsString::from(".");
+    name.push(place.file_name().ok_or(ErrorKind::InvalidInput)?);
+    name.push(".claim");
+    Ok(place.with_file_name(name))
+}
+
+/// Returns whether `path` still names the open file.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let id = |about: fs::Metadata| (about.dev(), about.ino());
+    let (open, named) = (file.metadata().map(id), fs::metadata(path).map(id));
+    open.is_ok_and(|open| named.is_ok_and(|named| named == open))
+}
+
+#[cfg(not(unix))]
+fn is_at(_: &File, path: &Path) -> bool {
+    path.exists()
+}
+
+/// Returns the text of this run's claim.
+fn owner() -> String {
+    let host = host_name().map_or(String::new(), |host| format!(" on {host}"));
+    format!("process {}{host}: {}\n", std::process::id(), command_line().join(" "))
+}
+
+/// Returns the error of a place that another run has claimed.
+fn taken(place: &Path, claim: &mut File) -> Error {
+    let mut text = String::new();
+    let _ = claim.rewind().and_then(|()| claim.take(4096).read_to_string(&mut text));
+    let shown: String = text.trim().replace('\n', " ").chars().take(N_SHOWN).collect();
+    let by = if shown.is_empty() { String::new() } else { format!(" ({shown})") };
+    let what = "another run of nimbus writes there";
+    let expected = "wait until it has ended, or name another place";
+    Error::Transient { what: format!("{}: {what}{by}; {expected}", place.display()) }
+}
+
+/// Returns the arguments of this process. Bytes that are not UTF-8 become U+FFFD.
+pub fn command_line() -> Vec<String> {
+    std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
+}
+
+/// Returns this machine's name, as the kernel or else the shell has it.
+pub fn host_name() -> Option<String> {
+    let kernel = fs::read_to_string("/proc/sys/kernel/hostname").ok();
+    // HOSTNAME comes last: a shell on another machine may have exported it.
+    kernel.or_else(|| std::env::var("HOSTNAME").ok()).map(|name| name.trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_has_one_claim_by_every_spelling_until_it_is_dropped() {
+        let dir = tempfile::tempdir().unwrap();
+        let place = dir.path().join("run");
+        let claim = Claim::take(&place).unwrap();
+        assert!(claim.is_some());
+        fs::create_dir(&place).unwrap();
+        let spellings = [place.clone(), place.join("."), dir.path().join("./run/../run")];
+        for spelling in &spellings {
+            let error = Claim::take(spelling).unwrap_err();
+            assert_eq!(error.exit_code(), 75);
+            let id = format!("process {}", std::process::id());
+            assert!(error.to_string().contains(&id), "{error}");
+        }
+        std::os::unix::fs::symlink(&place, dir.path().join("link")).unwrap();
+        assert!(Claim::take(&dir.path().join("link")).is_err());
+        drop(claim);
+        assert!(Claim::take(&place).is_ok());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2, "no claim is left");
+    }
+
+    #[test]
+    fn the_claim_of_a_process_that_was_killed_keeps_nobody_out() {
+        let dir = tempfile::tempdir().unwrap();
+        let place = dir.path().join("cloud.png");
+        fs::write(dir.path().join(".cloud.png.claim"), "process 1: nimbus").unwrap();
+        assert!(Claim::take(&place).unwrap().is_some());
+        assert!(Claim::take(&dir.path().join("gone/cloud.png")).is_err());
+    }
+}

@@ -23,6 +23,8 @@ mod grid_snap;
 mod handles;
 mod history;
 mod input;
+#[cfg(feature = "window")]
+mod key_groups;
 pub mod numbers;
 #[cfg(feature = "window")]
 mod overlay;
@@ -60,7 +62,8 @@ pub use viewport::Viewport;
 #[cfg(feature = "window")]
 pub(crate) use self::{
     acceptance::{BoxAcceptance, box_acceptances, mean_rate},
+    key_groups::key_groups,
     overlay::{Color, Shape, Stroke, overlay_shapes},
     recent_files::{RecentFiles, default_path},
-    shortcuts::{Command, SHORTCUTS, key_groups},
+    shortcuts::{Command, SHORTCUTS},
 };

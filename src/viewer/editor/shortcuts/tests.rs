@@ -35,7 +35,7 @@ fn every_chord_has_one_command() {
 #[test]
 #[cfg(feature = "window")]
 fn every_chord_is_in_one_group_of_the_list() {
-    let groups = key_groups();
+    let groups = crate::viewer::editor::key_groups();
     let listed: Vec<&str> = groups.iter().flat_map(|(_, keys)| keys.iter().map(|k| k.0)).collect();
     for shortcut in SHORTCUTS {
         assert_eq!(listed.iter().filter(|k| **k == shortcut.key).count(), 1, "{}", shortcut.key);

@@ -185,7 +185,8 @@ fn overrides_that_do_not_fit_are_named() {
         ("film.width=", "expected a value after `=`"),
         (
             "film.width=wide",
-            "`film.width`: expected an integer from 1 to 16384, found string \"wide\"",
+            "`film.width`: expected an integer from 1 to 16384, found string \"wide\"; for example \
+             `film.width=800`",
         ),
         (
             "film.widht=3",

@@ -70,7 +70,10 @@ fn files_that_are_no_text_are_refused() {
     fs::write(&path, format!("title = '{}'", "x".repeat(4 << 20))).unwrap();
     assert!(error().starts_with("scene.toml: too large: 5 MiB"));
     fs::write(&path, "\u{feff}title = 3").unwrap();
-    assert_eq!(error(), "scene.toml:1:9: `title`: expected a string, found integer 3");
+    assert_eq!(
+        error(),
+        "scene.toml:1:9: `title`: expected a string, found integer 3; write `title = \"3\"`"
+    );
 }
 
 #[test]

@@ -41,15 +41,22 @@ use std::process::ExitCode;
 use clap::{ColorChoice, Parser};
 
 use crate::error::{Error, Result};
+use crate::io::plain_text::plain;
 use crate::measure::zones::Zones;
 use args::{Args, Command};
 use interrupt::graceful_stop;
+
+/// Returns what clap shows, with arguments that have no characters that a terminal would obey.
+fn with_plain_words(shown: clap::Error) -> clap::Error {
+    let typed = std::env::args_os().map(|word| plain(&word.to_string_lossy()).into_owned());
+    Args::try_parse_from(typed).err().unwrap_or(shown)
+}
 
 /// Parses the command line, runs the command, prints its error and returns the exit code.
 pub fn main() -> ExitCode {
     let args = match Args::try_parse() {
         Ok(args) => args,
-        Err(shown) => return usage(&shown),
+        Err(shown) => return usage(&with_plain_words(shown)),
     };
     // If no handler can be set, Ctrl-C still ends the program, but leaves temporary files.
     let _ = ctrlc::set_handler(interrupt::handle);

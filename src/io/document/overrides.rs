@@ -101,7 +101,7 @@ pub fn put(
 
 /// Returns the path with the number that is missing before `segment`, or that a coordinate has.
 fn numbered(before: &[&str], segment: &str, after: &[&str]) -> String {
-    if segment.parse::<usize>().is_ok() {
+    if segment.chars().all(|c| c.is_ascii_digit()) {
         return String::new();
     }
     let (i_axis, rest) = match ["x", "y", "z"].iter().position(|axis| axis == &segment) {

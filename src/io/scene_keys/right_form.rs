@@ -14,8 +14,7 @@ pub fn readings(value: &Value) -> Vec<Value> {
         Value::Integer(_) | Value::Float(_) => of_number(value),
         Value::Boolean(flag) => {
             let names = if *flag { TRUE } else { FALSE };
-            let texts = names.iter().map(|name| Value::from(*name));
-            texts.chain([Value::Integer(i128::from(*flag))]).collect()
+            names.iter().map(|name| Value::from(*name)).collect()
         }
         Value::Array(items) => of_array(items),
         Value::Datetime | Value::Table(_) => vec![],

@@ -135,6 +135,9 @@ fn linear_steps(low: f64, high: f64, n_most: usize) -> Vec<f64> {
         return vec![];
     }
     let decade = 10f64.powf((span / n_most.max(1) as f64).log10().floor());
+    if !decade.is_normal() {
+        return vec![];
+    }
     let steps = [1.0, 2.0, 5.0, 10.0, 20.0].map(|unit| unit * decade);
     let multiples = |step: f64| {
         // With a tolerance, because 0.3 / 0.1 is below 3 in f64.

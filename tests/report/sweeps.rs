@@ -1,0 +1,74 @@
+//! The page of a sweep.
+
+use serde_json::json;
+
+use crate::browser::Browser;
+use crate::program::{path, run};
+use crate::report;
+
+#[test]
+fn a_sweep_has_one_plot_a_measure_and_fits_narrow_pages() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let out = path(&dir, "swept");
+    let scene = format!("{}/scenes/threads.toml", env!("CARGO_MANIFEST_DIR"));
+    let args = [
+        "bench",
+        &scene,
+        "--size",
+        "32x24",
+        "--frames",
+        "2",
+        "--warmup",
+        "0",
+        "--repeat",
+        "1",
+        "--no-saved",
+        "--threading",
+        "serial",
+        "--sweep",
+        "draw.particles=40,80,400",
+        "--sweep",
+        "draw.cutoff=2,3",
+        "--sweep",
+        "draw.path=tiles,sprites",
+        "--out",
+        &out,
+    ];
+    let output = run(&args);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let page = report(&dir, &[&out]);
+    let mut browser = Browser::new();
+    browser.size(1280, 900);
+    browser.open(&page);
+    // Particles along the axis, a line for each cutoff, a panel for each path.
+    let titles = browser.eval(
+        "[...document.querySelectorAll('.panels svg')].map(s => s.getAttribute('aria-label'))",
+    );
+    let of = |name: &str, path: &str| format!("{name} against draw.particles, {path}, serial");
+    let [tiles, sprites] = ["draw.path=tiles", "draw.path=sprites"];
+    assert_eq!(
+        titles,
+        json!([
+            of("Frame time", tiles),
+            of("Frame time", sprites),
+            of("GPU time", tiles),
+            of("GPU time", sprites)
+        ])
+    );
+    let marks = "document.querySelectorAll('.panels figure:first-child .mark').length";
+    assert_eq!(browser.eval(marks), json!(6));
+    let first = browser.eval("document.querySelector('.panels .mark title').textContent");
+    assert!(
+        first.as_str().is_some_and(|t| t.starts_with("draw.particles=40\ndraw.cutoff=2\n")),
+        "{first}"
+    );
+    // Wide tables scroll in their own box, at any width of the page.
+    for width in [1280, 640, 400] {
+        browser.size(width, 900);
+        browser.open(&page);
+        let fits = browser.eval("document.documentElement.scrollWidth <= innerWidth");
+        assert_eq!(fits, json!(true), "{width} pixels");
+    }
+    // Long tables are folded.
+    assert_eq!(browser.eval("document.querySelectorAll('details.folded').length > 0"), json!(true));
+}

@@ -22,7 +22,7 @@ pub fn write_painted(line: &str) {
 /// window prints while it runs.
 pub fn write_line_to_stdout(line: &str) {
     let mut out = std::io::stdout().lock();
-    let _ = out.write_all(format!("{line}\n").as_bytes()).and_then(|()| out.flush());
+    let _ = out.write_all(format!("{}\n", plain(line)).as_bytes()).and_then(|()| out.flush());
 }
 
 /// Writes a line to stderr, as `eprintln!` does, but never panics.

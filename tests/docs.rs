@@ -172,7 +172,7 @@ fn run_lines(page: &str, lines: Vec<String>) -> Vec<String> {
                 command.args(shrink(words(rest)));
                 command
             }
-            None if line.starts_with("cp ") || line.starts_with("mkdir ") => {
+            None if ["cp ", "mkdir ", "cat > "].iter().any(|name| line.starts_with(name)) => {
                 let mut command = Command::new("bash");
                 command.args(["-c", &line]);
                 command
@@ -230,9 +230,10 @@ fn a_command_is_made_small_wherever_its_options_stand() {
 #[test]
 fn pages_are_read_as_they_are_shown() {
     let text = "# A `b` C\n[x](y.md#z) ![p](q.png)\n```sh\n\
-                tools/nimbus render \\\n  a # c\nls\n```\n\
+                tools/nimbus render \\\n  a # c\nls\ncat > f <<'END'\n# x\nEND\n```\n\
                 ```toml\n[a](b)\n```\n## A `b` C\n";
     assert_eq!(markdown::links(text), ["y.md#z", "q.png"]);
     assert_eq!(markdown::anchors(text), ["a-b-c", "a-b-c-1"]);
-    assert_eq!(markdown::shell_lines(text), ["tools/nimbus render a", "ls"]);
+    let lines = ["tools/nimbus render a", "ls", "cat > f <<'END'\n# x\nEND"];
+    assert_eq!(markdown::shell_lines(text), lines);
 }

@@ -50,10 +50,23 @@ pub fn anchors(text: &str) -> Vec<String> {
 }
 
 /// Returns the lines of all `sh` blocks: continued lines joined, comments and empty lines left out.
+/// A file that is written by `cat > FILE <<'END'` is one line with all of its text.
 pub fn shell_lines(text: &str) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
-    let (mut is_shell, mut continues) = (false, false);
+    let (mut is_shell, mut continues, mut is_file) = (false, false, false);
     for line in text.lines() {
+        if is_file {
+            if let Some(file) = found.last_mut() {
+                *file = format!("{file}\n{line}");
+            }
+            is_file = line != "END";
+            continue;
+        }
+        is_file = is_shell && line.ends_with("<<'END'");
+        if is_file {
+            found.push(line.to_owned());
+            continue;
+        }
         if let Some(language) = line.trim_start().strip_prefix("```") {
             is_shell = !is_shell && language.trim() == "sh";
             continue;

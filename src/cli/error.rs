@@ -32,6 +32,7 @@ use crate::studies::error::study::{ErrorStudy, Event, StudyPlan, StudyResults};
 use crate::studies::provenance::{Provenance, ReferenceRecord};
 use crate::studies::reference_cache::{self, CachedReference};
 use crate::timing::json::ResultFile;
+use crate::timing::limits::check_study;
 use crate::timing::names::Setting;
 
 /// Runs `nimbus error`.
@@ -59,6 +60,8 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         n_rounds: args.rounds as usize,
         part: args.part.map(|part| part.first as usize..part.end as usize),
     };
+    let n_configurations = 1 + settings(&plan.axes, plan.design).len() as u64;
+    check_study(n_configurations, args.rounds, args.frames)?;
     let pixels = pixels(&scene, args.pixels)?;
     let existing = match (args.resume, args.force) {
         (true, _) => Existing::Extend,

@@ -20,6 +20,7 @@ use crate::studies::ledger::records::{Ledger, Row};
 use crate::studies::ledger::study::{LedgerParts, LedgerStudy, lock};
 use crate::studies::provenance::Provenance;
 use crate::timing::json::{self, ResultFile};
+use crate::timing::limits::check_study;
 
 const CHART: &str = "ledger.svg";
 /// Files of a ledger; the record is last.
@@ -45,6 +46,9 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
             args.reflections
         )));
     }
+    // The pictures that the device draws, one for each approximation of its own.
+    const MOST_DRAWN: u64 = 16;
+    check_study(MOST_DRAWN, args.rounds, args.frames)?;
     let (gpu, clocks) = open_for_study(&options, scene, time_s)?;
     let made = Provenance::now(Ledger::SCHEMA, &args.scene, &loaded, gpu.device.info(), clocks);
     let stop = graceful_stop();

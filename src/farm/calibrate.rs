@@ -13,7 +13,7 @@ use super::store::{ResultState, Store};
 use super::work::{AnyWork, Frames};
 use crate::error::{Error, Result};
 use crate::io::image::ImageKind;
-use crate::io::scene_file;
+use crate::io::{atomic, scene_file};
 
 /// Sizes of the pictures, relative to the scene's own along each side. They distinguish what grows
 /// with the pixels from what does not.
@@ -65,8 +65,7 @@ fn timed(
     n: u32,
     options: &RunOptions<'_>,
 ) -> Result<(Row, (String, Manifest))> {
-    let folder = tempfile::Builder::new().prefix("nimbus-calibrate-").tempdir();
-    let folder = folder.map_err(|cause| Error::io(&std::env::temp_dir(), cause))?;
+    let folder = atomic::temporary_folder("nimbus-calibrate")?;
     let mut set = set.to_vec();
     set.extend([format!("film.width={width}"), format!("film.height={height}")]);
     let work = AnyWork::Frames(Frames { first: 0, n, format: ImageKind::Png });

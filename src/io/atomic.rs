@@ -151,8 +151,17 @@ fn beside(path: &Path) -> Result<(Temporary, File)> {
 /// A temporary file or folder. Dropping it, or [`abandon`], removes what its path names then: after
 /// a rename, nothing.
 #[derive(Debug)]
-pub(super) struct Temporary {
-    pub path: PathBuf,
+pub struct Temporary {
+    pub(super) path: PathBuf,
+}
+
+/// Makes an empty folder for intermediate files in the system's folder for such.
+///
+/// # Errors
+/// When it cannot be made.
+pub fn temporary_folder(name: &str) -> Result<Temporary> {
+    let parent = std::env::temp_dir();
+    Temporary::folder(&parent, name).map_err(|cause| Error::io(&parent, cause))
 }
 
 impl Temporary {
@@ -180,6 +189,11 @@ impl Temporary {
         builder.prefix(&prefix).suffix(".nimbus.tmp");
         Temporary::register(|| Ok(((), builder.tempdir_in(parent)?.keep())))
             .map(|((), temporary)| temporary)
+    }
+
+    /// Returns the path.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     fn register<T>(make: impl FnOnce() -> io::Result<(T, PathBuf)>) -> io::Result<(T, Temporary)> {

@@ -13,6 +13,8 @@ pub const MOST_FRAMES: u64 = 500_000;
 pub const MOST_BLOCKS: u64 = 100_000;
 /// Most cases of a sweep, and most configurations of a study.
 pub const MOST_CASES: u64 = 4096;
+/// Most timed frames of a study. A frame has two times, and a line of `times.csv`.
+pub const MOST_STUDY_FRAMES: u64 = 2_000_000;
 /// Most bytes of the particles that all scenes of a run hold, and of the pictures that it keeps.
 pub const MOST_BYTES: u64 = 512 << 20;
 
@@ -29,6 +31,21 @@ pub fn check_cases(flag: &str, axes: impl Iterator<Item = usize>) -> Result<()> 
     if n > MOST_CASES {
         return Err(Error::limit(format!(
             "{flag}: {n} combinations, expected at most {MOST_CASES}; run them in parts"
+        )));
+    }
+    Ok(())
+}
+
+/// Checks that the times of a study fit in memory.
+///
+/// # Errors
+/// Fails if its configurations have too many timed frames together.
+pub fn check_study(n_configurations: u64, n_rounds: u32, n_frames: u32) -> Result<()> {
+    let n = n_configurations.saturating_mul(u64::from(n_rounds) * u64::from(n_frames));
+    if n > MOST_STUDY_FRAMES {
+        return Err(Error::limit(format!(
+            "{n} timed frames of {n_configurations} configurations, expected at most \
+             {MOST_STUDY_FRAMES}, whose times fit in memory: less of --rounds or --frames"
         )));
     }
     Ok(())

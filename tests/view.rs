@@ -275,6 +275,21 @@ fn changed_files_are_read_again_and_errors_keep_the_last_picture() {
         rgb.chunks_exact(3).filter(|p| p[0] > 130 && p[1] < 70 && p[2] < 70).count()
     };
     wait_for("alarm", || n_red() > 500);
+    // Texts that the compiler would not survive.
+    std::fs::create_dir(shaders.join("include")).expect("a folder");
+    write("shaders/include/walk.glsl", "#include \"walk.glsl\"\n");
+    let include = "\n#extension GL_GOOGLE_include_directive : require\n#include \"walk.glsl\"\n";
+    let itself = present.replacen('\n', include, 1);
+    for (text, message) in [
+        (present.replacen('\n', "\n\0", 1), "it holds a zero byte"),
+        (present.clone() + &"\n".repeat(100_000), "lines, the limit is"),
+        (present.clone() + &"(".repeat(1000), "brackets within each other"),
+        (itself, "more than 64 includes"),
+    ] {
+        write("shaders/present.frag", &text);
+        view.wait_for_text(message);
+    }
+    std::fs::remove_file(shaders.join("include/walk.glsl")).expect("it was there");
     write("shaders/present.frag", &present);
     wait_for("end of the alarm", || n_red() == 0);
     // The saved scene draws the saved picture.

@@ -21,7 +21,7 @@ const MAY_IMPORT: [(&str, &str); 18] = [
     ("io", "model"),
     ("layout", "model"),
     ("reference", "model"),
-    ("gpu", "model io"),
+    ("gpu", "io"),
     ("passes", "layout gpu"),
     ("frame", "passes layout gpu model"),
     ("measure", ""),

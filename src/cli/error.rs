@@ -60,8 +60,8 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         n_rounds: args.rounds as usize,
         part: args.part.map(|part| part.first as usize..part.end as usize),
     };
-    let n_configurations = 1 + settings(&plan.axes, plan.design).len() as u64;
-    check_study(n_configurations, args.rounds, args.frames)?;
+    let n_settings = settings(&plan.axes, plan.design).len() as u64;
+    check_study(1 + n_settings, args.rounds, args.frames)?;
     let pixels = pixels(&scene, args.pixels)?;
     let existing = match (args.resume, args.force) {
         (true, _) => Existing::Extend,

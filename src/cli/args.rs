@@ -36,8 +36,9 @@ pub use weather::WeatherArgs;
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "Start with:\n  nimbus render scenes/hello.toml -o hello.png\n  \
-    nimbus bench scenes/threads.toml\n  nimbus compare before after\n  nimbus report before after \
-    -o report.html\n  \
+    nimbus bench scenes/threads.toml --out before\n  \
+    nimbus bench scenes/threads.toml --set lighting.grid=32 --out after\n  \
+    nimbus compare before after --allow scene\n  nimbus report before after -o report.html\n  \
     nimbus inspect scenes/cubes-554.toml\n  nimbus weather scenes/weather/katrina.nc\n  nimbus \
     devices\n\n\
     Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver;\n  70 farm \

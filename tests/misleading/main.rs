@@ -7,3 +7,4 @@ mod program;
 mod forms;
 mod still;
 mod terminal;
+mod unseen;

@@ -151,7 +151,7 @@ pub fn without_scripts(browser: &mut Browser) {
     };
     assert_eq!(n(".slider"), 0);
     assert_eq!(n("thead button"), 0);
-    assert_eq!(n("figure.chart svg"), 12);
+    assert_eq!(n("figure.chart svg"), 10);
     // Per bench: loops, cases, passes; of the study: configurations and budgets; the ledger; of
     // the comparison: differences and ratios.
     assert_eq!(n("table"), 2 * 3 + 2 + 1 + 2);

@@ -130,6 +130,7 @@ pub fn charts(name: &str, measure: &str, figures: &[SweptFigure]) -> Vec<SweepCh
     let line_key = others
         .iter()
         .filter(|(_, values)| fits(values.len()))
+        .rev()
         .max_by_key(|(_, values)| values.len())
         .map(|(k, _)| k.as_str());
     let value_of = |f: &SweptFigure, key: &str| {

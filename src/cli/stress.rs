@@ -91,9 +91,8 @@ fn list(args: &StressArgs, chosen: &[Case]) -> String {
             let (family, n) = (first.family().to_owned(), cases.len().to_string());
             Some(vec![family, n, shortened(first.what, LINE)])
         }));
-        let more = "`nimbus stress --list FAMILY` lists the cases of a family; \
-            `nimbus stress FAMILY` runs them.";
-        return format!("{}\n{} cases. {more}\n", left_aligned(&rows), chosen.len());
+        let more = "`nimbus stress --list FAMILY` lists them, `nimbus stress FAMILY` runs them.";
+        return format!("{}\n{} cases.\n{more}\n", left_aligned(&rows), chosen.len());
     }
     if chosen.len() > 1 {
         let rows: Vec<Vec<String>> =

@@ -237,7 +237,7 @@ fn run(fixtures: &Fixtures, line: &[OsString]) {
     check_end(&format!("{line:?}"), &output);
 }
 
-/// Makes the folder of inputs anew: commands replace them.
+/// Makes the folder of inputs again: commands replace them.
 fn renew(fixtures: &Fixtures) {
     let (from, to) = (fixtures.dir.path().join("kept"), fixtures.dir.path().join("now"));
     let _ = fs::remove_dir_all(&to);

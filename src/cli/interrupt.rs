@@ -57,7 +57,8 @@ pub fn keep(patience: Duration, save: impl FnOnce() -> Error + Send + 'static) -
     Keeping(())
 }
 
-/// Declares that the command ends by itself after Ctrl-C, however long that takes.
+/// Declares that the command, which has a window, ends by itself after Ctrl-C.
+#[cfg(feature = "window")]
 pub fn keep_by_itself() -> Keeping {
     *lock() = Some(Kept { patience: None, save: Box::new(|| Error::Interrupted) });
     Keeping(())

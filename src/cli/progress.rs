@@ -108,7 +108,7 @@ pub struct ReferenceProgress {
     quiet: bool,
 }
 
-/// What the terminal shows.
+/// The line that the terminal shows.
 enum Shown {
     /// Nothing, while one line replaces another.
     Nothing,

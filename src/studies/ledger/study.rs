@@ -39,7 +39,7 @@ pub struct LedgerStudy<'a> {
     pub n_reflections: u32,
     /// Ends the study early once it is set.
     pub stop: &'a AtomicBool,
-    /// What is finished, which other threads may look at.
+    /// The finished parts, which other threads may look at.
     pub parts: &'a Mutex<LedgerParts>,
 }
 

@@ -176,7 +176,10 @@ fn an_interrupted_render_ends_at_once_and_leaves_nothing() {
         if output.status.success() {
             return false;
         }
-        assert_eq!((output.status.code(), &output.stderr[..]), (Some(130), &b""[..]));
+        assert_eq!(
+            (output.status.code(), &output.stderr[..]),
+            (Some(130), &b"error: interrupted\n"[..])
+        );
         assert!(cpu_s < 2.0, "{cpu_s} s of work after the signal");
         assert_eq!(names(), 0, "neither a picture nor a part of one");
         true

@@ -329,6 +329,7 @@ fn bench_replaces_only_its_own_files() {
         "frames.csv",
         "passes.svg",
         "run.json",
+        "run.sha256",
     ];
     assert_eq!(swept, all);
     // The picture equals that of `render`.
@@ -341,5 +342,8 @@ fn bench_replaces_only_its_own_files() {
         assert!(kept == drawn, "{exposure}");
     }
     fs::write(format!("{out}/picture-7.png"), "mine").expect("a file");
-    assert_eq!(bench(&["--force"]), ["case-0.png", "frames.csv", "picture-7.png", "run.json"]);
+    assert_eq!(
+        bench(&["--force"]),
+        ["case-0.png", "frames.csv", "picture-7.png", "run.json", "run.sha256"]
+    );
 }

@@ -57,7 +57,7 @@ fn a_sweep_has_one_plot_a_measure_and_fits_narrow_pages() {
     );
     let marks = "document.querySelectorAll('.panels figure:first-child .mark').length";
     assert_eq!(browser.eval(marks), json!(6));
-    let first = browser.eval("document.querySelector('.panels .mark title').textContent");
+    let first = browser.eval("document.querySelector('.panels .mark').getAttribute('aria-label')");
     assert!(
         first.as_str().is_some_and(|t| t.starts_with("draw.particles=40\ndraw.cutoff=2\n")),
         "{first}"

@@ -40,7 +40,7 @@ mod tests {
 
     #[test]
     fn numbers_that_no_memory_holds_are_refused() {
-        assert!(check_memory(2560 * 1440, 1 << 10, 100_000).is_ok());
+        assert!(check_memory(1920 * 1080, 1 << 6, 100_000).is_ok());
         assert!(check_memory(0, 1, 5_000_000).is_ok());
         for (pixels, samples, particles) in
             [(1 << 28, 1, 0), (1 << 22, 1 << 20, 0), (1, 1, u64::MAX), (u64::MAX, 1, u64::MAX)]

@@ -76,10 +76,6 @@ impl User {
         self.does(chord(Key::Char(key), true));
     }
 
-    fn escape(&mut self) {
-        self.does(chord(Key::Escape, false));
-    }
-
     fn types(&mut self, field: Field, text: &str) {
         self.does(Input::Typed { field, text: text.to_owned() });
     }
@@ -150,7 +146,7 @@ fn a_rectangle_selects_and_escape_drops_it() {
     user.presses(Button::Left, NONE);
     user.moves(b, NONE);
     assert_eq!((user.0.feedback().rectangle, user.selected()), (Some([a, b]), [].as_slice()));
-    user.escape();
+    user.does(chord(Key::Escape, false));
     assert_eq!(user.0.feedback().rectangle, None);
     user.releases(Button::Left);
     assert!(user.selected().is_empty());
@@ -216,7 +212,7 @@ fn escape_cancels_a_drag_and_losing_the_focus_ends_it() {
     user.does(Input::Wheel(3.0));
     user.key('f');
     assert_eq!(user.0.viewport().pose, pose);
-    user.escape();
+    user.does(chord(Key::Escape, false));
     assert_eq!(user.boxes()[0].center, DVec3::ZERO);
     user.moves(from - 90.0 * DVec2::Y, NONE);
     user.releases(Button::Left);
@@ -356,7 +352,7 @@ fn a_question_blocks_other_input_until_it_is_answered() {
         (2, 2, 1.0)
     );
     assert_eq!(user.0.camera().position(), controller().camera().position());
-    user.escape();
+    user.does(chord(Key::Escape, false));
     assert_eq!(user.0.session().question(), None);
     assert_eq!((user.selected().len(), user.1.len()), (2, 0));
     user.with_ctrl('q');
@@ -388,17 +384,14 @@ fn settings_help_and_window_size_change_no_box() {
     user.key('?');
     assert!(user.0.shows_help());
     user.with_ctrl('a');
-    user.escape();
+    user.does(chord(Key::Escape, false));
     assert_eq!((user.0.shows_help(), user.selected().len()), (false, 2));
     user.key('3');
     assert_eq!(user.0.editor().settings().display, DisplayMode::Both);
-    user.does(Input::Resized { size_px: DVec2::new(400.0, 200.0), px_per_point: 2.0 });
-    assert_eq!(
-        (user.0.viewport().size_px, user.0.viewport().px_per_point),
-        (DVec2::new(400.0, 200.0), 2.0)
-    );
+    let size_px = DVec2::new(400.0, 200.0);
+    user.does(Input::Resized { size_px, px_per_point: 2.0 });
     user.does(Input::Resized { size_px: DVec2::ZERO, px_per_point: 2.0 });
-    assert_eq!(user.0.viewport().size_px, DVec2::new(400.0, 200.0));
+    assert_eq!((user.0.viewport().size_px, user.0.viewport().px_per_point), (size_px, 2.0));
     user.moves(DVec2::NAN, NONE);
     assert_eq!(user.0.feedback().hovered, None);
     assert!(!user.0.session().is_dirty());

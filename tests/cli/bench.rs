@@ -177,7 +177,15 @@ fn an_interrupted_bench_keeps_its_finished_part() {
     let dir = temp();
     let out = path(&dir, "run");
     let program = assert_cmd::cargo::cargo_bin("nimbus");
-    let args = ["bench", "scenes/hello.toml", "--repeat", "1", "--frames", "100000", "--out", &out];
+    let args = [
+        "bench",
+        "scenes/hello.toml",
+        "--repeat=1",
+        "--frames=100000",
+        "--warmup=0",
+        "--out",
+        &out,
+    ];
     // The folder is made before the first frame, and one frame is always finished.
     let is_begun = || Path::new(&out).exists();
     let mut command = std::process::Command::new(program);

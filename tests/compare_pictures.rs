@@ -196,7 +196,7 @@ fn other_arguments_give_one_clear_error() {
         ),
         (&[&a, &a, "--fail-below", "rmse=30"], "--fail-below rmse: expected one of psnr, ssim"),
         (&[&a, &a, "--fail-above", "rmse"], "expected METRIC=VALUE such as rmse=1e-3"),
-        (&[&a, &a, "--pixels-per-degree", "0"], "expected a number above 0"),
+        (&[&a, &a, "--pixels-per-degree", "0"], "expected a number from 1 to 500"),
         (&[&a, &a, "-o", &dir.path("map.exr")], "expected a file name that ends in .png"),
     ] {
         let (code, stdout, stderr) = compare(args);

@@ -15,7 +15,8 @@ fn on_slurm_240_frames_are_the_frames_of_one_machine() {
     let (_, merge) = farm.submit(&cluster, &[]);
     farm.wait_for_job(&cluster, &merge);
     let merged = content(&farm.merged());
-    assert_eq!(merged.len(), 240);
+    // The frames and their list.
+    assert_eq!(merged.len(), 240 + 1);
     assert!(merged == alone("240", "64x48"), "the merged frames differ from one machine's");
     let attempts = farm.attempts();
     let nodes: BTreeSet<&str> =

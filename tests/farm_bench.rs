@@ -291,8 +291,8 @@ fn jobs_of_a_bench_have_their_node_to_themselves() {
 
 #[test]
 fn a_part_that_is_ended_leaves_no_result_and_may_be_tried_again() {
-    // Hours, unless it is ended.
-    let farm = Farm::of(SCENE, &["--bench", "--", "--repeat", "100000"]);
+    // Some ten minutes or more, unless it is ended.
+    let farm = Farm::of(SCENE, &["--bench", "--", "--repeat", "500"]);
     let mut run = farm.command(0).arg("--quiet").spawn().expect("the program runs");
     // The folder of its results is made once the device is open.
     wait_for("the part's folder", || {

@@ -149,7 +149,7 @@ fn a_full_disk_is_exit_code_75_and_leaves_no_half_result() {
     let mut command = Command::new("unshare");
     command.args(["--mount", "--map-root-user", "sh", "-c", &script]);
     let (code, out, errors) = outcome(&command.output().expect("unshare"));
-    assert!(code == Some(75) && errors.contains("No space left"), "{out}{errors}");
+    assert!(code == Some(75) && errors.contains("no space left"), "{out}{errors}");
     let place = farm.place(0);
     let key = place.file_name().expect("a key").to_string_lossy();
     assert!(!out.lines().any(|name| name == key), "{out}");

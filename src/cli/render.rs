@@ -22,12 +22,13 @@ use crate::timing::machine::device_record;
 pub fn run(args: &RenderArgs) -> Result<()> {
     // Faults of the arguments are reported before any work.
     ImageKind::of(&args.output)?;
-    let _claim = output::claim_file(&args.output, args.force)?;
+    output::refuse_existing(&args.output, args.force)?;
     let loaded = load(&args.scene, &args.options)?;
     let time_s = args.time.unwrap_or_else(|| loaded.scene.time.at(args.frame));
     let i_frame = args.time.map_or(args.frame, |time_s| loaded.scene.time.frame_at(time_s));
     let scene = loaded.at_frame(i_frame);
     check_time(&scene, time_s)?;
+    let _claim = output::claim_file(&args.output, args.force)?;
     match args.reference {
         Some(reference) => render_reference::run(args, reference, &scene, time_s),
         None => render(args, scene, time_s),

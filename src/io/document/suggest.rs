@@ -44,19 +44,23 @@ pub fn suggestion(typed: &str, known: &[&str]) -> String {
     if text.is_empty() { ";".to_owned() } else { text }
 }
 
+/// Returns text with every character escaped that a terminal would obey.
+pub fn escaped(text: &str) -> String {
+    let mut escaped = String::new();
+    for c in text.chars() {
+        if is_harmful(c) { escaped.extend(c.escape_debug()) } else { escaped.push(c) }
+    }
+    escaped
+}
+
 /// Returns a word of an input for a message: cut where it is long, and without characters that a
 /// terminal would obey.
 pub fn shown(word: &str) -> String {
     const LONGEST: usize = 80;
-    let mut shown = String::new();
-    for (i, c) in word.chars().enumerate() {
-        if i == LONGEST {
-            shown.push('…');
-            break;
-        }
-        if is_harmful(c) { shown.extend(c.escape_debug()) } else { shown.push(c) }
+    match word.char_indices().nth(LONGEST) {
+        Some((end, _)) => escaped(&word[..end]) + "…",
+        None => escaped(word),
     }
-    shown
 }
 
 /// Lists the first of the names that an input gave.

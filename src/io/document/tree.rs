@@ -8,7 +8,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::depth::too_deep;
-use super::suggest::shown;
+use super::suggest::escaped;
 use crate::error::{Error, Place, Result};
 use crate::io::text_file::{self, line_column};
 
@@ -148,9 +148,11 @@ impl Source {
                 let (line, column) = line_column(&self.text, offset);
                 Place::line(&self.path, line, column)
             }
-            Origin::Override(i) => {
-                Place { source: format!("--set {}", shown(&self.overrides[i])), line: 0, column: 0 }
-            }
+            Origin::Override(i) => Place {
+                source: format!("--set {}", escaped(&self.overrides[i])),
+                line: 0,
+                column: 0,
+            },
             Origin::Default => Place::file(&self.path),
         }
     }

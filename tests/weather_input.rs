@@ -22,7 +22,7 @@ fn files_that_are_no_netcdf_are_refused() {
     let of = |path: &Path| wrf::open(path).err().expect("an error").to_string();
     assert!(of(Path::new("/nowhere/of/nimbus.nc")).ends_with("nimbus.nc: no such file"));
     let dir = tempfile::tempdir().expect("a folder");
-    assert!(of(dir.path()).ends_with(": is a folder, expected a NetCDF file"));
+    assert!(of(dir.path()).ends_with(": is a folder, expected a file"));
     assert_eq!(message_of(b""), "the file is empty: expected a NetCDF file");
     let not_netcdf = "expected \"CDF\" and 1, 2 or 5, or \"\\x89HDF\"";
     assert_eq!(

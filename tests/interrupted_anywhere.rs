@@ -74,7 +74,7 @@ fn every_long_command_ends_soon_after_ctrl_c() {
             let what = format!("{line} interrupted after {after_s:.2} s");
             let args = line.split(' ').map(|word| word.replace("OUT", "out"));
             let mut command = fixtures.command(args);
-            // Nobody reads a pipe before the end: a full one would stop the command.
+            // This test reads no pipe before the end, and a full one would stop the command.
             let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
             let (output, used_s) = interrupt_after(child.expect("a child"), after_s);
             check_end(&what, &output);

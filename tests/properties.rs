@@ -18,7 +18,7 @@ use generated::check;
 use glam::DVec3;
 use nimbus::error::{Error, Place};
 use nimbus::io::box_file;
-use nimbus::io::plain_text::is_harmful;
+use nimbus::io::plain_text::one_line;
 use nimbus::io::scene_file::{LoadedScene, parse_beside};
 use nimbus::model::boxes::CloudBox;
 use proptest::collection::vec;
@@ -124,12 +124,8 @@ fn odd_overrides_load_or_are_named_in_the_error() {
         };
         // Otherwise the error is in the scene, which may lack a key, or in a file that it names.
         // Harmful characters of an argument are escaped where it is named.
-        let shown = |c: char| match is_harmful(c) {
-            true => c.escape_debug().to_string(),
-            false => c.to_string(),
-        };
-        let shown = |text: &String| text.chars().map(shown).collect::<String>();
-        let is_named = overrides.iter().any(|text| at.source == format!("--set {}", shown(text)));
+        let is_at = |text: &String| at.source == format!("--set {}", one_line(text));
+        let is_named = overrides.iter().any(is_at);
         prop_assert!(is_named || !at.source.starts_with("--set"), "{error}");
         Ok(())
     });

@@ -42,7 +42,8 @@ pub use weather::WeatherArgs;
     nimbus inspect scenes/cubes-554.toml\n  nimbus weather scenes/weather/katrina.nc\n  nimbus \
     devices\n\n\
     Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver;\n  70 farm \
-    results that differ; 75 another run writes there, or another try may succeed;\n  101 a fault of nimbus itself; 130 interrupted.")]
+    results that differ; 75 another run writes there, or another try may succeed;\n  101 \
+    a fault of nimbus itself; 130 interrupted.")]
 pub struct Args {
     /// The command.
     #[command(subcommand)]

@@ -7,19 +7,18 @@ use std::sync::{Arc, Mutex, PoisonError};
 use clap::ColorChoice;
 
 use super::args::{BenchArgs, SceneArgs};
-use super::bench_cases::{BenchCases, bench_cases};
+use super::bench_cases::{BenchCases, bench_cases, plan};
 use super::bench_record::{Recorder, Runs, print_json};
 use super::interrupt::{self, PATIENCE};
-use super::output::{claim_file, refuse_existing};
+use super::output::{SharedFolder, claim_file, lock_folder, refuse_existing};
 use super::progress::progress;
 use super::scene::{device_choice, print_sizes};
 use crate::error::{Error, Result};
 use crate::frame::{Stage, limits};
 use crate::io::result_folder::Existing;
 use crate::measure::zones::Zones;
-use crate::timing::blocks::{self, BenchPlan, Finished, Outcome};
+use crate::timing::blocks::{self, Finished, Outcome};
 use crate::timing::cases::Case;
-use crate::timing::limits::check_bench;
 use crate::timing::machine;
 use crate::timing::results::open_results;
 
@@ -54,8 +53,7 @@ pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
     // at once and no folder is made for results that will not come.
     let quiet = SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
     for scene in &args.scenes {
-        let BenchCases { cases, .. } = bench_cases(args, scene, &quiet)?;
-        check_bench(&cases, &plan(args))?;
+        bench_cases(args, scene, &quiet)?;
     }
     let runs = Runs::default();
     let mut ended = Ok(());
@@ -123,7 +121,7 @@ fn bench_scene(
         args,
         color,
         path,
-        folder: Mutex::new(None),
+        folder: SharedFolder::default(),
         cases,
         scene_hash,
         resolved,
@@ -141,16 +139,15 @@ fn bench_scene(
     };
     if let Some(dir) = &out {
         let Recorder { args, cases, .. } = &*recorder;
-        let existing = if args.force { Existing::Replace } else { Existing::Refuse };
-        let folder = open_results(dir, existing, cases.len(), args.plot)?;
-        *recorder.folder() = Some(folder);
+        let folder = open_results(dir, Existing::new(args.force), cases.len(), args.plot)?;
+        *lock_folder(&recorder.folder) = Some(folder);
     }
     let ended = time(stage, &recorder, context.stop, &outcome);
     keeping.finish();
     let outcome = std::mem::take(&mut *blocks::lock(&outcome));
     let Finished { stage, failure } = ended;
     if let (Some(failure), true) = (&failure, outcome.samples.is_empty()) {
-        drop(recorder.folder().take());
+        drop(lock_folder(&recorder.folder).take());
         return Err(failure.clone());
     }
     let later = match (&recorder.args.trace, &stage) {
@@ -179,13 +176,4 @@ fn time(
     let ended = blocks::run(stage, cases, plan, stop, outcome, &mut || bar.inc(1));
     bar.finish_and_clear();
     ended
-}
-
-fn plan(args: &BenchArgs) -> BenchPlan {
-    BenchPlan {
-        n_warm_up: args.warmup,
-        n_rounds: args.repeat,
-        hash_frames: args.hash_frames,
-        pictures: args.out.is_some(),
-    }
 }

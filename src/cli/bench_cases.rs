@@ -9,8 +9,9 @@ use crate::error::{Error, Result};
 use crate::farm::{Workload, bench_workload};
 use crate::io::console::say;
 use crate::model::scene::Threading;
+use crate::timing::blocks::BenchPlan;
 use crate::timing::cases::{Case, LoopChoice, cases};
-use crate::timing::limits::{SceneMemory, check_cases};
+use crate::timing::limits::{SceneMemory, check_bench, check_cases};
 use crate::timing::names::sweep_text;
 use crate::timing::parts::numbers;
 use crate::timing::sweep::{Axis, SIZE_KEY, points};
@@ -28,7 +29,8 @@ pub struct BenchCases {
 /// Loads the scene at `path` at every point of the sweep.
 ///
 /// # Errors
-/// Fails if the sweep or a scene is faulty, or there are no such cases as `--part` names.
+/// Fails if the sweep or a scene is faulty, there are no such cases as `--part` names, or the records
+/// of all frames would not fit in memory.
 pub fn bench_cases(args: &BenchArgs, path: &Path, options: &SceneArgs) -> Result<BenchCases> {
     let modes: &[Threading] = match args.threading {
         ThreadingArg::Serial => &[Threading::Serial],
@@ -57,8 +59,20 @@ pub fn bench_cases(args: &BenchArgs, path: &Path, options: &SceneArgs) -> Result
             all.extend(cases(at, &point, args.frames, loops));
         }
     }
-    let cases = of_part(args, all)?.into_iter().map(Case::with_figure).collect::<Result<_>>()?;
+    let cases: Vec<Case> =
+        of_part(args, all)?.into_iter().map(Case::with_figure).collect::<Result<_>>()?;
+    check_bench(&cases, &plan(args))?;
     Ok(BenchCases { cases, scene_hash, resolved })
+}
+
+/// Returns the blocks that the arguments ask for.
+pub fn plan(args: &BenchArgs) -> BenchPlan {
+    BenchPlan {
+        n_warm_up: args.warmup,
+        n_rounds: args.repeat,
+        hash_frames: args.hash_frames,
+        pictures: args.out.is_some(),
+    }
 }
 
 /// Returns the cases of `--part` after the first of all; all cases without `--part`.

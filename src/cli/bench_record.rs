@@ -1,17 +1,17 @@
 //! Turns the samples of a bench into its record, files and tables, at its end or at Ctrl-C.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::ColorChoice;
 
 use super::args::BenchArgs;
+use super::output::{SharedFolder, lock_folder};
 use super::{bench_plot, bench_table, output};
 use crate::error::{Error, Result};
 use crate::gpu::{ClockFit, ClockSample, DeviceInfo};
 use crate::io::claim::command_line;
 use crate::io::console::say;
-use crate::io::result_folder::ResultFolder;
 use crate::measure::zones::Zones;
 use crate::timing::attachments::Attachments;
 use crate::timing::blocks::{self, BenchPlan, Outcome};
@@ -32,7 +32,7 @@ pub struct Recorder {
     /// The scene file.
     pub path: PathBuf,
     /// The results folder, from when it is claimed.
-    pub folder: Mutex<Option<ResultFolder>>,
+    pub folder: SharedFolder,
     /// The cases that are timed.
     pub cases: Vec<Case>,
     /// SHA-256 of the scene without a sweep.
@@ -95,7 +95,7 @@ impl Recorder {
         let mut outcome = blocks::lock(outcome).clone();
         outcome.interrupted = true;
         if outcome.samples.is_empty() {
-            drop(self.folder().take());
+            drop(lock_folder(&self.folder).take());
             return Error::Interrupted;
         }
         let printed = self.record(&outcome, &[], true).and_then(|run| {
@@ -127,7 +127,7 @@ impl Recorder {
     }
 
     fn write(&self, run: &Run, table: &FrameTable, outcome: &Outcome) -> Result<()> {
-        let mut folder = self.folder();
+        let mut folder = lock_folder(&self.folder);
         let Some(folder) = &mut *folder else { return Ok(()) };
         let charts = if self.args.plot { bench_plot::files(run, &table.rows)? } else { vec![] };
         let pictures = outcome.pictures.clone();
@@ -135,11 +135,6 @@ impl Recorder {
         let written = write_results(folder, run, table, &attachments);
         output::kept_apart(folder, self.args.options.quiet);
         written
-    }
-
-    /// Locks the results folder.
-    pub fn folder(&self) -> MutexGuard<'_, Option<ResultFolder>> {
-        self.folder.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Prints the tables.

@@ -63,11 +63,7 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     let n_settings = settings(&plan.axes, plan.design).len() as u64;
     check_study(1 + n_settings, args.rounds, args.frames)?;
     let pixels = pixels(&scene, args.pixels)?;
-    let existing = match (args.resume, args.force) {
-        (true, _) => Existing::Extend,
-        (false, true) => Existing::Replace,
-        (false, false) => Existing::Refuse,
-    };
+    let existing = if args.resume { Existing::Extend } else { Existing::new(args.force) };
     let stop = graceful_stop();
     let folder = SharedFolder::default();
     let mut keeping = {
@@ -194,7 +190,9 @@ fn time_kind(args: &ErrorArgs, has_timestamps: bool) -> Result<TimeKind> {
     }
 }
 
-/// Returns the greatest number of configurations that the study in `--out` may have in the end.
+/// Returns the greatest number of configurations that the study in `--out` may have in the end. The
+/// earlier results are read again once the folder is claimed, because another run may extend them
+/// until then.
 fn n_configurations(args: &ErrorArgs, plan: &StudyPlan) -> usize {
     let earlier = args.out.as_ref().filter(|_| args.resume);
     let earlier = earlier.and_then(|out| files::read_earlier(out).ok());

@@ -135,17 +135,6 @@ fn wait_and_save(patience: Duration) {
 
 /// Ends the process at once.
 fn end(error: &Error) -> ! {
-    atomic::abandon();
     output::error(error, clap::ColorChoice::Never);
-    leave(error.exit_code())
-}
-
-/// Ends the process without exit handlers: other threads may still use the driver, whose handlers
-/// would free what they use.
-fn leave(code: u8) -> ! {
-    unsafe extern "C" {
-        fn _exit(code: std::ffi::c_int) -> !;
-    }
-    // SAFETY: ends the process; nothing after it runs.
-    unsafe { _exit(i32::from(code)) }
+    atomic::abandon_and_exit(error.exit_code())
 }

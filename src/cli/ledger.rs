@@ -62,8 +62,8 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
             (args.clone(), made.clone(), pixels.clone(), parts.clone(), folder.clone());
         interrupt::keep(PATIENCE, move || cut_short(&args, &folder, made, frames, &pixels, &parts))
     };
-    let existing = if args.force { Existing::Replace } else { Existing::Refuse };
-    let open = |out| ResultFolder::open(out, "ledger", existing, &FILES.map(str::to_owned));
+    let (existing, planned) = (Existing::new(args.force), FILES.map(str::to_owned));
+    let open = |out| ResultFolder::open(out, "ledger", existing, &planned);
     *lock_folder(&folder) = args.out.as_deref().map(open).transpose()?;
     let shown = ReferenceProgress::new(args.options.quiet);
     let study = LedgerStudy {
@@ -122,10 +122,7 @@ fn deliver(args: &LedgerArgs, folder: &SharedFolder, ledger: &Ledger) -> Result<
             output::write_chart(&folder.join(CHART), &charts::ledger::chart(ledger))?;
             json::write(&folder.join(Ledger::FILE), ledger)
         };
-        let written = match ledger.interrupted {
-            true => folder.replace(&FILES, write),
-            false => folder.finish(&FILES, write),
-        };
+        let written = folder.write_last(!ledger.interrupted, &FILES, write);
         output::kept_apart(folder, args.options.quiet);
         written?;
     }

@@ -38,7 +38,7 @@ pub fn merge(folder: &Path, plan: &Plan, options: &MergeOptions<'_>) -> Result<M
     plan.work.merge(&Merge {
         results: &results,
         out,
-        existing: if force { Existing::Replace } else { Existing::Refuse },
+        existing: Existing::new(force),
         scene: &plan.scene,
         build: [&plan.nimbus, &plan.revision, &plan.code],
         load: &|| plan.scene_as_planned(),

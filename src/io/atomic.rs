@@ -2,7 +2,7 @@
 //!
 //! A file is written under a temporary name in its own folder and renamed into its place, so that a
 //! reader, a crash or Ctrl-C finds the old file or the new one, whole. Ctrl-C must call
-//! [`abandon`] for that. The functions whose names end in `_synced` also wait until the content
+//! [`abandon_and_exit`] for that. The functions whose names end in `_synced` also wait until the content
 //! and the name are on the disk, so that the file outlasts a power cut.
 
 use std::fmt::Display;
@@ -19,18 +19,24 @@ use crate::error::{Error, Result};
 /// its lock is held.
 static IN_PROGRESS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Locks the list of temporaries; [`abandon`] waits until the lock is free.
+/// Locks the list of temporaries; [`abandon_and_exit`] waits until the lock is free.
 pub(super) fn in_progress() -> MutexGuard<'static, Vec<PathBuf>> {
     // A panic elsewhere cannot leave a list of paths half changed.
     IN_PROGRESS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes every temporary and keeps all threads from beginning or finishing another file. The
-/// caller must end the process at once.
-pub fn abandon() {
+/// Removes every temporary, keeps all threads from beginning or finishing another file, and ends
+/// the process without exit handlers: other threads may still use the driver, whose handlers would
+/// free what they use.
+pub fn abandon_and_exit(code: u8) -> ! {
     let paths = in_progress();
     paths.iter().for_each(|path| remove(path));
     std::mem::forget(paths);
+    unsafe extern "C" {
+        fn _exit(code: std::ffi::c_int) -> !;
+    }
+    // SAFETY: ends the process; nothing after it runs.
+    unsafe { _exit(i32::from(code)) }
 }
 
 /// Removes a file, or a folder with all that it holds. One that cannot be removed stays.
@@ -148,7 +154,7 @@ fn beside(path: &Path) -> Result<(Temporary, File)> {
     Temporary::file(path).map_err(|e| Error::io(path, format!("cannot be written: {e}")))
 }
 
-/// A temporary file or folder. Dropping it, or [`abandon`], removes what its path names then: after
+/// A temporary file or folder. Dropping it, or [`abandon_and_exit`], removes what its path names then: after
 /// a rename, nothing.
 #[derive(Debug)]
 pub struct Temporary {

@@ -18,6 +18,12 @@ pub fn plain(text: &str) -> Cow<'_, str> {
     replaced(text, |c| c != '\n' && c != '\t' && is_harmful(c), |c| c.escape_unicode().to_string())
 }
 
+/// Returns text of one line: every harmful character, line feeds and tabs as well, is escaped as in
+/// Rust's strings.
+pub fn one_line(text: &str) -> Cow<'_, str> {
+    replaced(text, is_harmful, |c| c.escape_debug().to_string())
+}
+
 /// Returns JSON with every harmful character in the form `\u001b`. Outside of strings, JSON has
 /// only line feeds, which stay.
 pub fn plain_json(json: &str) -> Cow<'_, str> {

@@ -34,6 +34,13 @@ pub enum Existing {
     Extend,
 }
 
+impl Existing {
+    /// Returns the rule of a command that continues no results.
+    pub fn new(is_forced: bool) -> Existing {
+        if is_forced { Existing::Replace } else { Existing::Refuse }
+    }
+}
+
 /// A folder that this run alone writes results to.
 #[derive(Debug)]
 pub struct ResultFolder {
@@ -152,6 +159,20 @@ impl ResultFolder {
     pub fn replace(&mut self, names: &[&str], write: impl Fn(&Path) -> Result<()>) -> Result<()> {
         let at = self.unfinished()?;
         self.put(&at, &[], names, &write)
+    }
+
+    /// Writes the last files of a run: as [`ResultFolder::finish`] if its results are finished, else
+    /// as [`ResultFolder::replace`].
+    ///
+    /// # Errors
+    /// Fails as these.
+    pub fn write_last(
+        &mut self,
+        is_finished: bool,
+        names: &[&str],
+        write: impl Fn(&Path) -> Result<()>,
+    ) -> Result<()> {
+        if is_finished { self.finish(names, write) } else { self.replace(names, write) }
     }
 
     /// Writes the last files of finished results, and puts all files of this run into the place

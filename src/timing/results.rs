@@ -76,7 +76,7 @@ pub fn open_results(
 /// ones.
 ///
 /// # Errors
-/// Fails as [`ResultFolder::finish`].
+/// Fails as [`ResultFolder::write_last`].
 pub fn write_results(
     folder: &mut ResultFolder,
     run: &Run,
@@ -92,7 +92,7 @@ pub fn write_results(
         write_frames(&folder.join(FRAMES_FILE), table)?;
         json::write(&folder.join(RUN_FILE), run)
     };
-    if run.interrupted { folder.replace(&names, write) } else { folder.finish(&names, write) }
+    folder.write_last(!run.interrupted, &names, write)
 }
 
 /// Reads a folder that `nimbus bench --out` wrote.

@@ -5,7 +5,6 @@
 //! any thread, in the middle of a call of the window system.
 
 use std::ffi::c_int;
-use std::io::{Write, stderr};
 use std::sync::Mutex;
 
 use x11_dl::xlib;
@@ -13,6 +12,7 @@ use x11_dl::xlib;
 use super::sync::lock;
 use crate::error::Error;
 use crate::io::atomic;
+use crate::io::console::say;
 
 /// A function that keeps unsaved work.
 type Rescue = Box<dyn FnOnce() + Send>;
@@ -37,14 +37,6 @@ unsafe extern "C" fn end(_: *mut xlib::Display) -> c_int {
         rescue();
     }
     let error = Error::vulkan("window", "the connection to the display is lost");
-    // The process ends also where nobody reads its messages.
-    let _ = writeln!(stderr(), "error: {error}");
-    atomic::abandon();
-    // std::process::exit would run exit handlers of the driver, which other threads are still
-    // using.
-    unsafe extern "C" {
-        fn _exit(code: c_int) -> !;
-    }
-    // SAFETY: ends the process; nothing after it runs.
-    unsafe { _exit(c_int::from(error.exit_code())) }
+    say!("error: {error}");
+    atomic::abandon_and_exit(error.exit_code())
 }

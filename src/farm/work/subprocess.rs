@@ -47,8 +47,8 @@ fn ended(name: &str, mut child: Child, stop: &AtomicBool) -> Result<()> {
     match output.status.code() {
         Some(0) => Ok(()),
         _ if stop.load(Ordering::Relaxed) => Err(Error::Interrupted),
-        // A failure of the device, or a signal.
-        Some(3 | 130) | None => Err(Error::Transient { what }),
+        // A failure of the device, one that may pass, or a signal.
+        Some(3 | 75 | 130) | None => Err(Error::Transient { what }),
         Some(_) if what.to_lowercase().contains("no space left") => Err(Error::Transient { what }),
         Some(code) => Err(Error::usage(format!("{name} ended with exit code {code}: {what}"))),
     }

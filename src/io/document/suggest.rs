@@ -1,7 +1,7 @@
 //! Words of an input in messages: shortened, listed, and with the nearest known name to a mistyped
 //! one.
 
-use crate::io::plain_text::is_harmful;
+use crate::io::plain_text::one_line;
 
 /// Returns the known name nearest to `typed` (Levenshtein distance, with a swap of neighbours as
 /// one edit), if it is within a third of its length. One edit is always near enough, so that `x1`
@@ -44,22 +44,13 @@ pub fn suggestion(typed: &str, known: &[&str]) -> String {
     if text.is_empty() { ";".to_owned() } else { text }
 }
 
-/// Returns text with every character escaped that a terminal would obey.
-pub fn escaped(text: &str) -> String {
-    let mut escaped = String::new();
-    for c in text.chars() {
-        if is_harmful(c) { escaped.extend(c.escape_debug()) } else { escaped.push(c) }
-    }
-    escaped
-}
-
 /// Returns a word of an input for a message: cut where it is long, and without characters that a
 /// terminal would obey.
 pub fn shown(word: &str) -> String {
     const LONGEST: usize = 80;
     match word.char_indices().nth(LONGEST) {
-        Some((end, _)) => escaped(&word[..end]) + "…",
-        None => escaped(word),
+        Some((end, _)) => format!("{}…", one_line(&word[..end])),
+        None => one_line(word).into_owned(),
     }
 }
 

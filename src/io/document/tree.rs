@@ -8,8 +8,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::depth::too_deep;
-use super::suggest::escaped;
 use crate::error::{Error, Place, Result};
+use crate::io::plain_text::one_line;
 use crate::io::text_file::{self, line_column};
 
 /// A scene file, as it is or with `--set` arguments laid over it.
@@ -149,7 +149,7 @@ impl Source {
                 Place::line(&self.path, line, column)
             }
             Origin::Override(i) => Place {
-                source: format!("--set {}", escaped(&self.overrides[i])),
+                source: format!("--set {}", one_line(&self.overrides[i])),
                 line: 0,
                 column: 0,
             },

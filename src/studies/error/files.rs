@@ -73,7 +73,7 @@ pub fn write(folder: &mut ResultFolder, study: &Study, results: &StudyResults) -
 /// replaces an earlier one.
 ///
 /// # Errors
-/// Fails as [`ResultFolder::finish`].
+/// Fails as [`ResultFolder::write_last`].
 pub fn write_last(
     folder: &mut ResultFolder,
     study: &Study,
@@ -91,7 +91,7 @@ pub fn write_last(
         write_atomic(&to.join(CHART_FILE), |file| file.write_all(chart.as_bytes()))?;
         write_tables(to, study, results)
     };
-    if study.interrupted { folder.replace(&names, write) } else { folder.finish(&names, write) }
+    folder.write_last(!study.interrupted, &names, write)
 }
 
 fn write_tables(folder: &Path, study: &Study, results: &StudyResults) -> Result<()> {

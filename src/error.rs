@@ -160,7 +160,16 @@ impl Error {
     }
 
     /// Adds to the message where the error happened, such as a part of a run.
-    pub fn within(mut self, place: &str) -> Self {
+    pub fn within(self, place: &str) -> Self {
+        self.with_end(&format!(" (in {place})"))
+    }
+
+    /// Adds a remark to the message, such as where results were kept.
+    pub fn with_note(self, note: &str) -> Self {
+        self.with_end(&format!("; {note}"))
+    }
+
+    fn with_end(mut self, end: &str) -> Self {
         match &mut self {
             Error::Scene { what, .. }
             | Error::Shader { what, .. }
@@ -171,7 +180,7 @@ impl Error {
             | Error::Check { what }
             | Error::Fault { what }
             | Error::Transient { what }
-            | Error::Conflict { what } => what.push_str(&format!(" (in {place})")),
+            | Error::Conflict { what } => what.push_str(end),
             Error::Interrupted => {}
         }
         self

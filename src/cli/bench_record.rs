@@ -10,8 +10,8 @@ use super::output::{SharedFolder, lock_folder};
 use super::{bench_plot, bench_table, output};
 use crate::error::{Error, Result};
 use crate::gpu::{ClockFit, ClockSample, DeviceInfo};
-use crate::io::claim::command_line;
 use crate::io::console::say;
+use crate::io::process_info::command_line;
 use crate::measure::zones::Zones;
 use crate::timing::attachments::Attachments;
 use crate::timing::blocks::{self, BenchPlan, Outcome};
@@ -133,7 +133,9 @@ impl Recorder {
         let pictures = outcome.pictures.clone();
         let attachments = Attachments { pictures, charts, copies: vec![] };
         let written = write_results(folder, run, table, &attachments);
-        output::kept_apart(folder, self.args.options.quiet);
+        if run.interrupted {
+            output::kept_apart(folder, self.args.options.quiet);
+        }
         written
     }
 

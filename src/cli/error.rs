@@ -125,7 +125,9 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         let chart = charts::error::chart(&study);
         let svg = chart.svg(chart.size())?;
         written = files::write_last(folder, &study, &results, &svg, &[]);
-        kept_apart(folder, args.options.quiet);
+        if study.interrupted {
+            kept_apart(folder, args.options.quiet);
+        }
     }
     if done.is_ok() || study.configurations.iter().any(|c| c.n_turns > 0) {
         print(args, color, &study)?;

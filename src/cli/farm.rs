@@ -175,11 +175,8 @@ fn merge(args: &MergeArgs) -> Result<()> {
     let Merged { n, summary, written } = farm::merge(&args.plan, &plan, &options)?;
     drop(merging);
     let (noun, out) = (plan.work.noun(), args.output.display());
-    let (of, place) = match &written {
-        Ok(()) => ("in", out.to_string()),
-        Err(_) => ("merged, but not written to", out.to_string()),
-    };
-    output::text(&format!("{n} {noun} {of} {place}\n{summary}"))?;
+    let outcome = if written.is_ok() { "in" } else { "merged, but not put into" };
+    output::text(&format!("{n} {noun} {outcome} {out}\n{summary}"))?;
     written
 }
 

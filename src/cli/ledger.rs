@@ -123,7 +123,9 @@ fn deliver(args: &LedgerArgs, folder: &SharedFolder, ledger: &Ledger) -> Result<
             json::write(&folder.join(Ledger::FILE), ledger)
         };
         let written = folder.write_last(!ledger.interrupted, &FILES, write);
-        output::kept_apart(folder, args.options.quiet);
+        if ledger.interrupted {
+            output::kept_apart(folder, args.options.quiet);
+        }
         written?;
     }
     printed

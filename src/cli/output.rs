@@ -13,6 +13,7 @@ use crate::io::claim::Claim;
 use crate::io::console::{self, say};
 use crate::io::plain_text::{plain, plain_json};
 use crate::io::result_folder::ResultFolder;
+pub use crate::io::result_folder::refuse_existing;
 use crate::report::charts::Chart;
 use crate::studies::figure::Figure;
 
@@ -129,17 +130,6 @@ fn fail(what: impl std::fmt::Display) -> Error {
     Error::Io { path: "stdout".into(), what: what.to_string() }
 }
 
-/// Refuses to replace a file or folder unless `force` is set.
-///
-/// # Errors
-/// Fails if `path` exists and `force` is not set.
-pub fn refuse_existing(path: &Path, force: bool) -> Result<()> {
-    if !force && path.symlink_metadata().is_ok() {
-        return Err(Error::io(path, "exists; --force replaces it"));
-    }
-    Ok(())
-}
-
 /// Claims the place of a file that a command writes, before its work.
 ///
 /// # Errors
@@ -161,7 +151,7 @@ pub fn lock_folder(folder: &SharedFolder) -> MutexGuard<'_, Option<ResultFolder>
     folder.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Says where unfinished results are that have not replaced earlier ones.
+/// Says where the results of a run that ended early are, if they have not replaced earlier ones.
 pub fn kept_apart(folder: &ResultFolder, quiet: bool) {
     if let Some(apart) = folder.apart().filter(|_| !quiet) {
         let place = folder.place().display();

@@ -8,7 +8,7 @@ use super::ranges::ranges;
 use super::store::{ResultState, Store};
 use super::work::{Merge, Merged, ShardResult};
 use crate::error::{Error, Result};
-use crate::io::result_folder::Existing;
+use crate::io::result_folder::{Existing, refuse_existing};
 
 /// The place of a merged result, and what is allowed there.
 #[derive(Debug, Clone, Copy)]
@@ -28,9 +28,7 @@ pub struct MergeOptions<'a> {
 /// replaced. Nothing is written then.
 pub fn merge(folder: &Path, plan: &Plan, options: &MergeOptions<'_>) -> Result<Merged> {
     let MergeOptions { out, force, mixed } = *options;
-    if !force && out.symlink_metadata().is_ok() {
-        return Err(Error::io(out, "exists; --force replaces it"));
-    }
+    refuse_existing(out, force)?;
     let results = verified(folder, plan)?;
     if plan.work.is_exact() && !mixed {
         check_devices(&results)?;

@@ -2,7 +2,7 @@
 
 use std::env;
 
-use crate::io::claim::host_name;
+use crate::io::process_info::host_name;
 
 /// Separates a task's name from the number of its restart.
 const RESTART: &str = " restart ";

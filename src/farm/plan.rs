@@ -14,7 +14,7 @@ use super::scene_source::SceneSource;
 use super::work::AnyWork;
 use crate::error::{Error, Result};
 use crate::io::atomic;
-use crate::io::claim::command_line;
+use crate::io::process_info::command_line;
 use crate::io::scene_file::LoadedScene;
 use crate::io::text_file::RECORD_LIMIT;
 use crate::timing::json::{self, ResultFile};

@@ -13,7 +13,7 @@ use super::plan::{Plan, Shard};
 use super::transient::io_error;
 use super::workplace::Workplace;
 use crate::error::{Error, Result};
-use crate::io::text_file::RECORD_LIMIT;
+use crate::io::text_file::TABLE_LIMIT;
 use crate::io::{atomic, input_file};
 
 /// The state of a shard's result.
@@ -75,7 +75,7 @@ impl<'a> Store<'a> {
         let path = folder.join(MANIFEST_FILE);
         let broken = |what: String| Err(Defect::Broken(format!("{MANIFEST_FILE}{what}")));
         let text =
-            input_file::read(&path, RECORD_LIMIT).map_err(|cause| Defect::new(&path, cause))?;
+            input_file::read(&path, TABLE_LIMIT).map_err(|cause| Defect::new(&path, cause))?;
         let manifest: Manifest = match serde_json::from_slice(&text) {
             Ok(manifest) => manifest,
             Err(cause) => return broken(format!(": {cause}")),

@@ -64,4 +64,4 @@ pub use still::{is_still, plan_of_frame};
 pub use tensor_shape::{Block, Shape, basis_of};
 pub use tiling::Tiling;
 pub use times::{FrameTimes, Marks, OnFrame};
-pub use unseen::{DrawnFrame, unseen, unseen_on};
+pub use unseen::{DrawnFrame, unseen};

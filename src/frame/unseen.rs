@@ -3,7 +3,6 @@
 use glam::DVec3;
 
 use super::renderer::Rendered;
-use super::stage::Stage;
 use crate::error::Result;
 use crate::model::film::Film;
 use crate::model::frame_state::FrameState;
@@ -39,15 +38,6 @@ pub fn unseen(scene: &Scene, frame: DrawnFrame, rgba: &[f32]) -> Result<Option<S
     }
     let reason = reason(scene, frame, rgba)?;
     Ok(Some(format!("nothing can be seen in the picture: {reason}")))
-}
-
-/// Returns [`unseen`] for the last frame that a stage has drawn.
-///
-/// # Errors
-/// Fails if the picture cannot be read back.
-pub fn unseen_on(stage: &mut Stage, frame: DrawnFrame) -> Result<Option<String>> {
-    let rgba = stage.renderer.image()?;
-    unseen(&stage.scene, frame, &rgba)
 }
 
 /// Returns whether a pixel is displayed in another colour than the background's.

@@ -1,4 +1,4 @@
-//! Advice for machines on which no Vulkan device can be used: no loader, no driver, or no permission.
+//! Advice for machines on which no Vulkan device can be used: no loader, driver or permission.
 
 use std::fs::OpenOptions;
 use std::io::ErrorKind;

@@ -12,14 +12,14 @@ use crate::io::input_file;
 
 /// Largest text of a shader of `--shaders`, bytes. The longest built-in one has 14 KiB.
 const LARGEST_TEXT: u64 = 256 << 10;
-/// Most lines of such a text.
+/// Most lines of such a text. The longest built-in one has 330.
 const MOST_LINES: usize = 10_000;
 /// Most brackets within each other in such a text: the compiler recurses into each of them.
 const DEEPEST_NESTING: usize = 200;
 /// Most includes of a shader, those of its includes counted; the built-in shaders have up to ten.
 /// Without a bound an include of itself never ends.
 const MOST_INCLUDES: u32 = 64;
-/// Largest SPIR-V of a shader in the cache.
+/// Largest SPIR-V of a shader in the cache, bytes. The built-in ones have less than 1 MiB.
 const LARGEST_BINARY: u64 = 64 << 20;
 
 /// Shader texts by file name (`include/x.glsl` for includes).

@@ -2,8 +2,8 @@
 //!
 //! A file is written under a temporary name in its own folder and renamed into its place, so that a
 //! reader, a crash or Ctrl-C finds the old file or the new one, whole. Ctrl-C must call
-//! [`abandon_and_exit`] for that. The functions whose names end in `_synced` also wait until the content
-//! and the name are on the disk, so that the file outlasts a power cut.
+//! [`abandon_and_exit`] for that. The functions whose names end in `_synced` also wait until the
+//! content and the name are on the disk, so that the file outlasts a power cut.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
@@ -154,8 +154,8 @@ fn beside(path: &Path) -> Result<(Temporary, File)> {
     Temporary::file(path).map_err(|e| Error::io(path, format!("cannot be written: {e}")))
 }
 
-/// A temporary file or folder. Dropping it, or [`abandon_and_exit`], removes what its path names then: after
-/// a rename, nothing.
+/// A temporary file or folder. Dropping it, or [`abandon_and_exit`], removes what its path names
+/// then: after a rename, nothing.
 #[derive(Debug)]
 pub struct Temporary {
     pub(super) path: PathBuf,
@@ -209,9 +209,10 @@ impl Temporary {
         Ok((made, Temporary { path }))
     }
 
-    /// Takes over a file that exists already, to be removed with the temporaries.
-    pub(super) fn registered(path: PathBuf) -> Temporary {
-        in_progress().push(path.clone());
+    /// Takes over a file that exists already, to be removed with the temporaries. `paths` is the
+    /// locked list of [`in_progress`].
+    pub(super) fn registered(path: PathBuf, paths: &mut Vec<PathBuf>) -> Temporary {
+        paths.push(path.clone());
         Temporary { path }
     }
 

@@ -11,10 +11,13 @@ use std::io::{self, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use super::atomic::{self, Temporary};
+use super::process_info::{command_line, host_name};
 use crate::error::{Error, Result};
 
 /// Most characters of a claim that a message shows.
 const N_SHOWN: usize = 300;
+/// Most bytes that are read of a claim: the shown characters, of at most 4 bytes each.
+const OWNER_BYTES: u64 = 4 * N_SHOWN as u64;
 
 /// A place that this run alone may write to, until the claim is dropped.
 #[derive(Debug)]
@@ -35,6 +38,8 @@ impl Claim {
         let failed = |cause: io::Error| Error::io(place, format!("cannot be written: {cause}"));
         let path = path_of(place).map_err(failed)?;
         loop {
+            // Made and registered at once, so that Ctrl-C between does not leave it behind.
+            let mut registered = atomic::in_progress();
             let (mut file, path) = match open(&path) {
                 // The folder may be writable though its parent is not.
                 Err(_) if place.is_dir() => {
@@ -55,16 +60,19 @@ impl Claim {
             if !is_at(&file, &path) {
                 continue;
             }
-            let temporary = Temporary::registered(path);
-            let written = file.set_len(0).and_then(|()| file.write_all(owner().as_bytes()));
-            written.map_err(failed)?;
+            let temporary = Temporary::registered(path, &mut registered);
+            drop(registered);
+            // The text only serves the message of another run.
+            let _ = file.set_len(0).and_then(|()| file.write_all(owner().as_bytes()));
             return Ok(Some(Claim { _temporary: temporary, _file: file }));
         }
     }
 }
 
+/// Opens a claim, and makes it if need be. Another user's claim can be locked without writing it.
 fn open(path: &Path) -> io::Result<File> {
-    OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path)
+    let opened = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path);
+    opened.or_else(|cause| File::open(path).map_err(|_| cause))
 }
 
 /// Returns the path of the claim of a place; different spellings of a place have one claim.
@@ -105,24 +113,12 @@ fn owner() -> String {
 /// Returns the error of a place that another run has claimed.
 fn taken(place: &Path, claim: &mut File) -> Error {
     let mut text = String::new();
-    let _ = claim.rewind().and_then(|()| claim.take(4096).read_to_string(&mut text));
+    let _ = claim.rewind().and_then(|()| claim.take(OWNER_BYTES).read_to_string(&mut text));
     let shown: String = text.trim().replace('\n', " ").chars().take(N_SHOWN).collect();
     let by = if shown.is_empty() { String::new() } else { format!(" ({shown})") };
     let what = "another run of nimbus writes there";
     let expected = "wait until it has ended, or name another place";
     Error::Transient { what: format!("{}: {what}{by}; {expected}", place.display()) }
-}
-
-/// Returns the arguments of this process. Bytes that are not UTF-8 become U+FFFD.
-pub fn command_line() -> Vec<String> {
-    std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect()
-}
-
-/// Returns this machine's name, as the kernel or else the shell has it.
-pub fn host_name() -> Option<String> {
-    let kernel = fs::read_to_string("/proc/sys/kernel/hostname").ok();
-    // HOSTNAME comes last: a shell on another machine may have exported it.
-    kernel.or_else(|| std::env::var("HOSTNAME").ok()).map(|name| name.trim().to_owned())
 }
 
 #[cfg(test)]

@@ -18,8 +18,8 @@ pub fn write_painted(line: &str) {
     let _ = std::io::stderr().lock().write_all(format!("{line}\n").as_bytes());
 }
 
-/// Writes a line to stdout, and ignores a failure. Results are not written so, but lines that a
-/// window prints while it runs.
+/// Writes a line to stdout, and ignores a failure. Only windows call this function, for lines that
+/// they print while they run. Results go through `cli::output`, which reports failures.
 pub fn write_line_to_stdout(line: &str) {
     let mut out = std::io::stdout().lock();
     let _ = out.write_all(format!("{}\n", plain(line)).as_bytes()).and_then(|()| out.flush());

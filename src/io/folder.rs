@@ -33,7 +33,7 @@ pub fn replace_files(
 /// # Errors
 /// When they cannot.
 pub fn check_writable(folder: &Path) -> Result<()> {
-    // Without a file for trial, which a kill would leave behind.
+    // Asks the system and makes no trial file, because a killed process would leave that behind.
     #[cfg(target_os = "linux")]
     let checked = {
         use rustix::fs::{Access, access};

@@ -22,6 +22,7 @@ pub mod image;
 pub mod input_file;
 pub mod particle_file;
 pub mod plain_text;
+pub mod process_info;
 pub mod result_folder;
 pub mod scene_file;
 pub mod scene_keys;

@@ -78,8 +78,9 @@ mod tests {
             let plain = plain(&text);
             prop_assert!(plain.chars().all(|c| c == '\n' || c == '\t' || !is_harmful(c)));
             prop_assert_eq!(super::plain(&plain), plain.as_ref());
-            let has_escape = plain_markup(&text).contains('\u{1b}');
-            prop_assert!(!has_escape);
+            let markup = plain_markup(&text);
+            prop_assert!(markup.chars().all(|c| c == '\n' || c == '\t' || !is_harmful(c)));
+            prop_assert!(!one_line(&text).chars().any(is_harmful));
         }
 
         #[test]

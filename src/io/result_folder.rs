@@ -1,13 +1,13 @@
 //! The folder that one run writes its results to.
 //!
-//! Results of one kind are a *record* (`run.json`), files beside it, and a *list* (`run.sha256`) of
+//! Results of one kind are a *record* (`run.json`; merged frames have none), files beside it, and a *list* (`run.sha256`) of
 //! all of them with their SHA-256, which `sha256sum -c` checks. The list tells the files of nimbus
 //! from those of the user: no file that is missing in the list, or has changed since, is replaced
 //! or removed. Results that are there already stay until the new ones are finished; until then the
 //! new ones are kept in a folder beside them, `NAME.partial`.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use sha2::{Digest, Sha256};
 use super::atomic::{Temporary, folder_of, write_atomic};
 use super::claim::Claim;
 use super::folder::{check_writable, replace_files};
-use super::text_file::{RECORD_LIMIT, read_result};
+use super::text_file::{RECORD_LIMIT, TABLE_LIMIT, read_result};
 use crate::error::{Error, Result};
 
 /// SHA-256 in hex by file name.
@@ -32,6 +32,17 @@ pub enum Existing {
     Replace,
     /// Results of the same kind are continued.
     Extend,
+}
+
+/// Refuses to replace a file or folder unless `force` is set.
+///
+/// # Errors
+/// Fails if `path` exists and `force` is not set.
+pub fn refuse_existing(path: &Path, force: bool) -> Result<()> {
+    if !force && path.symlink_metadata().is_ok() {
+        return Err(Error::io(path, "exists; --force replaces it"));
+    }
+    Ok(())
 }
 
 impl Existing {
@@ -69,23 +80,22 @@ impl ResultFolder {
         existing: Existing,
         planned: &[String],
     ) -> Result<ResultFolder> {
-        let refuse_existing = || match (place.symlink_metadata(), existing) {
-            (Ok(_), Existing::Refuse) => {
-                let expected = "name another folder, or add --force to overwrite it";
-                Err(Error::usage(format!("{}: exists already; {expected}", place.display())))
+        let check_place = || {
+            refuse_existing(place, existing != Existing::Refuse)?;
+            match place.symlink_metadata() {
+                Ok(_) if !place.is_dir() => {
+                    Err(Error::io(place, "is not a folder; results need one"))
+                }
+                Ok(_) => check_writable(place),
+                Err(_) => Ok(()),
             }
-            (Ok(_), _) if !place.is_dir() => {
-                Err(Error::io(place, "is not a folder; results need one"))
-            }
-            (Ok(_), _) => check_writable(place),
-            (Err(_), _) => Ok(()),
         };
-        refuse_existing()?;
+        check_place()?;
         let failed = |cause| Error::io(place, cause);
         fs::create_dir_all(folder_of(place)).map_err(failed)?;
         let claim = Claim::take(place)?;
         // A run that has ended meanwhile may have left results.
-        refuse_existing()?;
+        check_place()?;
         let is_made = !place.is_dir();
         if is_made {
             fs::create_dir_all(place).map_err(failed)?;
@@ -98,10 +108,12 @@ impl ResultFolder {
             sums: Sums::new(),
             _claim: claim,
         };
-        folder.check(planned, existing)?;
+        let ours = folder.check(planned, existing)?;
         let list = read_list(&place.join(folder.list()))?;
         if existing == Existing::Extend {
-            folder.sums = list.unwrap_or_default();
+            // Results of a version that kept no list.
+            let sum = |name: &String| Some((name.clone(), sum_of(&place.join(name)).ok()?));
+            folder.sums = list.unwrap_or_else(|| ours.iter().filter_map(sum).collect());
         } else if list.is_some() || place.join(folder.record()).exists() {
             // Results stay until others are finished.
             folder.at = None;
@@ -145,10 +157,13 @@ impl ResultFolder {
             .map_err(failed)?;
         let path = staged.path.join(name);
         write(&path)?;
+        let mut sums = self.sums.clone();
+        sums.insert(name.to_owned(), sum_of(&path).map_err(failed)?);
         // The list comes first: a file that it lacks would be the user's.
-        self.sums.insert(name.to_owned(), sum_of(&path).map_err(failed)?);
-        write_list(&at.join(self.list()), &self.sums)?;
-        fs::rename(&path, at.join(name)).map_err(failed)
+        write_list(&at.join(self.list()), &sums)?;
+        fs::rename(&path, at.join(name)).map_err(failed)?;
+        self.sums = sums;
+        Ok(())
     }
 
     /// Replaces the files `names` of unfinished results together. The last of them is the record,
@@ -185,20 +200,26 @@ impl ResultFolder {
         if self.at.as_ref() == Some(&self.place) {
             return self.replace(names, write);
         }
+        self.publish(names, &write).map_err(|error| match self.replace(names, &write) {
+            Ok(()) => {
+                let at = self.apart().unwrap_or(&self.place).display();
+                error.with_note(&format!("the new results are in {at}"))
+            }
+            Err(_) => error,
+        })
+    }
+
+    /// Puts all files of this run into the place.
+    fn publish(&mut self, names: &[&str], write: &dyn Fn(&Path) -> Result<()>) -> Result<()> {
         let added: Vec<String> = self.sums.keys().cloned().collect();
         let wanted: Vec<String> =
             names.iter().map(|name| (*name).to_owned()).chain(added.iter().cloned()).collect();
-        let ours = match self.check(&wanted, Existing::Replace) {
-            Ok(ours) => ours,
-            Err(error) => {
-                self.replace(names, write)?;
-                let at = self.unfinished()?;
-                return Err(error.within(&format!("the new results are in {}", at.display())));
-            }
-        };
+        let ours = self.check(&wanted, Existing::Replace)?;
         let at = self.at.clone();
-        let others: Vec<&str> =
-            ours.iter().chain(&added).map(String::as_str).filter(|n| !names.contains(n)).collect();
+        // Each name once: the second move of a file would find none and remove the first.
+        let others = ours.iter().chain(&added).map(String::as_str);
+        let others: BTreeSet<&str> = others.filter(|name| !names.contains(name)).collect();
+        let others: Vec<&str> = others.into_iter().collect();
         self.put(&self.place.clone(), &others, names, &|staged| {
             for (name, at) in added.iter().zip(at.iter().cycle()) {
                 let (from, to) = (at.join(name), staged.join(name));
@@ -211,7 +232,7 @@ impl ResultFolder {
         if let Some(at) = at {
             added.iter().for_each(|name| drop(fs::remove_file(at.join(name))));
             let _ = [self.record(), self.list()].map(|name| fs::remove_file(at.join(name)));
-            // The tables of rounds, which the finished ones have replaced.
+            // Removes the tables of the last round; the place has the finished ones.
             names.iter().for_each(|name| drop(fs::remove_file(at.join(name))));
             let _ = fs::remove_dir(at);
         }
@@ -341,7 +362,8 @@ fn read_list(path: &Path) -> Result<Option<Sums>> {
     if path.symlink_metadata().is_err() {
         return Ok(None);
     }
-    let text = read_result(path, RECORD_LIMIT)?;
+    // A merge of a million frames has a line for each.
+    let text = read_result(path, TABLE_LIMIT)?;
     let parsed = |line: &str| {
         let (sum, name) = line.split_once("  ")?;
         let is_sum = sum.len() == 64 && sum.bytes().all(|b| b.is_ascii_hexdigit());

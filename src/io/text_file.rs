@@ -83,7 +83,6 @@ fn decode(bytes: Vec<u8>, path: &Path) -> Result<String> {
 fn plain(e: &std::io::Error) -> String {
     match e.kind() {
         ErrorKind::NotFound => "no such file".to_owned(),
-        ErrorKind::PermissionDenied => "permission denied".to_owned(),
         _ => e.to_string(),
     }
 }

@@ -14,5 +14,9 @@ pub fn parallel_map<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> 
 fn has_pool() -> bool {
     static IS_STARTED: OnceLock<bool> = OnceLock::new();
     rayon::current_thread_index().is_some()
-        || *IS_STARTED.get_or_init(|| rayon::ThreadPoolBuilder::new().build_global().is_ok())
+        || *IS_STARTED.get_or_init(|| match rayon::ThreadPoolBuilder::new().build_global() {
+            Ok(()) => true,
+            // A failure to start threads has a cause; the other error says that the pool exists.
+            Err(error) => std::error::Error::source(&error).is_none(),
+        })
 }

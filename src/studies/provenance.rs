@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::picture_error::magnitude;
 use super::reference_cache::CachedReference;
 use crate::gpu::DeviceInfo;
-use crate::io::claim::command_line;
+use crate::io::process_info::command_line;
 use crate::io::scene_file::LoadedScene;
 use crate::reference::picture::{Pixels, ReferenceKind};
 use crate::timing::machine::{self, Clocks, Cpu, Device};

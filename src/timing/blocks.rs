@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use super::attachments::CasePicture;
 use super::cases::{Case, Loop};
 use crate::error::{Error, Result};
-use crate::frame::{Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen_on};
+use crate::frame::{Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
 use crate::gpu::hex;
 use crate::io::image::display_bytes;
 use crate::model::scene::{Draw, Scene};
@@ -200,7 +200,9 @@ impl Bench<'_> {
                 .samples
                 .last()
                 .map(|s| DrawnFrame { time_s: s.times.time_s, n_shown: s.times.n_kept });
-            let unseen = last.map(|frame| unseen_on(stage, frame)).transpose()?.flatten();
+            let rgba = stage.renderer.image()?;
+            let unseen = last.map(|frame| unseen(&stage.scene, frame, &rgba));
+            let unseen = unseen.transpose()?.flatten();
             let notes = light_notes(stage)?;
             lock(self.outcome).notes.extend(unseen.iter().chain(&notes).map(named));
             let counts = Counts::new(&mut stage.renderer, &stage.device, &stage.scene)?;
@@ -208,7 +210,7 @@ impl Bench<'_> {
             if self.plan.pictures && !is_stopped() {
                 let film = case.scene.film;
                 let (width, height) = (film.width, film.height);
-                let rgb = display_bytes(&film, width, height, &stage.renderer.image()?);
+                let rgb = display_bytes(&film, width, height, &rgba);
                 let picture = CasePicture { i_case: block.i_case, width, height, rgb };
                 lock(self.outcome).pictures.push(picture);
             }
@@ -242,9 +244,12 @@ fn run_frames(
     let n_before = lock(outcome).samples.len();
     let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
         let image_hash = if plan.hash_frames { Some(image_hash(renderer)?) } else { None };
-        let samples = &mut lock(outcome).samples;
-        let warm_up = samples.len() - n_before < plan.n_warm_up as usize;
-        samples.push(Sample { i_case, of, i_block, warm_up, times, image_hash });
+        {
+            let samples = &mut lock(outcome).samples;
+            let warm_up = samples.len() - n_before < plan.n_warm_up as usize;
+            samples.push(Sample { i_case, of, i_block, warm_up, times, image_hash });
+        }
+        // Without the lock: stderr may hold the tick up, and Ctrl-C needs the samples.
         Ok(tick())
     };
     stage.run(of.threading, frames_of(case, plan.n_warm_up), on_frame)

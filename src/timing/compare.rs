@@ -49,7 +49,7 @@ impl Verdict {
             Verdict::Faster => "faster",
             Verdict::Slower => "slower",
             Verdict::NoDifferenceFound => "no difference found",
-            Verdict::TooFewFrames => "too few frames: each needs 30",
+            Verdict::TooFewFrames => "too few frames",
             Verdict::NotMeasuredInA => "not measured in A",
             Verdict::NotMeasuredInB => "not measured in B",
             Verdict::NoRatio => "no ratio: A's median is 0, or may be",

@@ -3,6 +3,7 @@
 use super::blocks::{BenchPlan, n_frames_total};
 use super::cases::Case;
 use crate::error::{Error, Result};
+use crate::io::text_file::RECORD_LIMIT;
 use crate::model::cloud::CloudSource;
 use crate::model::scene::Scene;
 
@@ -11,13 +12,18 @@ use crate::model::scene::Scene;
 pub const MOST_FRAMES: u64 = 500_000;
 /// Most blocks of a bench. `run.json` lists each of them in about 100 bytes.
 pub const MOST_BLOCKS: u64 = 100_000;
-/// Most cases of a sweep, and most configurations of a study.
+/// Most cases of a sweep, and most configurations of a study: each is loaded before the first runs.
 pub const MOST_CASES: u64 = 4096;
-/// Most timed frames of a study. A frame has two times, and a line of `times.csv`.
-pub const MOST_STUDY_FRAMES: u64 = 2_000_000;
+/// Most timed frames of a study. Each has a line of about 150 bytes in `times.csv`, all of which
+/// must fit into `TABLE_LIMIT`.
+pub const MOST_STUDY_FRAMES: u64 = 1_000_000;
 /// Most bytes of the particles that all scenes of a run hold, and of the pictures that it keeps.
 pub const MOST_BYTES: u64 = 512 << 20;
 
+/// Bytes of a loop in `run.json`, as measured: the times of all passes.
+const LOOP_BYTES: u64 = 12 << 10;
+/// Bytes of a block in `run.json`.
+const BLOCK_BYTES: u64 = 100;
 /// Bytes of a particle of a list.
 const PARTICLE_BYTES: u64 = 128;
 
@@ -45,7 +51,7 @@ pub fn check_study(n_configurations: u64, n_rounds: u32, n_frames: u32) -> Resul
     if n > MOST_STUDY_FRAMES {
         return Err(Error::limit(format!(
             "{n} timed frames of {n_configurations} configurations, expected at most \
-             {MOST_STUDY_FRAMES}, whose times fit in memory: less of --rounds or --frames"
+             {MOST_STUDY_FRAMES}, whose times fit in memory; reduce --rounds or --frames"
         )));
     }
     Ok(())
@@ -87,8 +93,15 @@ pub fn check_bench(cases: &[Case], plan: &BenchPlan) -> Result<()> {
     if n_frames > MOST_FRAMES || n_blocks > MOST_BLOCKS {
         return Err(Error::limit(format!(
             "{n_frames} frames in {n_blocks} blocks: the records of {MOST_FRAMES} frames, warm-up \
-             included, and of {MOST_BLOCKS} blocks fit in memory; expected less of --repeat, \
+             included, and of {MOST_BLOCKS} blocks fit in memory; reduce --repeat, \
              --frames, --warmup or --sweep"
+        )));
+    }
+    if n_loops.saturating_mul(LOOP_BYTES) + n_blocks * BLOCK_BYTES > RECORD_LIMIT {
+        return Err(Error::limit(format!(
+            "{} cases of {n_loops} loops: run.json would be too large to be read again; run the \
+             cases in parts, or fewer loops of each",
+            cases.len()
         )));
     }
     let pixels =

@@ -185,7 +185,8 @@ impl Work for ReferenceWork {
     fn check_scene(&self, loaded: &LoadedScene) -> Result<()> {
         self.check().map_err(Error::usage)?;
         let scene = self.scene(loaded);
-        let n_pixels = u64::from(self.tile[0].min(self.width)) * u64::from(self.tile[1]);
+        let n_pixels =
+            u64::from(self.tile[0].min(self.width)) * u64::from(self.tile[1].min(self.height));
         check_memory(n_pixels, self.range, scene.n_particles())?;
         if (self.width, self.height) != (scene.film.width, scene.film.height) {
             return Err(Error::usage("the picture has another size than the scene's film"));

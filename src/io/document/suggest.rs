@@ -47,10 +47,15 @@ pub fn suggestion(typed: &str, known: &[&str]) -> String {
 /// Returns a word of an input for a message: cut where it is long, and without characters that a
 /// terminal would obey.
 pub fn shown(word: &str) -> String {
-    const LONGEST: usize = 80;
-    match word.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}…", one_line(&word[..end])),
-        None => one_line(word).into_owned(),
+    cut(word, 80)
+}
+
+/// Returns text of an input for a message: at most `longest` characters of it, and no character
+/// that a terminal would obey.
+pub fn cut(text: &str, longest: usize) -> String {
+    match text.char_indices().nth(longest) {
+        Some((end, _)) => format!("{}…", one_line(&text[..end])),
+        None => one_line(text).into_owned(),
     }
 }
 

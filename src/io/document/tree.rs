@@ -8,8 +8,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::depth::too_deep;
+use super::suggest::cut;
 use crate::error::{Error, Place, Result};
-use crate::io::plain_text::one_line;
 use crate::io::text_file::{self, line_column};
 
 /// A scene file, as it is or with `--set` arguments laid over it.
@@ -23,6 +23,8 @@ pub struct Document {
 
 /// Message about a key that [`too_deep`] finds.
 pub const TOO_DEEP: &str = "no key of nimbus has this many dots";
+/// Most characters of an override that an error names: those of long paths, and not a whole list.
+const LONGEST_OVERRIDE: usize = 500;
 /// Message about an integer of more than 127 bits, which no key takes.
 pub const TOO_LARGE: &str = "the integer is too large";
 
@@ -149,7 +151,7 @@ impl Source {
                 Place::line(&self.path, line, column)
             }
             Origin::Override(i) => Place {
-                source: format!("--set {}", one_line(&self.overrides[i])),
+                source: format!("--set {}", cut(&self.overrides[i], LONGEST_OVERRIDE)),
                 line: 0,
                 column: 0,
             },

@@ -32,6 +32,7 @@ fn finished(place: &Path, text: &str) {
 fn files(folder: &Path) -> Vec<(String, String)> {
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
     let mut found: Vec<_> = entries
+        .filter(|entry| entry.path().is_file())
         .filter(|entry| !entry.file_name().to_string_lossy().ends_with(".sha256"))
         .map(|entry| {
             let text = fs::read_to_string(entry.path()).unwrap_or_default();
@@ -48,10 +49,18 @@ fn expected(all: &[(&str, &str)]) -> Vec<(String, String)> {
 
 #[test]
 fn earlier_results_stay_until_new_ones_are_finished() {
+    [false, true].into_iter().for_each(replaced_by_a_second_run);
+}
+
+fn replaced_by_a_second_run(has_folder: bool) {
     let dir = tempfile::tempdir().unwrap();
     let place = dir.path().join("run");
     finished(&place, "old");
     fs::write(place.join("picture-9.png"), "mine").unwrap();
+    if has_folder {
+        // The files are then moved one by one.
+        fs::create_dir(place.join("plots")).unwrap();
+    }
     let old = [
         ("picture-0.png", "old"),
         ("picture-1.png", "old"),

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 
-/// Most memory of a reference, bytes.
+/// Most memory of a reference, bytes: 2 GiB less the memory of the scene and the program itself.
 const MOST_BYTES: u64 = 1600 << 20;
 /// Bytes of a pixel: colours, errors, depths and the picture's copies, as measured.
 const PIXEL_BYTES: u64 = 256;

@@ -86,7 +86,8 @@ pub fn write_last(
         copied.chain([CHART_FILE, TIMES_FILE, CONFIGURATIONS_FILE, Study::FILE]).collect();
     let write = |to: &Path| {
         for (name, from) in more {
-            fs::copy(from, to.join(name)).map_err(|cause| Error::of_io(from, &cause))?;
+            let copy = to.join(name);
+            fs::copy(from, &copy).map_err(|cause| Error::of_io(&copy, &cause))?;
         }
         write_atomic(&to.join(CHART_FILE), |file| file.write_all(chart.as_bytes()))?;
         write_tables(to, study, results)

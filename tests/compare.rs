@@ -21,6 +21,7 @@ const N_FRAMES: u32 = 60;
 /// Exit code, stdout, stderr.
 fn compare(args: &[&str]) -> (i32, String, String) {
     let mut command = Command::cargo_bin("nimbus").expect("the program is built");
+    command.env("NIMBUS_PROGRESS_S", "0");
     let output = command.arg("compare").args(args).output().expect("the program runs");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
     (output.status.code().expect("an exit code"), text(output.stdout), text(output.stderr))

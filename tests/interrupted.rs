@@ -17,6 +17,7 @@ const N_COMPARED: usize = 100;
 
 fn nimbus(args: &[&str]) -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
+    command.env("NIMBUS_PROGRESS_S", "0");
     command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }

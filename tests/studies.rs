@@ -317,9 +317,17 @@ fn a_ledger_sums_up() {
     }
     assert_eq!((&rows[1]["from"], &rows[1]["to"]), (&json!("3 sigma"), &json!("8 sigma")));
     assert_eq!(tiny.refused(&args), "out: exists; --force replaces it");
-    let printed = tiny.good(&[&args[..], &["--force"]].concat());
+    let loud: Vec<&str> = args.iter().copied().filter(|arg| *arg != "-q").collect();
+    let output = tiny.run(&[&loud[..], &["--force"]].concat());
+    let [printed, said] =
+        [output.stdout, output.stderr].map(|b| String::from_utf8(b).expect("UTF-8"));
     assert!(
         all.iter().all(|name| printed.contains(name)) && printed.contains("the rows sum to"),
         "{printed}"
+    );
+    assert!(
+        said.starts_with("the pictures in f64 take about ")
+            && said.ends_with("wrote out: 3 files, listed in ledger.sha256\n"),
+        "{said}"
     );
 }

@@ -173,7 +173,7 @@ fn time(
     let Recorder { args, path, cases, plan, .. } = recorder;
     let n_frames = blocks::n_frames_total(cases, plan);
     let bar = progress(n_frames, &path.display().to_string(), args.options.quiet);
-    let ended = blocks::run(stage, cases, plan, stop, outcome, &mut || bar.inc(1));
-    bar.finish_and_clear();
+    let ended = blocks::run(stage, cases, plan, stop, outcome, &mut || bar.advance());
+    drop(bar);
     ended
 }

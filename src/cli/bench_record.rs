@@ -82,7 +82,14 @@ impl Recorder {
             let clock = ClockFit::from_samples(&readings);
             trace::write(file, &outcome.samples, zones.as_ref(), clock)?;
         }
-        if !args.options.quiet {
+        let quiet = args.options.quiet;
+        if let (Some(folder), false) = (&*lock_folder(&self.folder), run.interrupted) {
+            output::wrote_folder(folder, quiet);
+        }
+        if let Some(file) = &args.trace {
+            output::wrote(file, "the zones of all threads and of the device", quiet);
+        }
+        if !quiet {
             outcome.chosen.iter().for_each(|chosen| say!("note: {chosen}"));
             outcome.notes.iter().for_each(|note| say!("warning: {note}"));
         }

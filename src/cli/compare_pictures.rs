@@ -93,6 +93,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let of_each = [&a, &b].map(|image| picture::n_not_finite(&image.rgba));
     if let Some(path) = &args.output {
         image::write_bytes(path, a.width, a.height, &flip.shown())?;
+        output::wrote(path, "FLIP of every pixel, black to yellow", false);
     }
     if args.json {
         let values: Map<String, Value> =

@@ -1,16 +1,16 @@
 //! `nimbus error SCENE`.
 
 use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::ColorChoice;
-use indicatif::ProgressBar;
 
 use super::args::ErrorArgs;
 use super::error_configurations::{axes, design, load_configuration};
 use super::error_table;
 use super::interrupt::{self, PATIENCE, graceful_stop};
 use super::output::{self, SharedFolder, kept_apart, lock_folder, refuse_existing};
-use super::progress::{ReferenceProgress, progress};
+use super::progress::{Progress, ReferenceProgress, progress};
 use super::scene::{
     StudyScene, load_study, open_for_study, pixels, print_sizes, with_texture_hint,
 };
@@ -66,9 +66,10 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     let existing = if args.resume { Existing::Extend } else { Existing::new(args.force) };
     let stop = graceful_stop();
     let folder = SharedFolder::default();
+    let last_round = LastRound::default();
     let mut keeping = {
-        let folder = folder.clone();
-        interrupt::keep(PATIENCE, move || cut_short(&folder))
+        let (args, folder, last_round) = (args.clone(), folder.clone(), last_round.clone());
+        interrupt::keep(PATIENCE, move || cut_short(&args, color, &folder, &last_round))
     };
     // Claimed before the reference is computed, which may take minutes.
     let open = |out| files::open(out, existing, n_configurations(args, &plan));
@@ -105,7 +106,9 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     let bar = progress(0, "configurations", args.options.quiet);
     let done = {
         let mut recorder = Recorder {
+            args,
             folder: &folder,
+            last_round: &last_round,
             study: &mut study,
             film: &film,
             pixels: &pixels,
@@ -115,7 +118,7 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         running.run(&mut runner, &mut results, &mut |event| recorder.on(event))
     };
     keeping.finish();
-    bar.finish_and_clear();
+    drop(bar);
     drop(runner);
     study.interrupted = !matches!(done, Ok(true));
     update(args, &mut study, &results);
@@ -134,22 +137,38 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     }
     done?;
     written?;
+    if let (Some(folder), false) = (&*lock_folder(&folder), study.interrupted) {
+        output::wrote_folder(folder, args.options.quiet);
+    }
     gpu.close()?;
     if study.interrupted { Err(Error::Interrupted) } else { Ok(()) }
 }
 
-/// Says what is kept of a study whose present step takes too long to stop.
-fn cut_short(folder: &SharedFolder) -> Error {
+/// The study after its last whole round, which Ctrl-C prints.
+type LastRound = Arc<Mutex<Option<Study>>>;
+
+/// Prints what is finished of a study whose present step takes too long to stop, and says what is
+/// kept.
+fn cut_short(
+    args: &ErrorArgs,
+    color: ColorChoice,
+    folder: &SharedFolder,
+    last_round: &LastRound,
+) -> Error {
+    let printed = match &*last_round.lock().unwrap_or_else(PoisonError::into_inner) {
+        Some(study) => print(args, color, study),
+        None => Ok(()),
+    };
     let mut folder = lock_folder(folder);
     match folder.as_ref().and_then(|folder| folder.unfinished_at()) {
         Some(at) => say!(
             "the step under way was cut short; {} has the rounds before it, and --resume goes on",
             at.display()
         ),
-        None => say!("the step under way was cut short; nothing is kept"),
+        None => say!("the step under way was cut short; no file is kept"),
     }
     drop(folder.take());
-    Error::Interrupted
+    printed.err().unwrap_or(Error::Interrupted)
 }
 
 fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
@@ -249,27 +268,31 @@ fn update(args: &ErrorArgs, study: &mut Study, results: &StudyResults) {
 
 /// Shows the progress of a study and saves its results on the way.
 struct Recorder<'a> {
+    args: &'a ErrorArgs,
     folder: &'a SharedFolder,
+    last_round: &'a LastRound,
     study: &'a mut Study,
     film: &'a Film,
     pixels: &'a Pixels,
     reference: &'a [[f64; 4]],
-    bar: &'a ProgressBar,
+    bar: &'a Progress,
 }
 
 impl Recorder<'_> {
     fn on(&mut self, event: Event<'_>) -> Result<()> {
         match event {
-            Event::More(n) => self.bar.inc_length(n as u64),
-            Event::Block => self.bar.inc(1),
+            Event::More(n) => self.bar.expect(n as u64),
+            Event::Block => self.bar.advance(),
             Event::Picture { i, rgba, results } => {
-                self.bar.inc(1);
+                self.bar.advance();
                 self.write_picture(i, rgba, &mut results.configurations[i])?;
             }
             Event::Round(results) => {
+                update(self.args, self.study, results);
+                let mut last = self.last_round.lock().unwrap_or_else(PoisonError::into_inner);
+                *last = Some(self.study.clone());
+                drop(last);
                 if let Some(folder) = &mut *lock_folder(self.folder) {
-                    self.study.configurations = results.configurations.clone();
-                    self.study.rounds = results.n_rounds;
                     files::write(folder, self.study, results)?;
                 }
             }

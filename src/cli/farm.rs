@@ -58,9 +58,9 @@ fn shard(args: &RunArgs) -> Result<()> {
     let bar = progress(u64::from(n), noun, args.quiet);
     let (device, validation) = (args.device.clone(), args.validation);
     let choice = DeviceChoice { device, validation, ..DeviceChoice::default() };
-    let options = RunOptions { choice: &choice, stop, on_item: &|| bar.inc(1) };
+    let options = RunOptions { choice: &choice, stop, on_item: &|| bar.advance() };
     let outcome = farm::run(&args.plan, args.shard, &options);
-    bar.finish_and_clear();
+    drop(bar);
     let text = match outcome? {
         Outcome::Skipped => "was done before".to_owned(),
         Outcome::Beaten => "was done meanwhile, with the same result".to_owned(),
@@ -91,8 +91,8 @@ fn local(args: &LocalArgs) -> Result<()> {
         n_tries: args.tries,
     };
     let bar = progress(open.len() as u64, "shards", args.quiet);
-    let ended = pool.run(&open, stop, &|| bar.inc(1));
-    bar.finish_and_clear();
+    let ended = pool.run(&open, stop, &|| bar.advance());
+    drop(bar);
     let (n, n_open) = (plan.shards.len(), open.len());
     check_ended(&ended?, n, &args.plan)?;
     if args.quiet {

@@ -51,6 +51,7 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
         cut,
     })?;
     plan.write(&args.output)?;
+    output::wrote(&args.output, "the plan", args.quiet);
     if args.json {
         return output::object(&plan.to_json(&args.output)?);
     }
@@ -129,13 +130,14 @@ pub fn calibrated(args: &CalibrateArgs) -> Result<()> {
     let choice = DeviceChoice { device: args.device.clone(), ..DeviceChoice::default() };
     let bar = progress(n_frames(args.scenes.len(), args.frames), "frames", args.quiet);
     let never = AtomicBool::new(false);
-    let options = RunOptions { choice: &choice, stop: &never, on_item: &|| bar.inc(1) };
+    let options = RunOptions { choice: &choice, stop: &never, on_item: &|| bar.advance() };
     let found = match &args.farm[..] {
         [] => calibrate(&args.scenes, &args.set, args.frames, &options),
         farms => calibrate_by_farms(farms),
     };
-    bar.finish_and_clear();
+    drop(bar);
     let found = found?;
     found.write(&args.output)?;
+    output::wrote(&args.output, "the cost model of this device and processor", args.quiet);
     if args.json { output::object(&found) } else { output::text(&found.to_string()) }
 }

@@ -8,11 +8,12 @@ use super::interrupt::{self, PATIENCE, graceful_stop};
 use super::output::{
     self, SharedFolder, header, interval, lock_folder, or_dash, refuse_existing, scientific,
 };
-use super::progress::ReferenceProgress;
+use super::progress::{ReferenceProgress, about, spinner};
 use super::scene::{StudyScene, load_study, open_for_study, pixels, with_texture_hint};
 use crate::error::{Error, Result};
 use crate::io::console::say;
 use crate::io::result_folder::{Existing, ResultFolder};
+use crate::model::scene::LightingMode;
 use crate::reference::picture::{Pixels, ReferenceKind, n_reflections};
 use crate::report::charts;
 use crate::studies::error::device_runner::FrameChoice;
@@ -65,7 +66,6 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
     let (existing, planned) = (Existing::new(args.force), FILES.map(str::to_owned));
     let open = |out| ResultFolder::open(out, "ledger", existing, &planned);
     *lock_folder(&folder) = args.out.as_deref().map(open).transpose()?;
-    let shown = ReferenceProgress::new(args.options.quiet);
     let study = LedgerStudy {
         gpu: &gpu,
         scene,
@@ -76,6 +76,8 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
         stop,
         parts: &parts,
     };
+    announce(args, &study)?;
+    let shown = ReferenceProgress::new(args.options.quiet);
     let ledger = study.run(made, &|work, n| shown.advance(work, n))?;
     keeping.finish();
     drop(shown);
@@ -89,6 +91,25 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
         let what = format!("the total {total:.3e} is more than the sum of all rows {sum:.3e}");
         return Err(Error::Check { what });
     }
+    Ok(())
+}
+
+/// Says how long a ledger will take.
+fn announce(args: &LedgerArgs, study: &LedgerStudy<'_>) -> Result<()> {
+    /// Time beyond which a user may want less.
+    const LONG_S: f64 = 60.0;
+    if args.options.quiet || study.scene.lighting.mode == LightingMode::None {
+        return Ok(());
+    }
+    let estimating = spinner("estimating the time", false);
+    let seconds = study.expected_s()?;
+    drop(estimating);
+    let least = n_reflections(study.scene);
+    let hint = match seconds > LONG_S && args.reflections > least {
+        true => format!("; --reflections {least} leaves out the last row, the longest"),
+        false => String::new(),
+    };
+    say!("the pictures in f64 take about {} on this machine{hint}", about(seconds));
     Ok(())
 }
 
@@ -123,10 +144,12 @@ fn deliver(args: &LedgerArgs, folder: &SharedFolder, ledger: &Ledger) -> Result<
             json::write(&folder.join(Ledger::FILE), ledger)
         };
         let written = folder.write_last(!ledger.interrupted, &FILES, write);
-        if ledger.interrupted {
-            output::kept_apart(folder, args.options.quiet);
-        }
         written?;
+        let quiet = args.options.quiet;
+        match ledger.interrupted {
+            true => output::kept_apart(folder, quiet),
+            false => output::wrote_folder(folder, quiet),
+        }
     }
     printed
 }

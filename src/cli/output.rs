@@ -13,7 +13,7 @@ use crate::io::claim::Claim;
 use crate::io::console::{self, say};
 use crate::io::plain_text::{plain, plain_json};
 use crate::io::result_folder::ResultFolder;
-pub use crate::io::result_folder::refuse_existing;
+pub use crate::io::result_folder::{refuse_any, refuse_existing};
 use crate::report::charts::Chart;
 use crate::studies::figure::Figure;
 
@@ -139,8 +139,26 @@ pub fn claim_file(path: &Path, force: bool) -> Result<Option<Claim>> {
     check_place(path)?;
     let claim = Claim::take(path)?;
     // Another run may have written it meanwhile.
-    refuse_existing(path, force)?;
+    refuse_any(path, force)?;
     Ok(claim)
+}
+
+/// Says on stderr what a command has written, and where.
+pub fn wrote(place: &Path, what: &str, quiet: bool) {
+    if !quiet {
+        say!("wrote {}: {what}", place.display());
+    }
+}
+
+/// Says on stderr that a command has written a picture.
+pub fn wrote_picture(path: &Path, width: u32, height: u32, quiet: bool) {
+    wrote(path, &format!("{width} × {height} pixels"), quiet);
+}
+
+/// Says on stderr where finished results are.
+pub fn wrote_folder(folder: &ResultFolder, quiet: bool) {
+    let (n, list) = folder.n_files();
+    wrote(folder.place(), &format!("{n} files, listed in {list}"), quiet);
 }
 
 /// A results folder that the thread of Ctrl-C may take over; none before it is claimed.

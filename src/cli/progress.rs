@@ -1,4 +1,5 @@
-//! Progress on stderr: bars for work whose parts are counted, spinners for other work.
+//! Progress on stderr. A terminal shows bars for work whose parts are counted, and spinners for
+//! other work. Elsewhere, as in a log, a line says from time to time how far the work is.
 
 use std::io::IsTerminal;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
@@ -8,15 +9,57 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::io::console::say;
 use crate::reference::picture::RenderStage;
 
-/// Returns a progress bar, hidden if `quiet` is set or stderr is not a terminal.
-pub fn progress(n: u64, what: &str, quiet: bool) -> ProgressBar {
-    let is_hidden = quiet || !std::io::stderr().is_terminal();
-    let target =
-        if is_hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-    let bar = ProgressBar::with_draw_target(Some(n), target).with_message(what.to_owned());
-    styled(bar, "{msg} {wide_bar} {pos}/{len} {eta}")
+/// Time after which work is long enough to be shown on a terminal.
+const DELAY: Duration = Duration::from_secs(1);
+/// Time between two steps of a spinner.
+const SPINNER_STEP: Duration = Duration::from_millis(100);
+/// Seconds between two lines where stderr is not a terminal.
+const LINE_STEP_S: f64 = 15.0;
+
+/// Where progress is shown.
+#[derive(Clone, Copy)]
+enum Shown {
+    Nowhere,
+    OnTerminal,
+    /// In lines, this time apart.
+    InLines(Duration),
+}
+
+impl Shown {
+    fn new(quiet: bool) -> Shown {
+        if quiet {
+            return Shown::Nowhere;
+        }
+        if std::io::stderr().is_terminal() {
+            return Shown::OnTerminal;
+        }
+        let asked = std::env::var("NIMBUS_PROGRESS_S").ok().and_then(|text| text.parse().ok());
+        match Duration::try_from_secs_f64(asked.unwrap_or(LINE_STEP_S)) {
+            Ok(step) if !step.is_zero() => Shown::InLines(step),
+            _ => Shown::Nowhere,
+        }
+    }
+}
+
+/// Progress of work whose parts are counted. Any thread can advance it; dropping it removes its bar
+/// from the terminal.
+pub struct Progress {
+    bar: ProgressBar,
+    shown: Shown,
+    begin: Instant,
+    /// The time of the last line.
+    last: Mutex<Instant>,
+}
+
+/// Returns the progress of `n` parts of the work `what`.
+pub fn progress(n: u64, what: &str, quiet: bool) -> Progress {
+    let bar = ProgressBar::with_draw_target(Some(n), ProgressDrawTarget::hidden());
+    let bar = styled(bar.with_message(what.to_owned()), "{msg} {wide_bar} {pos}/{len} {eta}");
+    let begin = Instant::now();
+    Progress { bar, shown: Shown::new(quiet), begin, last: Mutex::new(begin) }
 }
 
 fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
@@ -26,67 +69,93 @@ fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
     }
 }
 
-/// A bar that appears after a second and disappears when it is dropped. Any thread can advance it.
-pub struct LateProgress {
-    bar: ProgressBar,
-    begin: Instant,
-    may_show: bool,
-}
-
-impl LateProgress {
-    /// Returns a bar for `n` parts; it never appears if `quiet` is set or stderr is not a terminal.
-    pub fn new(n: u64, what: &str, quiet: bool) -> LateProgress {
-        LateProgress {
-            bar: progress(n, what, true),
-            begin: Instant::now(),
-            may_show: !quiet && std::io::stderr().is_terminal(),
-        }
-    }
-
+impl Progress {
     /// Counts one more part as done.
     pub fn advance(&self) {
         self.bar.inc(1);
-        if self.may_show && self.bar.is_hidden() && self.begin.elapsed() > SPINNER_DELAY {
-            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        match self.shown {
+            Shown::OnTerminal if self.bar.is_hidden() && self.begin.elapsed() > DELAY => {
+                self.bar.set_draw_target(ProgressDrawTarget::stderr());
+            }
+            Shown::InLines(step) => {
+                let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+                if last.elapsed() >= step {
+                    *last = Instant::now();
+                    say!("{}", self.line());
+                }
+            }
+            Shown::OnTerminal | Shown::Nowhere => {}
         }
+    }
+
+    /// Adds parts that were not known before.
+    pub fn expect(&self, n: u64) {
+        self.bar.inc_length(n);
+    }
+
+    /// Names the work that follows.
+    pub fn name(&self, what: &'static str) {
+        self.bar.set_message(what);
+    }
+
+    /// Returns the line of a log. The time left assumes that all parts take as long as those done.
+    fn line(&self) -> String {
+        let (done, n) = (self.bar.position(), self.bar.length().unwrap_or(0));
+        let per_part_s = self.begin.elapsed().as_secs_f64() / done.max(1) as f64;
+        let left = about(per_part_s * n.saturating_sub(done) as f64);
+        format!("progress: {}: {done} of {n}, about {left} left", self.bar.message())
     }
 }
 
-impl Drop for LateProgress {
+impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
 }
 
-const SPINNER_DELAY: Duration = Duration::from_secs(1);
-const SPINNER_STEP: Duration = Duration::from_millis(100);
+/// Returns a time that is not known exactly, in the unit of a person.
+pub fn about(seconds: f64) -> String {
+    match seconds.ceil() {
+        s if s < 100.0 => format!("{s:.0} s"),
+        s if s < 6000.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.0} h", s / 3600.0),
+    }
+}
 
-/// A spinner that appears after a second and disappears when it is dropped.
+/// Progress of work without counted parts: on a terminal, a spinner that appears after a second and
+/// disappears when it is dropped.
 pub struct Spinner {
     /// The thread that draws, and the sender whose end makes it end.
     drawn: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
-/// Returns a spinner; it never appears if `quiet` is set or stderr is not a terminal.
+/// Returns the progress of the work `what`.
 pub fn spinner(what: &'static str, quiet: bool) -> Spinner {
-    if quiet || !std::io::stderr().is_terminal() {
-        return Spinner { drawn: None };
-    }
     let (done, waiting) = mpsc::channel::<()>();
-    let draw = move || {
-        if waiting.recv_timeout(SPINNER_DELAY) != Err(RecvTimeoutError::Timeout) {
-            return;
-        }
-        let spinner =
-            ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()).with_message(what);
-        let spinner = styled(spinner, "{spinner} {msg} {elapsed}").with_elapsed(SPINNER_DELAY);
-        while waiting.recv_timeout(SPINNER_STEP) == Err(RecvTimeoutError::Timeout) {
-            spinner.tick();
-        }
-        spinner.finish_and_clear();
+    let is_over = move |time| waiting.recv_timeout(time) != Err(RecvTimeoutError::Timeout);
+    let drawing: Box<dyn FnOnce() + Send> = match Shown::new(quiet) {
+        Shown::Nowhere => return Spinner { drawn: None },
+        Shown::OnTerminal => Box::new(move || {
+            if is_over(DELAY) {
+                return;
+            }
+            let spinner = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+            let spinner = styled(spinner.with_message(what), "{spinner} {msg} {elapsed}");
+            let spinner = spinner.with_elapsed(DELAY);
+            while !is_over(SPINNER_STEP) {
+                spinner.tick();
+            }
+            spinner.finish_and_clear();
+        }),
+        Shown::InLines(step) => Box::new(move || {
+            let begin = Instant::now();
+            while !is_over(step) {
+                say!("progress: {what}, for {} now", about(begin.elapsed().as_secs_f64()));
+            }
+        }),
     };
     // Where no thread can be started, the work goes on without a spinner.
-    let thread = std::thread::Builder::new().name("spinner".into()).spawn(draw);
+    let thread = std::thread::Builder::new().name("spinner".into()).spawn(drawing);
     Spinner { drawn: thread.ok().map(|thread| (done, thread)) }
 }
 
@@ -104,53 +173,53 @@ impl Drop for Spinner {
 /// Progress of a picture in f64, which any thread can report: a bar for work with counted parts, a
 /// spinner in between.
 pub struct ReferenceProgress {
-    shown: Mutex<Shown>,
+    line: Mutex<Line>,
     quiet: bool,
 }
 
-/// The line that the terminal shows.
-enum Shown {
+/// The progress that is shown.
+enum Line {
     /// Nothing, while one line replaces another.
     Nothing,
     /// A spinner between two works.
     Spinner { _spinner: Spinner },
     /// A bar over the parts of a work.
-    Bar { work: RenderStage, n_left: usize, bar: LateProgress },
+    Bar { work: RenderStage, n_left: usize, bar: Progress },
 }
 
 impl ReferenceProgress {
     /// Begins with a spinner.
     pub fn new(quiet: bool) -> ReferenceProgress {
-        ReferenceProgress { shown: Mutex::new(Shown::spinner(quiet)), quiet }
+        ReferenceProgress { line: Mutex::new(Line::spinner(quiet)), quiet }
     }
 
     /// Counts one of the `n` parts of `work` as done.
     pub fn advance(&self, work: RenderStage, n: usize) {
-        let mut shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
-        if !matches!(&*shown, Shown::Bar { work: current, .. } if *current == work) {
+        let mut line = self.line.lock().unwrap_or_else(PoisonError::into_inner);
+        if !matches!(&*line, Line::Bar { work: current, .. } if *current == work) {
             let what = match work {
                 RenderStage::Lighting => "lighting",
                 RenderStage::Drawing => "drawing",
                 RenderStage::Sampling => "samples",
             };
             // The line is cleared before another is drawn on it.
-            *shown = Shown::Nothing;
-            let bar = LateProgress::new(n as u64, what, self.quiet);
-            *shown = Shown::Bar { work, n_left: n, bar };
+            *line = Line::Nothing;
+            let bar = progress(n as u64, what, self.quiet);
+            *line = Line::Bar { work, n_left: n, bar };
         }
-        if let Shown::Bar { n_left, bar, .. } = &mut *shown {
+        if let Line::Bar { n_left, bar, .. } = &mut *line {
             bar.advance();
             *n_left -= 1;
             if *n_left == 0 {
-                *shown = Shown::Nothing;
-                *shown = Shown::spinner(self.quiet);
+                *line = Line::Nothing;
+                *line = Line::spinner(self.quiet);
             }
         }
     }
 }
 
-impl Shown {
-    fn spinner(quiet: bool) -> Shown {
-        Shown::Spinner { _spinner: spinner("drawing in f64", quiet) }
+impl Line {
+    fn spinner(quiet: bool) -> Line {
+        Line::Spinner { _spinner: spinner("drawing in f64", quiet) }
     }
 }

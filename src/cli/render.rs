@@ -70,6 +70,7 @@ fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
     image::write(&args.output, &film, film.width, film.height, &rgba)?;
     let hash = args.json.then(|| image_hash(&rgba));
     drop(writing);
+    output::wrote_picture(&args.output, film.width, film.height, quiet);
     let Some(hash) = hash else { return Ok(()) };
     output::object(&json!({
         "file": args.output.display().to_string(), "width": film.width, "height": film.height,

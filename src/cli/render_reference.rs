@@ -50,6 +50,7 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
         say!("warning: {n_bad} of {n} values of the picture are not finite");
     }
     image::write(&args.output, &film, film.width, film.height, &rgba)?;
+    output::wrote_picture(&args.output, film.width, film.height, args.options.quiet);
     if !args.json {
         return Ok(());
     }

@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use super::args::ReportArgs;
-use super::output::claim_file;
+use super::output::{claim_file, wrote};
 use super::progress::spinner;
 use crate::error::{Error, Result};
 use crate::io::atomic;
@@ -37,6 +37,8 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     let page = pages::page(&sources)?;
     atomic::write_atomic(&args.output, |file| file.write_all(page.as_bytes()))?;
     drop(writing);
+    let (n, plural) = (sources.len(), if sources.len() == 1 { "" } else { "s" });
+    wrote(&args.output, &format!("{n} result{plural} on one page"), args.quiet);
     Ok(())
 }
 

@@ -48,13 +48,13 @@ pub fn run(args: &StressArgs) -> Result<()> {
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        bar.set_message(case.name);
+        bar.name(case.name);
         let outcome = case.run(&mut context);
         lock(&done).push(outcome);
-        bar.inc(1);
+        bar.advance();
     }
     keeping.finish();
-    bar.finish_and_clear();
+    drop(bar);
     let done = std::mem::take(&mut *lock(&done));
     let interrupted = done.len() < chosen.len();
     print(args, &device, &done, interrupted)?;

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::args::WeatherArgs;
 use super::output::{self, header, or_dash};
-use super::progress::LateProgress;
+use super::progress::progress;
 use crate::error::Result;
 use crate::io::weather::container::Variable;
 use crate::io::weather::wrf::{self, Clouds, WeatherFile};
@@ -28,13 +28,13 @@ pub fn run(args: &WeatherArgs) -> Result<()> {
         }
         None => 0..file.n_steps,
     };
-    let progress = LateProgress::new(wanted.len() as u64, "reading steps", args.quiet);
+    let bar = progress(wanted.len() as u64, "reading steps", args.quiet);
     let mut steps = Vec::with_capacity(wanted.len());
     for i_step in wanted {
         steps.push(StepSummary::read(&file, i_step)?);
-        progress.advance();
+        bar.advance();
     }
-    drop(progress);
+    drop(bar);
     let name = args.file.display().to_string();
     let notes: Vec<String> = file.notes.iter().cloned().chain(notes(&steps)).collect();
     if args.json {

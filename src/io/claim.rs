@@ -9,11 +9,16 @@
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use super::atomic::{self, Temporary};
 use super::process_info::{command_line, host_name};
 use crate::error::{Error, Result};
 
+/// End of the name of every claim.
+const SUFFIX: &str = ".claim";
+/// A time far longer than [`refuse_taken`] looks at a claim.
+const LOOK: Duration = Duration::from_millis(20);
 /// Most characters of a claim that a message shows.
 const N_SHOWN: usize = 300;
 /// Most bytes that are read of a claim: the shown characters, of at most 4 bytes each.
@@ -43,12 +48,18 @@ impl Claim {
             let (mut file, path) = match open(&path) {
                 // The folder may be writable though its parent is not.
                 Err(_) if place.is_dir() => {
-                    let inside = place.join(".nimbus.claim");
+                    let inside = place.join(format!(".nimbus{SUFFIX}"));
                     (open(&inside).map_err(failed)?, inside)
                 }
                 opened => (opened.map_err(failed)?, path.clone()),
             };
-            match file.try_lock() {
+            let mut locked = file.try_lock();
+            if matches!(locked, Err(TryLockError::WouldBlock)) {
+                // It may be locked for an instant only, by a run that looks at it.
+                std::thread::sleep(LOOK);
+                locked = file.try_lock();
+            }
+            match locked {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => return Err(taken(place, &mut file)),
                 Err(TryLockError::Error(_)) => {
@@ -69,6 +80,28 @@ impl Claim {
     }
 }
 
+/// Refuses a place that another run has claimed, or a folder in which one has.
+///
+/// # Errors
+/// [`Error::Transient`] when another run has claimed it.
+pub fn refuse_taken(place: &Path) -> Result<()> {
+    let inside = fs::read_dir(place).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_claim = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().as_encoded_bytes();
+        name.starts_with(b".") && name.ends_with(SUFFIX.as_bytes())
+    };
+    let claims = path_of(place).into_iter().chain(inside.filter(is_claim));
+    // Opening a pipe would wait for its other end.
+    let claims = claims.filter(|path| path.is_file());
+    for mut file in claims.filter_map(|path| File::open(path).ok()) {
+        // A shared lock, so that two runs that look at once do not see each other.
+        if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
+            return Err(taken(place, &mut file));
+        }
+    }
+    Ok(())
+}
+
 /// Opens a claim, and makes it if need be. Another user's claim can be locked without writing it.
 fn open(path: &Path) -> io::Result<File> {
     let opened = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(path);
@@ -86,7 +119,7 @@ fn path_of(place: &Path) -> io::Result<PathBuf> {
     };
     let mut name = std::ffi::OsString::from(".");
     name.push(place.file_name().ok_or(ErrorKind::InvalidInput)?);
-    name.push(".claim");
+    name.push(SUFFIX);
     Ok(place.with_file_name(name))
 }
 
@@ -141,7 +174,10 @@ mod tests {
         }
         std::os::unix::fs::symlink(&place, dir.path().join("link")).unwrap();
         assert!(Claim::take(&dir.path().join("link")).is_err());
+        assert_eq!(refuse_taken(&place).unwrap_err().exit_code(), 75);
+        assert_eq!(refuse_taken(dir.path()).unwrap_err().exit_code(), 75);
         drop(claim);
+        assert_eq!(refuse_taken(&place), Ok(()));
         assert!(Claim::take(&place).is_ok());
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2, "no claim is left");
     }

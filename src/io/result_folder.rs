@@ -1,10 +1,10 @@
 //! The folder that one run writes its results to.
 //!
-//! Results of one kind are a *record* (`run.json`; merged frames have none), files beside it, and a *list* (`run.sha256`) of
-//! all of them with their SHA-256, which `sha256sum -c` checks. The list tells the files of nimbus
-//! from those of the user: no file that is missing in the list, or has changed since, is replaced
-//! or removed. Results that are there already stay until the new ones are finished; until then the
-//! new ones are kept in a folder beside them, `NAME.partial`.
+//! Results of one kind are a *record* (`run.json`; merged frames have none), files beside it, and a
+//! *list* (`run.sha256`) of all of them with their SHA-256, which `sha256sum -c` checks. The list
+//! tells the files of nimbus from those of the user: no file that is missing in the list, or has
+//! changed since, is replaced or removed. Results that are there already stay until the new ones
+//! are finished; until then the new ones are kept in a folder beside them, `NAME.partial`.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 use super::atomic::{Temporary, folder_of, write_atomic};
-use super::claim::Claim;
+use super::claim::{self, Claim};
 use super::folder::{check_writable, replace_files};
 use super::text_file::{RECORD_LIMIT, TABLE_LIMIT, read_result};
 use crate::error::{Error, Result};
@@ -34,11 +34,22 @@ pub enum Existing {
     Extend,
 }
 
-/// Refuses to replace a file or folder unless `force` is set.
+/// Refuses to replace a file or folder unless `force` is set, before it is claimed.
+///
+/// # Errors
+/// Fails if `path` exists and `force` is not set: [`Error::Transient`] if another run writes there.
+pub fn refuse_existing(path: &Path, force: bool) -> Result<()> {
+    if !force && path.symlink_metadata().is_ok() {
+        claim::refuse_taken(path)?;
+    }
+    refuse_any(path, force)
+}
+
+/// Refuses to replace a file or folder unless `force` is set, whoever writes there.
 ///
 /// # Errors
 /// Fails if `path` exists and `force` is not set.
-pub fn refuse_existing(path: &Path, force: bool) -> Result<()> {
+pub fn refuse_any(path: &Path, force: bool) -> Result<()> {
     if !force && path.symlink_metadata().is_ok() {
         return Err(Error::io(path, "exists; --force replaces it"));
     }
@@ -80,21 +91,19 @@ impl ResultFolder {
         existing: Existing,
         planned: &[String],
     ) -> Result<ResultFolder> {
-        let check_place = || {
-            refuse_existing(place, existing != Existing::Refuse)?;
-            match place.symlink_metadata() {
-                Ok(_) if !place.is_dir() => {
-                    Err(Error::io(place, "is not a folder; results need one"))
-                }
-                Ok(_) => check_writable(place),
-                Err(_) => Ok(()),
-            }
+        let is_forced = existing != Existing::Refuse;
+        let check_place = || match place.symlink_metadata() {
+            Ok(_) if !place.is_dir() => Err(Error::io(place, "is not a folder; results need one")),
+            Ok(_) => check_writable(place),
+            Err(_) => Ok(()),
         };
+        refuse_existing(place, is_forced)?;
         check_place()?;
         let failed = |cause| Error::io(place, cause);
         fs::create_dir_all(folder_of(place)).map_err(failed)?;
         let claim = Claim::take(place)?;
         // A run that has ended meanwhile may have left results.
+        refuse_any(place, is_forced)?;
         check_place()?;
         let is_made = !place.is_dir();
         if is_made {
@@ -127,6 +136,11 @@ impl ResultFolder {
 
     fn record(&self) -> String {
         format!("{}.json", self.kind)
+    }
+
+    /// Returns the number of files that this run has written, with their list, and its name.
+    pub fn n_files(&self) -> (usize, String) {
+        (self.sums.len() + 1, self.list())
     }
 
     /// Returns the folder that finished results go to.

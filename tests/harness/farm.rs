@@ -16,6 +16,7 @@ pub type Ran = (Option<i32>, String, String);
 
 pub fn nimbus(args: &[&str]) -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
+    command.env("NIMBUS_PROGRESS_S", "0");
     command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
     command.env_remove("SLURMD_NODENAME").env_remove("NIMBUS_EXCLUSIVE");
     command

@@ -86,6 +86,7 @@ impl Fixtures {
     /// Returns the program in this folder, without display and without other programs.
     pub fn command<A: AsRef<OsStr>>(&self, args: impl IntoIterator<Item = A>) -> Command {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
+        command.env("NIMBUS_PROGRESS_S", "0");
         command.args(args).current_dir(self.dir.path()).stdin(Stdio::null());
         command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
         command

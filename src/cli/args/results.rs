@@ -78,7 +78,7 @@ pub struct ReportArgs {
     /// Replace an existing file
     #[arg(long)]
     pub force: bool,
-    /// No progress
+    /// No progress, and no line about what was written
     #[arg(short, long)]
     pub quiet: bool,
 }

@@ -34,7 +34,7 @@ pub struct SceneArgs {
     /// Run every pass in every frame; the pictures are the same, to the byte
     #[arg(long, help_heading = "Scene")]
     pub no_skip: bool,
-    /// No warnings, no progress
+    /// No warnings, no progress, no line about what was written
     #[arg(short, long)]
     pub quiet: bool,
     /// Print device, sizes and passes

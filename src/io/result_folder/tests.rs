@@ -167,3 +167,17 @@ fn the_list_is_one_that_sha256sum_checks() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(String::from_utf8_lossy(&output.stdout).lines().count(), 4);
 }
+
+#[test]
+fn results_that_a_run_is_replacing_belong_to_that_run() {
+    let dir = tempfile::tempdir().unwrap();
+    let place = dir.path().join("run");
+    finished(&place, "old");
+    let refused = || ResultFolder::open(&place, "run", Existing::Refuse, &planned(0)).unwrap_err();
+    let running = ResultFolder::open(&place, "run", Existing::Replace, &planned(0)).unwrap();
+    assert_eq!(refused().exit_code(), 75);
+    // The folder above has results of several scenes.
+    assert_eq!(refuse_existing(dir.path(), false).unwrap_err().exit_code(), 75);
+    drop(running);
+    assert!(refused().to_string().contains("--force replaces it"));
+}

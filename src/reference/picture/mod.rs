@@ -8,6 +8,7 @@
 
 mod background;
 mod error_estimate;
+mod expected;
 mod frame;
 mod kind;
 mod limits;
@@ -24,6 +25,7 @@ mod sprites;
 
 pub use background::view;
 pub use error_estimate::ErrorEstimate;
+pub use expected::{PictureTime, expected_time};
 pub use frame::{FrameReference, colors};
 pub use kind::{ReferenceKind, n_reflections};
 pub use limits::check_memory;

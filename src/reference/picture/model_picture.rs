@@ -51,9 +51,17 @@ impl ModelPicture<'_> {
     /// Lights the facets of ground and particles in one sample. The result is the same in every
     /// sample unless the light is random.
     pub fn discs(&self, i_sample: u32) -> Vec<RadianceEstimate> {
-        self.light_each(self.model.discs.len(), |i| {
-            self.light.toward_eye(&self.light.area_scene.on_disc(i), [i as u32, i_sample])
-        })
+        self.light_each(self.n_discs(), |i| self.disc(i, i_sample))
+    }
+
+    /// Returns the number of facets of ground and particles.
+    pub fn n_discs(&self) -> usize {
+        self.model.discs.len()
+    }
+
+    /// Lights one of the facets of ground and particles.
+    pub fn disc(&self, i: usize, i_sample: u32) -> RadianceEstimate {
+        self.light.toward_eye(&self.light.area_scene.on_disc(i), [i as u32, i_sample])
     }
 
     /// Returns the radiance at a point of a surface's front. `i` numbers the points on surfaces.
@@ -67,16 +75,12 @@ impl ModelPicture<'_> {
         self.light.toward_eye(&self.light.area_scene.on_surface(i_surface, position), number)
     }
 
-    /// Lights `n` of the points that are lit one by one.
+    /// Lights `n` points of one kind.
     fn light_each<T: Send>(&self, n: usize, light: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        let n_on_surfaces = match self.how.by_facet {
-            true => self.scene.n_surface_facets() as usize,
-            false => self.pixels.at.len(),
-        };
-        let n_all = self.model.discs.len() + n_on_surfaces;
         parallel_map(n, |i| {
             let lit = light(i);
-            (self.on_progress)(RenderStage::Lighting, n_all);
+            // Points of another kind take other times: together they would mislead about the rest.
+            (self.on_progress)(RenderStage::Lighting, n);
             lit
         })
     }

@@ -92,24 +92,37 @@ pub(super) fn with_renderer<T>(
 
 fn with_model<T>(
     how: ModelDrawing,
-    (scene, time_s): (&Scene, f64),
+    of_scene: (&Scene, f64),
     pixels: &Pixels,
     on_progress: OnProgress,
     draw: impl FnOnce(&mut dyn FnMut(PixelSample) -> RenderedPixels) -> Result<T>,
 ) -> Result<T> {
+    with_picture(how, of_scene, pixels, on_progress, |picture| {
+        let is_random = picture.light.is_random();
+        let mut discs: Option<Vec<RadianceEstimate>> = None;
+        draw(&mut |sample| {
+            let kept = discs.take().filter(|_| !is_random);
+            let lit = kept.unwrap_or_else(|| picture.discs(sample.i));
+            let drawn = picture.draw(&lit, sample);
+            discs = Some(lit);
+            drawn
+        })
+    })
+}
+
+/// Prepares a picture in the model's own light, and calls `draw` with it.
+pub(super) fn with_picture<T>(
+    how: ModelDrawing,
+    (scene, time_s): (&Scene, f64),
+    pixels: &Pixels,
+    on_progress: OnProgress,
+    draw: impl FnOnce(&ModelPicture<'_>) -> Result<T>,
+) -> Result<T> {
     let frame = FrameReference::unlit(scene, time_s)?;
     let model = ModelScene::new(scene, &frame);
     let light = ModelLight::new(scene, &model, &frame, how.n_reflections);
-    let is_random = light.is_random();
     let (frame, model) = (&frame, &model);
-    let picture = ModelPicture { scene, frame, model, light, how, pixels, on_progress };
-    let mut discs: Option<Vec<RadianceEstimate>> = None;
-    draw(&mut |sample| {
-        let lit = discs.take().filter(|_| !is_random).unwrap_or_else(|| picture.discs(sample.i));
-        let drawn = picture.draw(&lit, sample);
-        discs = Some(lit);
-        drawn
-    })
+    draw(&ModelPicture { scene, frame, model, light, how, pixels, on_progress })
 }
 
 /// Draws a lit scene in the model's own light, through the centres of `pixels`.

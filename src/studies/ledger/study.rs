@@ -14,7 +14,7 @@ use crate::measure::stats::median;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::picture::{
     BlobModel, FrameReference, ModelDrawing, OnProgress, PixelSample, Pixels, ReferenceKind,
-    RenderStage, RenderedPixels, n_reflections, render_lit_scene, render_model,
+    RenderStage, RenderedPixels, expected_time, n_reflections, render_lit_scene, render_model,
 };
 use crate::studies::error::blocks::TimedBlock;
 use crate::studies::error::device_runner::{DeviceRunner, FrameChoice};
@@ -173,25 +173,49 @@ impl LedgerStudy<'_> {
 
     /// Adds the pictures that are lit by the model itself.
     fn add_models(&self, scene: &Scene, listener: OnProgress) -> Result<()> {
-        let add = |link: Link, is_by_facet: bool, n: u32| -> Result<()> {
+        for (link, how) in self.models(scene) {
             if !self.is_stopped() {
                 let (time_s, pixels) = (self.frames.time_s, self.pixels);
-                let how = ModelDrawing { n_reflections: n, by_facet: is_by_facet };
                 self.add(link, render_model(how, scene, time_s, pixels, listener)?);
             }
-            Ok(())
-        };
-        let (k, n) = (n_reflections(scene), self.n_reflections);
-        if scene.n_particles() > 0 {
-            add(Link::new("density grid", "grid and march", "closed form"), true, k)?;
-        }
-        if !scene.surfaces.is_empty() {
-            add(Link::new("facets of surfaces", "between facets", "every pixel"), false, k)?;
-        }
-        if n > k {
-            add(Link::new("reflections", &k.to_string(), &n.to_string()), false, n)?;
         }
         Ok(())
+    }
+
+    /// Returns the pictures that are lit by the model itself.
+    fn models(&self, scene: &Scene) -> Vec<(Link, ModelDrawing)> {
+        let (k, n) = (n_reflections(scene), self.n_reflections);
+        let picture = |is_made: bool, link: [&str; 3], by_facet: bool, n_reflections: u32| {
+            let [name, from, to] = link;
+            is_made.then(|| (Link::new(name, from, to), ModelDrawing { n_reflections, by_facet }))
+        };
+        let has_particles = scene.n_particles() > 0;
+        let grid = ["density grid", "grid and march", "closed form"];
+        let facets = ["facets of surfaces", "between facets", "every pixel"];
+        let more = ["reflections", &k.to_string(), &n.to_string()];
+        let all = [
+            picture(has_particles, grid, true, k),
+            picture(!scene.surfaces.is_empty(), facets, false, k),
+            picture(n > k, more, false, n),
+        ];
+        all.into_iter().flatten().collect()
+    }
+
+    /// Estimates the seconds that the pictures in f64 of a lit scene take, which are most of the
+    /// ledger's time.
+    ///
+    /// # Errors
+    /// As [`LedgerStudy::run`].
+    pub fn expected_s(&self) -> Result<f64> {
+        let scene = &ReferenceKind::without_approximations(self.scene);
+        let (mut sum, mut drawing_s) = (0.0, 0.0);
+        for (_, how) in self.models(scene) {
+            let time = expected_time(how.n_reflections, scene, self.frames.time_s, self.pixels)?;
+            sum += time.lighting_s + time.drawing_s;
+            drawing_s = time.drawing_s;
+        }
+        // The pictures in the light of the device and of its reference.
+        Ok(sum + 4.0 * drawing_s)
     }
 
     /// Times rounds of one block for each configuration, every second round in reverse order.

@@ -15,6 +15,7 @@ use super::progress::progress;
 use super::scene::{device_choice, print_sizes};
 use crate::error::{Error, Result};
 use crate::frame::{Stage, limits};
+use crate::io::console::say;
 use crate::io::result_folder::Existing;
 use crate::measure::zones::Zones;
 use crate::timing::blocks::{self, Finished, Outcome};
@@ -148,6 +149,9 @@ fn bench_scene(
     let Finished { stage, failure } = ended;
     if let (Some(failure), true) = (&failure, outcome.samples.is_empty()) {
         drop(lock_folder(&recorder.folder).take());
+        if *failure == Error::Interrupted {
+            say!("no frame was finished, nothing is kept");
+        }
         return Err(failure.clone());
     }
     let later = match (&recorder.args.trace, &stage) {

@@ -83,8 +83,8 @@ impl Recorder {
             trace::write(file, &outcome.samples, zones.as_ref(), clock)?;
         }
         let quiet = args.options.quiet;
-        if let (Some(folder), false) = (&*lock_folder(&self.folder), run.interrupted) {
-            output::wrote_folder(folder, quiet);
+        if let Some(folder) = &*lock_folder(&self.folder) {
+            output::wrote_folder(folder, !run.interrupted, quiet);
         }
         if let Some(file) = &args.trace {
             output::wrote(file, "the zones of all threads and of the device", quiet);
@@ -103,6 +103,7 @@ impl Recorder {
         outcome.interrupted = true;
         if outcome.samples.is_empty() {
             drop(lock_folder(&self.folder).take());
+            say!("no frame was finished, nothing is kept");
             return Error::Interrupted;
         }
         let printed = self.record(&outcome, &[], true).and_then(|run| {
@@ -139,11 +140,7 @@ impl Recorder {
         let charts = if self.args.plot { bench_plot::files(run, &table.rows)? } else { vec![] };
         let pictures = outcome.pictures.clone();
         let attachments = Attachments { pictures, charts, copies: vec![] };
-        let written = write_results(folder, run, table, &attachments);
-        if run.interrupted {
-            output::kept_apart(folder, self.args.options.quiet);
-        }
-        written
+        write_results(folder, run, table, &attachments)
     }
 
     /// Prints the tables.

@@ -187,6 +187,32 @@ pub fn empty_line(case: &Case) -> Option<String> {
     Some(format!("{text}: nothing moved in them\n"))
 }
 
+/// Returns a line about passes that the loops which skip ran in only some frames, or in none though
+/// the sweep changes what they compute: times of these loops then say little about such a pass.
+pub fn irregular_line(run: &Run) -> Option<String> {
+    const OF_LIGHT: [&str; 6] = ["grid", "facets", "transmit", "first", "second", "contract"];
+    let sweeps_light =
+        run.cases.iter().flat_map(|c| &c.sweep).any(|s| s.key.starts_with("lighting."));
+    let mut names: Vec<&str> = Vec::new();
+    for case in run.cases.iter().filter(|case| !case.is_still()) {
+        for pass in case.modes.iter().filter(|m| m.skip).flat_map(|m| &m.passes) {
+            let is_swept = sweeps_light && OF_LIGHT.contains(&pass.name.as_str());
+            // A pass that has nothing to do has no time in the loop without skipping either.
+            let is_missed = pass.n_run == 0 && is_swept && pass.saved_ms.is_some_and(|s| s > 0.0);
+            let is_irregular = pass.n_skipped > 0 && (pass.n_run > 0 || is_missed);
+            if is_irregular && !names.contains(&pass.name.as_str()) {
+                names.push(&pass.name);
+            }
+        }
+    }
+    (!names.is_empty()).then(|| {
+        format!(
+            "skipped in some timed frames or in all: {}; their times are those of the loop `no-skip`\n",
+            names.join(", ")
+        )
+    })
+}
+
 /// Returns a line for each kind of figure that a table shows as "-", with the reason.
 pub fn missing_lines(run: &Run) -> String {
     let mut lines: Vec<String> = Vec::new();

@@ -9,7 +9,7 @@ use super::args::ErrorArgs;
 use super::error_configurations::{axes, design, load_configuration};
 use super::error_table;
 use super::interrupt::{self, PATIENCE, graceful_stop};
-use super::output::{self, SharedFolder, kept_apart, lock_folder, refuse_existing};
+use super::output::{self, SharedFolder, lock_folder, refuse_existing};
 use super::progress::{Progress, ReferenceProgress, progress};
 use super::scene::{
     StudyScene, load_study, open_for_study, pixels, print_sizes, with_texture_hint,
@@ -128,17 +128,14 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         let chart = charts::error::chart(&study);
         let svg = chart.svg(chart.size())?;
         written = files::write_last(folder, &study, &results, &svg, &[]);
-        if study.interrupted {
-            kept_apart(folder, args.options.quiet);
-        }
     }
     if done.is_ok() || study.configurations.iter().any(|c| c.n_turns > 0) {
         print(args, color, &study)?;
     }
     done?;
     written?;
-    if let (Some(folder), false) = (&*lock_folder(&folder), study.interrupted) {
-        output::wrote_folder(folder, args.options.quiet);
+    if let Some(folder) = &*lock_folder(&folder) {
+        output::wrote_folder(folder, !study.interrupted, args.options.quiet);
     }
     gpu.close()?;
     if study.interrupted { Err(Error::Interrupted) } else { Ok(()) }

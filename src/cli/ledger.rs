@@ -145,11 +145,7 @@ fn deliver(args: &LedgerArgs, folder: &SharedFolder, ledger: &Ledger) -> Result<
         };
         let written = folder.write_last(!ledger.interrupted, &FILES, write);
         written?;
-        let quiet = args.options.quiet;
-        match ledger.interrupted {
-            true => output::kept_apart(folder, quiet),
-            false => output::wrote_folder(folder, quiet),
-        }
+        output::wrote_folder(folder, !ledger.interrupted, args.options.quiet);
     }
     printed
 }

@@ -155,10 +155,23 @@ pub fn wrote_picture(path: &Path, width: u32, height: u32, quiet: bool) {
     wrote(path, &format!("{width} × {height} pixels"), quiet);
 }
 
-/// Says on stderr where finished results are.
-pub fn wrote_folder(folder: &ResultFolder, quiet: bool) {
+/// Says on stderr where the results of a run are. Those of one that ended early may be kept apart
+/// from earlier ones.
+pub fn wrote_folder(folder: &ResultFolder, is_finished: bool, quiet: bool) {
     let (n, list) = folder.n_files();
-    wrote(folder.place(), &format!("{n} files, listed in {list}"), quiet);
+    let files = format!("{n} files, listed in {list}");
+    let place = folder.place();
+    match (is_finished, folder.unfinished_at()) {
+        (true, _) => wrote(place, &files, quiet),
+        (false, Some(at)) if at == place => {
+            wrote(place, &format!("what was finished, {files}"), quiet);
+        }
+        (false, Some(at)) if !quiet => {
+            let (place, at) = (place.display(), at.display());
+            say!("note: {place} keeps its earlier results; the new ones are in {at}");
+        }
+        (false, _) => {}
+    }
 }
 
 /// A results folder that the thread of Ctrl-C may take over; none before it is claimed.
@@ -167,14 +180,6 @@ pub type SharedFolder = Arc<Mutex<Option<ResultFolder>>>;
 /// Locks a shared folder.
 pub fn lock_folder(folder: &SharedFolder) -> MutexGuard<'_, Option<ResultFolder>> {
     folder.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Says where the results of a run that ended early are, if they have not replaced earlier ones.
-pub fn kept_apart(folder: &ResultFolder, quiet: bool) {
-    if let Some(apart) = folder.apart().filter(|_| !quiet) {
-        let place = folder.place().display();
-        say!("note: {place} keeps its earlier results; the new ones are in {}", apart.display());
-    }
 }
 
 /// Returns the rows of a table that has only its header yet.

@@ -148,16 +148,18 @@ fn header(line: Option<Line>, meaning: &str, text: &str, path: &Path) -> Result<
         ));
     };
     let (fields, _) = line.fields()?;
+    let (offset, word) = fields[0];
+    let n = word.parse().map_err(|_| {
+        let hint =
+            if word == "x" { "; a list of particles needs from = \"particles\"" } else { "" };
+        line.fault(offset, format!("expected {meaning}, found `{}`{hint}", shown(word)))
+    })?;
     if let Some(extra) = fields.get(1) {
         return Err(line.fault(
             extra.0,
             format!("expected {meaning} alone on its line, found more: `{}`", shown(extra.1)),
         ));
     }
-    let (offset, word) = fields[0];
-    let n = word
-        .parse()
-        .map_err(|_| line.fault(offset, format!("expected {meaning}, found `{}`", shown(word))))?;
     Ok((n, line.place(offset)))
 }
 

@@ -45,12 +45,14 @@ pub fn refuse_existing(path: &Path, force: bool) -> Result<()> {
     refuse_any(path, force)
 }
 
-/// Refuses to replace a file or folder unless `force` is set, whoever writes there.
+/// Refuses to replace a file or folder unless `force` is set, whoever writes there. An empty folder
+/// has nothing to replace.
 ///
 /// # Errors
 /// Fails if `path` exists and `force` is not set.
 pub fn refuse_any(path: &Path, force: bool) -> Result<()> {
-    if !force && path.symlink_metadata().is_ok() {
+    let is_empty = || path.read_dir().is_ok_and(|mut entries| entries.next().is_none());
+    if !force && path.symlink_metadata().is_ok() && !is_empty() {
         return Err(Error::io(path, "exists; --force replaces it"));
     }
     Ok(())

@@ -81,19 +81,19 @@ passes! {
     /// Places the particles.
     Place "place", Particles,
         needs |_, _| None,
-        unless |same| same.places => "nothing moved";
+        unless |same| same.places => "nothing moved, or all as one";
     /// Deposits the density grid.
     Grid "grid", Particles,
         needs unlit,
-        unless |same| same.grid => "nothing moved";
+        unless |same| same.grid => "nothing moved, or all as one";
     /// Orders particles along a Morton curve.
     Morton "morton", Particles,
         needs |f, _| unless(f.is_grouped, "a facet a particle"),
-        unless |same| same.morton => "nothing moved";
+        unless |same| same.morton => "nothing moved, or all as one";
     /// Places the facets.
     Facets "facets", Facets,
         needs unlit,
-        unless |same| same.facets => "nothing moved";
+        unless |same| same.facets => "nothing moved, or all as one";
     /// Computes the transmittance toward the lights.
     Transmit "transmit", Facets,
         needs unlit,

@@ -84,6 +84,11 @@ fn faults_have_their_place_and_say_what_was_expected() {
         (message("3\n0\n3, 1, 1, 1, 0, 0, 0, 1"), "2:1: the file says 0 boxes and has 1"),
         (message("3\n"), "1:2: the file ends: expected the number of boxes"),
         (
+            message("x, y\n1"),
+            "1:1: expected the number of particles, found `x`; a list of particles needs from = \
+             \"particles\"",
+        ),
+        (
             message("3, 1\n1"),
             "1:4: expected the number of particles alone on its line, found more: `1`",
         ),

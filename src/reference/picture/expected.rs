@@ -47,7 +47,7 @@ pub fn expected_time(
         while n_lit < n && begin.elapsed() < PROBE {
             parallel_map(round, |i| {
                 let spread = ((n_lit + i) as u32).wrapping_mul(SPREAD);
-                picture.disc((u64::from(spread) * n as u64 >> 32) as usize, 0)
+                picture.disc(((u64::from(spread) * n as u64) >> 32) as usize, 0)
             });
             n_lit += round;
         }

@@ -32,8 +32,10 @@ pub fn on_loss(rescue: impl FnOnce() + Send + 'static) {
 }
 
 unsafe extern "C" fn end(_: *mut xlib::Display) -> c_int {
-    let rescue = lock(&RESCUE).take();
-    if let Some(rescue) = rescue {
+    // The lock is held until the process ends: another thread that finds the display lost must not
+    // end the process while this one keeps unsaved work.
+    let mut rescue = lock(&RESCUE);
+    if let Some(rescue) = rescue.take() {
         rescue();
     }
     let error = Error::vulkan("window", "the connection to the display is lost");

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use egui::epaint::textures::TexturesDelta;
-use egui::{Context, RawInput, Ui, ViewportId};
+use egui::{Context, Ui, ViewportId};
 use winit::event::WindowEvent;
 use winit::window::Window;
 
@@ -109,15 +109,9 @@ impl EguiLayer {
         layout::px_per_point(self.window.inner_size().into(), self.window.scale_factor())
     }
 
-    /// Sets the size of text. egui changes it at the beginning of a pass, by the size of the window
-    /// in the pass before, so that a change takes a pass of its own.
+    /// Sets the size of text for the next pass.
     fn set_scale(&mut self) {
-        let zoom = (self.px_per_point() / self.window.scale_factor()) as f32;
-        if (zoom - self.context.zoom_factor()).abs() > 1e-4 {
-            self.context.set_zoom_factor(zoom);
-            let output = self.context.run_ui(RawInput::default(), |_| {});
-            lock(&self.shared).textures.append(output.textures_delta);
-        }
+        set_zoom(&self.context, (self.px_per_point() / self.window.scale_factor()) as f32);
     }
 
     /// Returns whether a text field has the keyboard focus.
@@ -171,5 +165,37 @@ impl EguiLayer {
     pub fn hide(&mut self) {
         lock(&self.shared).widgets = None;
         self.needs_update = true;
+    }
+}
+
+/// Sets the zoom that holds from the next pass on.
+///
+/// `Context::set_zoom_factor` would take effect within that pass, after the size of the window in
+/// points and the places of events were computed by the old zoom.
+fn set_zoom(context: &Context, zoom: f32) {
+    context.options_mut(|options| options.zoom_factor = zoom);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::{Pos2, RawInput, Rect, vec2};
+
+    #[test]
+    fn a_zoom_holds_from_the_next_pass_on() {
+        let context = Context::default();
+        for (native, zoom) in [(1.0, 1.0), (2.0, 0.5), (2.0, 0.75), (1.5, 1.0), (1.0, 1.0)] {
+            set_zoom(&context, zoom);
+            assert_eq!(context.zoom_factor(), zoom);
+            let size = vec2(640.0, 480.0) / (native * zoom);
+            let rect = Rect::from_min_size(Pos2::ZERO, size);
+            let mut input = RawInput { screen_rect: Some(rect), ..RawInput::default() };
+            let viewport = input.viewports.entry(input.viewport_id).or_default();
+            viewport.native_pixels_per_point = Some(native);
+            let mut seen = Rect::NOTHING;
+            let mut output = context.run_ui(input, |ui| seen = ui.max_rect());
+            output.textures_delta.clear();
+            assert_eq!((output.pixels_per_point, seen), (native * zoom, rect), "{native} {zoom}");
+        }
     }
 }

@@ -44,8 +44,7 @@ pub fn open_window(
 /// # Errors
 /// There is no display, or it cannot be opened.
 pub fn event_loop<T: 'static>(alternative: &str) -> Result<EventLoop<T>> {
-    // The cause names places in a library's source, and nothing that DISPLAY does not say.
-    EventLoop::with_user_event().build().map_err(|_| {
+    EventLoop::with_user_event().build().map_err(|error| {
         let problem = match std::env::var("DISPLAY") {
             Ok(name) if !name.is_empty() => format!(
                 "the display {name} cannot be opened: no X server answers there, or it does not \
@@ -55,8 +54,16 @@ pub fn event_loop<T: 'static>(alternative: &str) -> Result<EventLoop<T>> {
                   `ssh -X`, or by `xvfb-run`"
                 .to_owned(),
         };
-        Error::vulkan("opening a window", format!("{problem}; {alternative}"))
+        let cause = without_place(&error.to_string()).trim_end_matches('.').to_owned();
+        Error::vulkan("opening a window", format!("{problem} ({cause}); {alternative}"))
     })
+}
+
+/// Returns the text of an error of winit without the place in winit's source that it begins with:
+/// "os error at FILE:LINE: ".
+fn without_place(text: &str) -> &str {
+    let cause = || text.strip_prefix("os error at ")?.split_once(": ");
+    cause().map_or(text, |(_, cause)| cause)
 }
 
 /// Converts a scroll event to notches of a wheel; positive is away from the user.
@@ -103,6 +110,17 @@ impl<T: Send + 'static> RenderThread<T> {
 mod tests {
     use super::*;
     use std::sync::mpsc::channel;
+
+    #[test]
+    fn a_cause_has_no_place_in_the_source() {
+        for (text, cause) in [
+            ("os error at /a b/x11/mod.rs:12: no display: :0", "no display: :0"),
+            ("Exit Failure: 3", "Exit Failure: 3"),
+            ("os error at nothing", "os error at nothing"),
+        ] {
+            assert_eq!(without_place(text), cause);
+        }
+    }
 
     #[test]
     fn the_end_of_a_render_thread_is_signalled_also_after_a_panic() {

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf, absolute};
 
 use crate::error::Result;
-use crate::io::atomic::{make_folder, write_new_synced};
+use crate::io::atomic::{make_folder, write_synced};
 use crate::io::image::{self, ImageKind};
 use crate::model::film::Film;
-use crate::viewer::free_path::free_path;
+use crate::viewer::free_path::write_free;
 
 /// The folder that files are saved to, and the beginning of their names.
 pub struct Captures {
@@ -31,7 +31,7 @@ impl Captures {
             ImageKind::Png => "png",
             ImageKind::Exr => "exr",
         };
-        self.save(extension, |_| Ok(bytes.clone()))
+        self.save(extension, |_| Ok(bytes))
     }
 
     /// Saves a scene, whose text `text_of` returns for the place of the file. Returns its whole
@@ -39,27 +39,19 @@ impl Captures {
     ///
     /// # Errors
     /// As [`Captures::save_picture`], and those of `text_of`.
-    pub fn save_scene(&self, text_of: impl Fn(&Path) -> Result<String>) -> Result<PathBuf> {
+    pub fn save_scene(&self, text_of: impl FnOnce(&Path) -> Result<String>) -> Result<PathBuf> {
         self.save("toml", |path| text_of(path).map(String::into_bytes))
     }
 
-    /// Writes a new file. Another window may take a free name at the same time; then the next one
-    /// is tried.
+    /// Writes a new file in the folder, under a name that another window cannot take.
     fn save(
         &self,
         extension: &str,
-        bytes_at: impl Fn(&Path) -> Result<Vec<u8>>,
+        bytes_at: impl FnOnce(&Path) -> Result<Vec<u8>>,
     ) -> Result<PathBuf> {
         make_folder(&self.folder)?;
         let name = |n| self.folder.join(format!("{}-view-{n}.{extension}", self.stem));
-        loop {
-            let path = free_path(name);
-            match write_new_synced(&path, &bytes_at(&path)?) {
-                Ok(()) => return Ok(path),
-                Err(_) if path.symlink_metadata().is_ok() => {}
-                Err(error) => return Err(error),
-            }
-        }
+        write_free(name, |path| write_synced(path, &bytes_at(path)?))
     }
 }
 

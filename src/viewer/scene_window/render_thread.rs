@@ -31,11 +31,30 @@ struct GoodScene {
     size: [u32; 2],
 }
 
-/// Version, shader count and window size of a state.
-type Attempt = (u64, u64, [u32; 2]);
+/// The part of a state that could not be drawn.
+#[derive(Debug, Clone, Copy)]
+struct Attempt {
+    version: u64,
+    n_shader_loads: u64,
+    /// The size of the window, where the size is the fault. Another size mends no other fault.
+    size: Option<[u32; 2]>,
+}
 
-fn attempt(state: &ViewState) -> Attempt {
-    (state.version, state.n_shader_loads, state.size)
+impl Attempt {
+    fn of(state: &ViewState) -> Attempt {
+        Attempt { version: state.version, n_shader_loads: state.n_shader_loads, size: None }
+    }
+
+    fn of_size(state: &ViewState) -> Attempt {
+        Attempt { size: Some(state.size), ..Attempt::of(state) }
+    }
+
+    /// Returns whether `state` has the same fault.
+    fn is_of(&self, state: &ViewState) -> bool {
+        self.version == state.version
+            && self.n_shader_loads == state.n_shader_loads
+            && self.size.is_none_or(|size| size == state.size)
+    }
 }
 
 /// Delay before another attempt while the window has no visible area.
@@ -109,7 +128,7 @@ impl SceneRenderer {
             match self.activate(&state) {
                 Ok(Some(active)) => {
                     // An error stays visible until something else is drawn than what failed.
-                    if self.failed_at.is_some_and(|at| at != attempt(&state)) {
+                    if self.failed_at.is_some_and(|at| !at.is_of(&state)) {
                         self.failed_at = None;
                         lock(&self.links.status).render_error = None;
                     }
@@ -150,12 +169,17 @@ impl SceneRenderer {
         }
         let sources = self.choice.sources();
         let replaced = sources.and_then(|sources| self.target.gpu.set_sources(sources));
-        replaced.map_err(|error| self.report(&error, state)).ok()
+        replaced.map_err(|error| self.report_kept(&error, state)).ok()
     }
 
-    fn report(&mut self, error: &Error, state: &ViewState) {
-        self.failed_at = Some(attempt(state));
-        let text = format!("{}; the last good state stays", error.to_string().trim_end());
+    /// Reports that a state cannot be drawn, and that the last good one is drawn in its place.
+    fn report_kept(&mut self, error: &Error, state: &ViewState) {
+        let error = error.to_string();
+        self.report(Attempt::of(state), format!("{}; the last good state stays", error.trim_end()));
+    }
+
+    fn report(&mut self, failed: Attempt, text: String) {
+        self.failed_at = Some(failed);
         lock(&self.links.status).render_error = Some(text.clone());
         self.links.send(RenderEvent::ErrorChanged);
         // The window shows the error until something can be drawn again.
@@ -165,9 +189,11 @@ impl SceneRenderer {
     /// Reports that the window is too large for the device, and waits for a while. The window shows
     /// pictures again when it is smaller.
     fn wait_for_other_size(&mut self, error: &Error, state: &ViewState) {
-        if self.failed_at != Some(attempt(state)) {
-            self.report(error, state);
-            self.links.send(RenderEvent::Title(format!("the window is too large: {error}")));
+        let is_known = |at: &Attempt| at.size.is_some() && at.is_of(state);
+        if !self.failed_at.as_ref().is_some_and(is_known) {
+            let text = format!("the window is too large: {error}");
+            self.report(Attempt::of_size(state), text.clone());
+            self.links.send(RenderEvent::Title(text));
         }
         std::thread::sleep(HIDDEN_DELAY);
     }
@@ -203,7 +229,7 @@ impl SceneRenderer {
             }
             _ => return Err(error),
         }
-        self.report(&error, failed);
+        self.report_kept(&error, failed);
         Ok(())
     }
 

@@ -45,7 +45,7 @@ impl<'a> View<'a> {
     /// Waits until the window answers keys. Returns the window.
     fn window(&self) -> String {
         let window = self.display.window_of(self.child.id());
-        let n_answers = || self.text().matches("flies at ").count();
+        let n_answers = || self.text().matches("flying speed: ").count();
         let before = n_answers();
         wait_for("answer to a key", || {
             self.display.key("minus");

@@ -11,7 +11,7 @@ const PLAIN: std::ops::Range<f64> = 1e-4..1e9;
 ///
 /// At least three digits stay, so that a small number is not shown as 0. A number that reads back
 /// from fewer digits is not padded.
-pub fn shown(v: f64, resolution: f64) -> String {
+pub fn format_to_resolution(v: f64, resolution: f64) -> String {
     if v == 0.0 || !v.is_finite() {
         return if v == 0.0 { "0".to_owned() } else { format!("{v}") };
     }
@@ -32,9 +32,9 @@ pub fn shown(v: f64, resolution: f64) -> String {
 }
 
 /// Writes `v` with `n` significant digits at most.
-pub fn significant(v: f64, n: i32) -> String {
+pub fn format_significant(v: f64, n: i32) -> String {
     let exponent = if v == 0.0 { 0.0 } else { v.abs().log10().floor() };
-    shown(v, 10f64.powf(exponent - f64::from(n - 1)))
+    format_to_resolution(v, 10f64.powf(exponent - f64::from(n - 1)))
 }
 
 /// Returns a number without the zeros at the end of its decimals.
@@ -69,10 +69,14 @@ mod tests {
             (1.0, 0.0, "1"),
             (8.731_787_123, f64::NAN, "8.73"),
         ] {
-            assert_eq!(shown(v, resolution), expected, "{v} to {resolution}");
+            assert_eq!(format_to_resolution(v, resolution), expected, "{v} to {resolution}");
         }
         assert_eq!(
-            [significant(4.654_545, 3), significant(0.0, 3), significant(-1e-12 / 3.0, 4)],
+            [
+                format_significant(4.654_545, 3),
+                format_significant(0.0, 3),
+                format_significant(-1e-12 / 3.0, 4)
+            ],
             ["4.65", "0", "-3.333e-13"]
         );
     }
@@ -84,14 +88,14 @@ mod tests {
         ) {
             let (v, resolution) =
                 (if sign { -1.0 } else { 1.0 } * 10f64.powf(power), 10f64.powi(step));
-            let text = shown(v, resolution);
+            let text = format_to_resolution(v, resolution);
             let back: f64 = text.parse().expect("a number");
             // Half a unit of the last digit: of the resolution, or of the third digit. Beyond 15
             // digits f64 ends.
             let bound = (0.5 * resolution).min(0.005 * v.abs()).max(1e-14 * v.abs());
             prop_assert!((back - v).abs() <= 1.000_001 * bound, "{text} for {v} to {resolution}");
             prop_assert!(text.len() <= 24, "{text}");
-            prop_assert_eq!(shown(back, resolution), text);
+            prop_assert_eq!(format_to_resolution(back, resolution), text);
         }
     }
 }

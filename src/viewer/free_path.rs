@@ -47,7 +47,8 @@ fn claim(name: impl Fn(u32) -> PathBuf) -> Result<Claimed> {
         }
     }
     let (first, last) = (name(1), name(MAX_NAMES));
-    let what = format!("this name and all others up to {} are taken; move old files", last.display());
+    let what =
+        format!("this name and all others up to {} are taken; move old files", last.display());
     Err(Error::io(&first, what))
 }
 

@@ -5,6 +5,8 @@
 //! into a window target, and panels (egui) are drawn over the picture. The state compiles and is
 //! tested without a window.
 
+#[cfg(feature = "window")]
+mod colors;
 mod digits;
 #[cfg(feature = "window")]
 mod display_loss;
@@ -17,7 +19,8 @@ pub mod error_probe;
 pub mod fly_camera;
 #[cfg(feature = "window")]
 mod free_path;
-pub mod layout;
+#[cfg(feature = "window")]
+mod layout;
 #[cfg(feature = "window")]
 mod messages;
 #[cfg(feature = "window")]

@@ -6,11 +6,6 @@ use egui::{
     Vec2, Window, pos2, vec2,
 };
 
-/// Colour behind messages.
-pub const MESSAGE: Color32 = Color32::from_rgb(34, 38, 46);
-/// Colour behind errors.
-pub const ERROR: Color32 = Color32::from_rgb(150, 40, 40);
-
 /// Distance of banners from each other and from the picture's edges, points.
 const GAP: f32 = 8.0;
 /// Distance of a banner's text from its edge, points.
@@ -21,10 +16,18 @@ const TEXT: f32 = 13.0;
 const MAX_CHARS: usize = 2000;
 /// Smallest share that text of narrow panels shrinks to.
 const LEAST_TEXT: f32 = 0.85;
-/// Width of the list of keys, points.
+/// Width of the list of keys, points: the longest description takes two lines.
 const KEYS_WIDTH: f32 = 480.0;
-/// Width of the column of keys, points.
+/// Smallest width of the list of keys, points. Below it a description has one word a line.
+const LEAST_KEYS_WIDTH: f32 = 60.0;
+/// Width of the column of keys, points: the longest name of a key takes one line.
 const KEY_WIDTH: f32 = 118.0;
+/// Space beside the list of keys, points: the window's margins, and as much of the picture.
+const BESIDE_KEYS: f32 = 40.0;
+/// Space above and below the list of keys, points: the window's title and margins.
+const ABOVE_KEYS: f32 = 80.0;
+/// Smallest height of the list of keys, points: two lines, so that it can be scrolled.
+const LEAST_KEYS_HEIGHT: f32 = 40.0;
 
 /// A group of keys with its title: each key with what it does.
 pub type KeyGroup = (&'static str, Vec<(&'static str, &'static str)>);
@@ -66,9 +69,8 @@ pub fn rows_of_third(area: Rect) -> usize {
 /// Shows the list of keys in the middle of `area`. Returns whether its close button was clicked.
 pub fn keys(ui: &Ui, area: Rect, groups: &[KeyGroup]) -> bool {
     let mut is_open = true;
-    let width = KEYS_WIDTH.min(area.width() - 40.0).max(60.0);
-    // The title and the margins take the rest.
-    let height = (area.height() - 80.0).max(40.0);
+    let width = KEYS_WIDTH.min(area.width() - BESIDE_KEYS).max(LEAST_KEYS_WIDTH);
+    let height = (area.height() - ABOVE_KEYS).max(LEAST_KEYS_HEIGHT);
     let window = Window::new("Keys").open(&mut is_open).collapsible(false).resizable(false);
     let at = area.center() - ui.ctx().content_rect().center();
     window.anchor(Align2::CENTER_CENTER, at).show(ui.ctx(), |ui| {

@@ -1,7 +1,8 @@
 //! Widgets of a test's pass: every drawn text with its place.
 
 use egui::epaint::{ClippedShape, Shape};
-use egui::{Context, Event, FullOutput, MouseWheelUnit, Pos2, RawInput, Rect, Ui, Vec2, vec2};
+use egui::{Context, Event, FullOutput, MouseWheelUnit, PointerButton, Pos2, RawInput, Rect};
+use egui::{Ui, Vec2, vec2};
 
 use super::layout::px_per_point;
 
@@ -64,16 +65,43 @@ impl FakeWindow {
 
     /// Turns the wheel at a place through `points`, down. Returns the texts afterwards.
     pub fn scroll(&mut self, at: Pos2, points: f32, mut add: impl FnMut(&mut Ui)) -> Vec<Text> {
-        let wheel = Event::MouseWheel {
-            unit: MouseWheelUnit::Point,
-            delta: vec2(0.0, -points),
-            phase: egui::TouchPhase::Move,
-            modifiers: egui::Modifiers::default(),
-        };
-        self.run(vec![Event::PointerMoved(at)], &mut add);
-        self.run(vec![wheel], &mut add);
+        wheel(at, points).into_iter().for_each(|events| drop(self.run(events, &mut add)));
         self.settle(add)
     }
+}
+
+/// Returns the events of each pass of a turn of the wheel through `points`, down.
+pub fn wheel(at: Pos2, points: f32) -> [Vec<Event>; 2] {
+    let wheel = Event::MouseWheel {
+        unit: MouseWheelUnit::Point,
+        delta: vec2(0.0, -points),
+        phase: egui::TouchPhase::Move,
+        modifiers: egui::Modifiers::default(),
+    };
+    [vec![Event::PointerMoved(at)], vec![wheel]]
+}
+
+/// Returns the events of each pass of a click.
+pub fn click(at: Pos2) -> [Vec<Event>; 3] {
+    let button = |pressed| Event::PointerButton {
+        pos: at,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: egui::Modifiers::default(),
+    };
+    [vec![Event::PointerMoved(at)], vec![button(true)], vec![button(false)]]
+}
+
+/// Returns sizes of windows, pixels, and scales of displays, that all have room for panels.
+pub fn windows() -> impl Iterator<Item = ([u32; 2], f64)> {
+    let small = [[640, 480], [700, 700], [800, 600], [900, 640], [961, 540], [1280, 720]];
+    let large = [[1920, 1080], [3840, 2160], [1080, 1920], [2560, 600]];
+    small.into_iter().chain(large).flat_map(|size| [1.0, 1.5, 2.0].map(|scale| (size, scale)))
+}
+
+/// Returns the drawn text of these words.
+pub fn find<'a>(texts: &'a [Text], text: &str) -> &'a Text {
+    texts.iter().find(|t| t.text == text).unwrap_or_else(|| panic!("no {text}: {texts:?}"))
 }
 
 fn texts(output: &FullOutput) -> Vec<Text> {

@@ -7,7 +7,7 @@ use egui::text_edit::TextEditState;
 use egui::{Grid, Id, Key, TextEdit, Ui};
 
 use crate::model::boxes::CloudBox;
-use crate::viewer::digits::{shown, significant};
+use crate::viewer::digits::{format_significant, format_to_resolution};
 use crate::viewer::editor::document::density;
 use crate::viewer::editor::{Axis, EditorController, Field, Input};
 
@@ -55,20 +55,20 @@ const NAMES: f32 = 66.0;
 const FIELD: f32 = 130.0;
 
 /// A number as a field shows it.
-struct Shown {
+struct FieldValue {
     /// Every digit, for an edit.
     whole: String,
     /// The digits that matter.
     rounded: String,
 }
 
-impl Shown {
-    fn exact(v: f64) -> Shown {
-        Shown { whole: format!("{v}"), rounded: format!("{v}") }
+impl FieldValue {
+    fn exact(v: f64) -> FieldValue {
+        FieldValue { whole: format!("{v}"), rounded: format!("{v}") }
     }
 
-    fn with_digits(v: f64, n: i32) -> Shown {
-        Shown { rounded: significant(v, n), ..Shown::exact(v) }
+    fn with_digits(v: f64, n: i32) -> FieldValue {
+        FieldValue { rounded: format_significant(v, n), ..FieldValue::exact(v) }
     }
 }
 
@@ -101,19 +101,22 @@ pub fn show(
     let length = |of: fn(&CloudBox, Axis) -> f64, axis: Axis| {
         let b = active?;
         let v = of(b, axis);
-        Some(Shown { rounded: shown(v, resolution(b, step)), ..Shown::exact(v) })
+        Some(FieldValue {
+            rounded: format_to_resolution(v, resolution(b, step)),
+            ..FieldValue::exact(v)
+        })
     };
     Grid::new("fields").num_columns(2).min_col_width(NAMES).spacing([8.0, 2.0]).show(ui, |ui| {
-        let mut row = |name: &str, field: Field, value: Option<Shown>, hint: &str| {
+        let mut row = |name: &str, field: Field, value: Option<FieldValue>, hint: &str| {
             ui.label(name).on_hover_text(hint);
             edit(ui, texts, field, value, inputs);
             ui.end_row();
         };
         const LENGTH: &str = "in scene units, or 1.5 m, 150 cm, 2 km";
-        let n = active.map(|b| Shown::exact(b.n_particles.into()));
+        let n = active.map(|b| FieldValue::exact(b.n_particles.into()));
         row("particles", Field::Count, n, "a whole number");
         let hint = "particles in a cubic unit; 12 /m³, 0.5 /km³";
-        let density = active.and_then(density).map(|v| Shown::with_digits(v, DENSITY_DIGITS));
+        let density = active.and_then(density).map(|v| FieldValue::with_digits(v, DENSITY_DIGITS));
         row("density", Field::Density, density, hint);
         for axis in Axis::ALL {
             let value = length(|b, axis| b.extent[axis.index()], axis);
@@ -125,9 +128,9 @@ pub fn show(
         }
         row("radius", Field::Radius, length(|b, _| b.radius_max, Axis::X), LENGTH);
         let hint = "of the cloud's particles; not saved in the file";
-        row("seed", Field::Seed, Some(Shown::exact(editor.document().seed.into())), hint);
+        row("seed", Field::Seed, Some(FieldValue::exact(editor.document().seed.into())), hint);
         let hint = "of the grid that drags snap to";
-        row("grid step", Field::SnapStep, Some(Shown::with_digits(step, LENGTH_DIGITS)), hint);
+        row("grid step", Field::SnapStep, Some(FieldValue::with_digits(step, LENGTH_DIGITS)), hint);
     });
 }
 
@@ -139,11 +142,11 @@ fn edit(
     ui: &mut Ui,
     texts: &mut FieldTexts,
     field: Field,
-    value: Option<Shown>,
+    value: Option<FieldValue>,
     inputs: &mut Vec<Input>,
 ) {
     let is_enabled = value.is_some();
-    let value = value.unwrap_or(Shown { whole: String::new(), rounded: String::new() });
+    let value = value.unwrap_or(FieldValue { whole: String::new(), rounded: String::new() });
     let text = texts.texts.get(&field).map(|text| text.now.clone());
     let mut text = text.unwrap_or(value.rounded);
     let id = Id::new(field);

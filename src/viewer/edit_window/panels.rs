@@ -1,18 +1,19 @@
 //! The editor's panels: file, numbers, buttons, list of boxes, status line, and messages.
 
-use egui::{Align, Button, Color32, Frame, Id, Layout, Margin, Panel, Rect, RichText, ScrollArea};
+use egui::{Align, Button, Frame, Id, Layout, Margin, Panel, Rect, RichText, ScrollArea};
 use egui::{TextStyle, Ui, vec2};
 
 use super::dialogs::{self, FileDialog};
 use super::fields::{self, FieldTexts};
 use super::panel_state::PanelState;
 use super::shapes;
+use crate::viewer::colors;
 use crate::viewer::editor::{
     Action, Axis, Command, DisplayMode, Input, SHORTCUTS, ScalingAnchor, Select, SelectionMode,
     SessionEvent, Setting, mean_rate,
 };
 use crate::viewer::layout::panel_width;
-use crate::viewer::overlay_text::{self, banner, rows_of_third, shrink_text};
+use crate::viewer::overlay_text::{banner, rows_of_third, shrink_text};
 use crate::viewer::shortcut::Shortcut;
 
 /// Width of the panel, points.
@@ -30,7 +31,6 @@ const LEAST_LIST: f32 = 60.0;
 const BUTTON_GAP: f32 = 5.0;
 /// Number of rows of a message.
 const MESSAGE_ROWS: usize = 8;
-const BACKGROUND: Color32 = Color32::from_rgb(24, 26, 30);
 /// The line over an empty picture.
 const FIRST_STEPS: &str = "A: add a box where the view looks    ?: all keys";
 
@@ -65,13 +65,13 @@ pub fn show(
     }
     let mut free = ui.available_rect_before_wrap();
     if let Some(failure) = state.failure {
-        free = banner(ui, free, failure, overlay_text::ERROR, rows_of_third(free));
+        free = banner(ui, free, failure, colors::ERROR, rows_of_third(free));
     }
     if let Some(message) = state.controller.message() {
-        free = banner(ui, free, message, overlay_text::MESSAGE, MESSAGE_ROWS);
+        free = banner(ui, free, message, colors::MESSAGE, MESSAGE_ROWS);
     }
     if state.controller.editor().boxes().is_empty() && !state.controller.shows_help() {
-        banner(ui, free, FIRST_STEPS, overlay_text::MESSAGE, MESSAGE_ROWS);
+        banner(ui, free, FIRST_STEPS, colors::MESSAGE, MESSAGE_ROWS);
     }
     dialogs::show(ui, state, dialog, &mut inputs);
     inputs
@@ -80,10 +80,10 @@ pub fn show(
 /// Adds the status line and the panel.
 fn sides(ui: &mut Ui, state: &PanelState<'_>, texts: &mut FieldTexts, inputs: &mut Vec<Input>) {
     let width = width_of(ui.max_rect().width().into());
-    let frame = Frame::new().fill(BACKGROUND).inner_margin(Margin::symmetric(6, 2));
+    let frame = Frame::new().fill(colors::PANEL).inner_margin(Margin::symmetric(6, 2));
     let status_line = Panel::bottom("status").resizable(false).exact_size(STATUS).frame(frame);
     status_line.show(ui, |ui| status(ui, state));
-    let frame = Frame::new().fill(BACKGROUND).inner_margin(Margin::same(6));
+    let frame = Frame::new().fill(colors::PANEL).inner_margin(Margin::same(6));
     let numbers = Panel::right("numbers").resizable(false).exact_size(width).frame(frame);
     numbers.show(ui, |ui| {
         shrink_text(ui, width / WIDTH);
@@ -196,9 +196,7 @@ fn row_height(ui: &Ui) -> f32 {
 fn list(ui: &mut Ui, state: &PanelState<'_>, inputs: &mut Vec<Input>) {
     let editor = state.controller.editor();
     let n = editor.boxes().len();
-    let text_height = ui.text_style_height(&TextStyle::Button);
-    let height =
-        ui.spacing().interact_size.y.max(text_height + 2.0 * ui.spacing().button_padding.y);
+    let height = row_height(ui);
     let active = editor.active_box().map(|(i, _)| i);
     let id = Id::new("listed active box");
     let was_active = ui.data(|data| data.get_temp::<Option<usize>>(id)).flatten();

@@ -65,6 +65,8 @@ pub struct WindowTimes {
 
 /// Interval between two updates of the panels, and between two looks at the scene's files.
 const IDLE_INTERVAL: Duration = Duration::from_millis(250);
+/// Time that the hint stays after the first picture, unless a key ends it before.
+const HINT_FOR: Duration = Duration::from_secs(6);
 
 /// Opens a window and shows the scene until the user closes it.
 ///
@@ -89,6 +91,7 @@ pub fn run(options: Options) -> Result<WindowTimes> {
     let mut app = App {
         captures: Captures::new(&options.captures, &options.source.path),
         messages: Messages::default(),
+        drawn_since: None,
         options,
         links,
         files,
@@ -130,6 +133,8 @@ struct App {
     error_meter: ErrorMeter,
     captures: Captures,
     messages: Messages,
+    /// When the first picture was seen here.
+    drawn_since: Option<Instant>,
     /// Why the window could not open.
     failure: Option<Error>,
 }
@@ -167,6 +172,7 @@ impl ApplicationHandler<RenderEvent> for App {
     fn about_to_wait(&mut self, events: &ActiveEventLoop) {
         self.reload_files();
         self.error_meter.update(&self.links.state, &self.links.status);
+        self.end_hint();
         let is_shown = self.update_panels();
         let idle = Instant::now() + IDLE_INTERVAL;
         let due = self.layer.as_ref().filter(|_| is_shown).and_then(EguiLayer::due);
@@ -286,16 +292,28 @@ impl App {
         self.request_panels();
     }
 
+    /// Hides the hint when the user has seen it for a while.
+    fn end_hint(&mut self) {
+        if self.drawn_since.is_none() && lock(&self.links.status).timeline.newest().is_some() {
+            self.drawn_since = Some(Instant::now());
+        }
+        if self.drawn_since.is_some_and(|since| since.elapsed() >= HINT_FOR) {
+            self.state().shows_hint = false;
+        }
+    }
+
+    /// Returns whether anything is shown over the picture besides messages.
+    fn has_widgets(&self) -> bool {
+        let state = self.state();
+        let by_state = state.has_panels || state.shows_help || state.shows_hint;
+        drop(state);
+        by_state || lock(&self.links.status).alarm().is_some()
+    }
+
     /// Updates the widgets where due. Returns whether any widget is shown.
     fn update_panels(&mut self) -> bool {
         let messages = self.messages.at(Instant::now());
-        // Copies, so that the render thread never waits for the panels.
-        let (state, status) = (lock(&self.links.state).clone(), lock(&self.links.status).clone());
-        let is_shown = state.has_panels
-            || state.shows_help
-            || state.shows_hint
-            || !messages.is_empty()
-            || status.alarm().is_some();
+        let is_shown = self.has_widgets() || !messages.is_empty();
         let Some(layer) = &mut self.layer else { return is_shown };
         if !is_shown {
             layer.hide();
@@ -304,15 +322,14 @@ impl App {
         if !layer.is_due() {
             return true;
         }
+        // Copies, so that the render thread never waits for the panels.
+        let (state, status) = (lock(&self.links.state).clone(), lock(&self.links.status).clone());
         let mut commands = vec![];
         layer.update(|ui| {
             let (clicked, backdrop) = panels::show_all(ui, &state, &status, &messages);
             commands.extend(clicked);
             backdrop
         });
-        if !commands.is_empty() {
-            layer.request_update();
-        }
         for command in commands {
             let response = self.state().act(command);
             self.respond(response);

@@ -100,13 +100,17 @@ pub const SHORTCUTS: [Shortcut<Command>; 28] = [
     Shortcut::new("f12", Command::Capture(ImageKind::Png), "save the picture as PNG"),
     Shortcut::new("f11", Command::Capture(ImageKind::Exr), "save the picture as EXR"),
     Shortcut::new("h", Command::TogglePanels, "show or hide the panels"),
-    Shortcut::new("n", Command::Count, "count non-finite and clipped values of a frame"),
-    Shortcut::new("m", Command::ToggleB, "keep the settings as B for a comparison, or drop B"),
+    Shortcut::new("n", Command::Count, "count values of a frame that are not finite, or clipped"),
+    Shortcut::new(
+        "m",
+        Command::ToggleB,
+        "keep the present settings as B, to compare later ones (A) with them, or drop B",
+    ),
     Shortcut::new("x", Command::NextComparison, "show A and B split, their difference, or B alone"),
     Shortcut::new(
         "j",
         Command::ToggleError,
-        "measure the error against the f64 reference, when paused",
+        "measure the error against the f64 reference, while the scene is paused",
     ),
     Shortcut::new("f10", Command::SaveScene, "save the view as a scene file"),
     Shortcut::new(
@@ -115,7 +119,7 @@ pub const SHORTCUTS: [Shortcut<Command>; 28] = [
         "copy the command that draws this view, and print it on the terminal",
     ),
     Shortcut::new("?", Command::Help, "show or hide this list"),
-    Shortcut::new("f1", Command::Help, "the same"),
+    Shortcut::new("f1", Command::Help, "show or hide this list, as ?"),
     Shortcut::new("escape", Command::Quit, "close this list, or the window"),
 ];
 

@@ -72,6 +72,11 @@ impl Timeline {
     }
 }
 
+/// Returns the time to record and submit a frame, ms.
+pub fn recording_ms(frame: &FrameTimes) -> f64 {
+    frame.record_ms + frame.submit_ms
+}
+
 /// Returns the time from `zero` to `t`, ms.
 pub fn ms_after(zero: Instant, t: Instant) -> f64 {
     t.saturating_duration_since(zero).as_secs_f64() * 1e3

@@ -12,7 +12,7 @@ use super::knobs::Knob;
 use super::playback::Playback;
 use crate::io::image::ImageKind;
 use crate::model::scene::Scene;
-use crate::viewer::digits::significant;
+use crate::viewer::digits::format_significant;
 use crate::viewer::fly_camera::{FlyCamera, Motion};
 #[cfg(feature = "window")]
 use crate::viewer::layout;
@@ -52,7 +52,7 @@ pub struct ViewState {
     pub fits_panels: bool,
     /// Whether the list of keys is shown.
     pub shows_help: bool,
-    /// Whether the line with the first keys is shown.
+    /// Whether the line with the first keys is shown. It goes with the first key.
     pub shows_hint: bool,
     /// The next frame's values are to be counted.
     pub wants_counts: bool,
@@ -125,6 +125,7 @@ impl ViewState {
 
     /// Handles a key press; keys are named as in `SHORTCUTS`.
     pub fn press(&mut self, key: &str) -> Response {
+        self.shows_hint = false;
         if let Some((name, _)) = FLYING_KEYS.iter().find(|(name, _)| *name == key) {
             self.held_keys.insert(name);
         } else if let Some(command) = Shortcut::command_of(&SHORTCUTS, key) {
@@ -167,16 +168,17 @@ impl ViewState {
             Command::ToggleB => {
                 self.version += 1;
                 let text = if self.variant.take().is_some() {
-                    "B is dropped"
+                    "B is dropped: the window shows A alone"
                 } else {
                     self.variant = Some(Variant { scene: self.scene.clone(), skips: self.skips });
-                    "B keeps the present settings; further changes are those of A"
+                    "the present settings are kept as B; changes from now on are of A"
                 };
                 return Response::Message(text.to_owned());
             }
             Command::NextComparison if self.variant.is_none() => {
                 return Response::Message(
-                    "there is no B to compare with: m keeps the present settings as B".to_owned(),
+                    "there is no B to compare with: press m to keep the present settings as B"
+                        .to_owned(),
                 );
             }
             Command::NextComparison => {
@@ -188,15 +190,14 @@ impl ViewState {
             }
             Command::Speed(doublings) => {
                 self.camera = self.camera.after(Motion::Speed { doublings });
-                let speed = significant(self.camera.speed(), 3);
-                return Response::Message(format!("flies at {speed} units a second"));
+                let speed = format_significant(self.camera.speed(), 3);
+                return Response::Message(format!("flying speed: {speed} scene units a second"));
             }
             Command::NextPresentMode => self.n_mode_steps += 1,
             Command::Seek(seek) => self.playback = self.playback.after(seek),
             Command::Capture(format) => self.capture = Some(format),
             Command::TogglePanels => {
-                self.has_panels = !self.has_panels;
-                (self.fits_panels, self.shows_hint) = (false, false);
+                (self.has_panels, self.fits_panels) = (!self.has_panels, false);
             }
             Command::Count => self.wants_counts = true,
             Command::Compare(comparison) => self.comparison = comparison,
@@ -204,16 +205,14 @@ impl ViewState {
                 self.measures_error = !self.measures_error;
                 if self.measures_error && !self.playback.is_paused() {
                     return Response::Message(
-                        "the error is measured while the frames pause: press space".to_owned(),
+                        "the error is measured only while the scene is paused: press space to pause"
+                            .to_owned(),
                     );
                 }
             }
             Command::SaveScene => return Response::SaveScene,
             Command::PrintCommandLine => return Response::PrintCommandLine,
-            Command::Help => {
-                self.shows_help = !self.shows_help;
-                self.shows_hint = false;
-            }
+            Command::Help => self.shows_help = !self.shows_help,
             Command::Quit if self.shows_help => self.shows_help = false,
             Command::Quit => self.is_closing = true,
         }

@@ -9,8 +9,10 @@ use crate::viewer::editor::{
 };
 use crate::viewer::fly_camera::FlyCamera;
 use crate::viewer::layout::has_room_for_panels;
-use crate::viewer::widget_check::{FakeWindow, Text, assert_whole_lines, is_visible};
-use egui::{Event, PointerButton, Pos2, pos2};
+use crate::viewer::widget_check::{
+    FakeWindow, Text, assert_whole_lines, click, find, is_visible, wheel, windows,
+};
+use egui::{Event, Pos2, pos2};
 use glam::{DVec2, DVec3};
 
 /// Number of boxes of the long list.
@@ -77,22 +79,12 @@ impl Panels {
     }
 
     fn scroll(&mut self, at: Pos2, points: f32) -> Vec<Text> {
-        self.pass(vec![Event::PointerMoved(at)]);
-        self.pass(vec![Event::MouseWheel {
-            unit: egui::MouseWheelUnit::Point,
-            delta: vec2(0.0, -points),
-            phase: egui::TouchPhase::Move,
-            modifiers: egui::Modifiers::default(),
-        }]);
+        wheel(at, points).into_iter().for_each(|events| drop(self.pass(events)));
         self.settle()
     }
 
     fn click(&mut self, at: Pos2) -> Vec<Text> {
-        self.pass(vec![Event::PointerMoved(at)]);
-        for pressed in [true, false] {
-            let (button, modifiers) = (PointerButton::Primary, Default::default());
-            self.pass(vec![Event::PointerButton { pos: at, button, pressed, modifiers }]);
-        }
+        click(at).into_iter().for_each(|events| drop(self.pass(events)));
         self.settle()
     }
 
@@ -121,15 +113,6 @@ impl Panels {
         }
         seen
     }
-}
-
-fn find<'a>(texts: &'a [Text], text: &str) -> &'a Text {
-    texts.iter().find(|t| t.text == text).unwrap_or_else(|| panic!("no {text}: {texts:?}"))
-}
-
-fn windows() -> impl Iterator<Item = ([u32; 2], f64)> {
-    let sizes = [[640, 480], [700, 700], [800, 600], [900, 640], [1280, 720], [3840, 2160]];
-    sizes.into_iter().flat_map(|size| [1.0, 1.5, 2.0].map(|scale| (size, scale)))
 }
 
 #[test]

@@ -6,7 +6,9 @@ use egui::{Align2, Color32, FontId, Rect, Sense, Ui, pos2, vec2};
 
 use super::style::{DIM, GAME, PASSES, RECORD, WAIT, ms};
 use crate::frame::{FrameTimes, Marks};
-use crate::viewer::scene_window::timeline::{PassTime, Span, Timeline, device_spans, ms_after};
+use crate::viewer::scene_window::timeline::{
+    PassTime, Span, Timeline, device_spans, ms_after, recording_ms,
+};
 
 /// Number of frames on the time line.
 const N_FRAMES: usize = 4;
@@ -60,13 +62,11 @@ pub fn show_passes(ui: &mut Ui, timeline: &Timeline) {
         let p50_ms = timeline.summary(value)?.p50;
         Some((PassTime { name, p50_ms, share: 1.0 }, color))
     };
-    let mut rows: Vec<(PassTime, Color32)> = [
-        host("game step", GAME, |f| f.game_ms),
-        host("recording", RECORD, |f| f.record_ms + f.submit_ms),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
+    let mut rows: Vec<(PassTime, Color32)> =
+        [host("game step", GAME, |f| f.game_ms), host("recording", RECORD, recording_ms)]
+            .into_iter()
+            .flatten()
+            .collect();
     rows.extend(passes.iter().map(|p| (*p, pass_color(&passes, p.name))));
     let longest = rows.iter().map(|(p, _)| p.p50_ms).fold(1e-3, f64::max);
     for (PassTime { name, p50_ms, share }, color) in rows {

@@ -13,6 +13,7 @@ use super::commands::{Command, HINT, key_groups};
 use super::status::ViewStatus;
 use super::view_state::ViewState;
 use crate::gpu::Backdrop;
+use crate::viewer::colors;
 use crate::viewer::layout::panel_width;
 use crate::viewer::overlay_text::{self, banner, rows_of_third, shrink_text};
 
@@ -41,13 +42,13 @@ pub fn show_all(
     let picture = ui.available_rect_before_wrap();
     let mut free = picture;
     if let Some(text) = status.alarm() {
-        free = banner(ui, free, &text, overlay_text::ERROR, rows_of_third(picture));
+        free = banner(ui, free, &text, colors::ERROR, rows_of_third(picture));
     }
     if state.shows_hint && !state.shows_help {
-        free = banner(ui, free, HINT, overlay_text::MESSAGE, MESSAGE_ROWS);
+        free = banner(ui, free, HINT, colors::MESSAGE, MESSAGE_ROWS);
     }
     for text in messages.iter().rev() {
-        free = banner(ui, free, text, overlay_text::MESSAGE, MESSAGE_ROWS);
+        free = banner(ui, free, text, colors::MESSAGE, MESSAGE_ROWS);
     }
     if state.shows_help && overlay_text::keys(ui, picture, &key_groups()) {
         commands.push(Command::Help);
@@ -81,7 +82,7 @@ fn show(ui: &mut Ui, state: &ViewState, status: &ViewStatus) -> (Vec<Command>, B
             ui.label(RichText::new("h hides the panels, ? lists the keys").color(style::DIM));
         });
     });
-    (commands, Backdrop { room: shown.response.rect, color: style::BACKGROUND })
+    (commands, Backdrop { room: shown.response.rect, color: colors::PANEL })
 }
 
 fn section(ui: &mut Ui, title: &str, is_open: bool, add: impl FnOnce(&mut Ui)) {

@@ -4,8 +4,9 @@ use std::mem::discriminant;
 
 use egui::{Button, Color32, Grid, RichText, Slider, Ui};
 
-use super::style::{DIM, ERROR, GAME, ms};
+use super::style::{DIM, GAME, ms};
 use crate::frame::plan::Pass;
+use crate::viewer::colors::ERROR;
 use crate::viewer::scene_window::commands::{Command, Comparison, SHORTCUTS};
 use crate::viewer::scene_window::knobs::Knob;
 use crate::viewer::scene_window::playback::Seek;
@@ -123,7 +124,7 @@ pub fn compare(ui: &mut Ui, state: &ViewState, status: &ViewStatus, commands: &m
     let has_b = state.variant.is_some();
     ui.horizontal_wrapped(|ui| {
         let label = ui.selectable_label(has_b, "B");
-        if label.on_hover_text("keeps the present settings as B, or drops B (m)").clicked() {
+        if label.on_hover_text("keeps the present settings as B, to compare later ones (A) with them, or drops B (m)").clicked() {
             commands.push(Command::ToggleB);
         }
         for (text, comparison) in [
@@ -188,7 +189,7 @@ fn errors(ui: &mut Ui, state: &ViewState, error: &ErrorStatus) {
         let text = RichText::new(format!("at {n} pixels, against {kind}{cached}"));
         ui.label(text.color(DIM).small());
     } else if !state.playback.is_paused() {
-        ui.weak("pause (space) to measure");
+        ui.weak("press space to pause; then it is measured");
     } else if let Some(why) = &probe.failure {
         ui.label(highlighted(RichText::new(why)));
     }

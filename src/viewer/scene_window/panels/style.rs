@@ -2,8 +2,6 @@
 
 use egui::Color32;
 
-/// Colour behind the panels.
-pub const BACKGROUND: Color32 = Color32::from_rgb(24, 26, 30);
 /// Colour of text and lines of less importance.
 pub const DIM: Color32 = Color32::from_gray(140);
 /// Colour of game steps.
@@ -12,8 +10,6 @@ pub const GAME: Color32 = Color32::from_rgb(95, 170, 110);
 pub const RECORD: Color32 = Color32::from_rgb(215, 160, 70);
 /// Colour of waiting for the device.
 pub const WAIT: Color32 = Color32::from_rgb(80, 85, 95);
-/// Colour behind error messages.
-pub const ERROR: Color32 = Color32::from_rgb(150, 40, 40);
 
 /// Colours of the device's passes, used in turn.
 pub const PASSES: [Color32; 8] = [

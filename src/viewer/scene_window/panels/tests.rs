@@ -9,8 +9,10 @@ use crate::viewer::scene_window::playback::Seek;
 use crate::viewer::scene_window::status::ErrorStatus;
 use crate::viewer::scene_window::timeline::{CAPACITY, tests::times};
 use crate::viewer::scene_window::view_state::Variant;
-use crate::viewer::widget_check::{FakeWindow, Text, assert_whole_lines, is_visible};
-use egui::{Event, PointerButton, Pos2, pos2};
+use crate::viewer::widget_check::{
+    FakeWindow, Text, assert_whole_lines, click, find, is_visible, windows,
+};
+use egui::pos2;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -68,27 +70,6 @@ fn full_status() -> ViewStatus {
     let probe = ProbeStatus { failure, ..ProbeStatus::default() };
     status.error = Some(ErrorStatus { probe, ..ErrorStatus::default() });
     status
-}
-
-/// The sizes and scales of windows that are tried.
-fn windows() -> Vec<([u32; 2], f64)> {
-    let sizes = [[640, 480], [700, 700], [800, 600], [961, 540], [1280, 720], [1920, 1080]];
-    let sizes = sizes.into_iter().chain([[3840, 2160], [1080, 1920], [2560, 600]]);
-    sizes.flat_map(|size| [1.0, 1.5, 2.0].map(|scale| (size, scale))).collect()
-}
-
-fn click(at: Pos2) -> Vec<Vec<Event>> {
-    let button = |pressed| Event::PointerButton {
-        pos: at,
-        button: PointerButton::Primary,
-        pressed,
-        modifiers: Default::default(),
-    };
-    vec![vec![Event::PointerMoved(at)], vec![button(true)], vec![button(false)]]
-}
-
-fn find<'a>(texts: &'a [Text], text: &str) -> &'a Text {
-    texts.iter().find(|t| t.text == text).unwrap_or_else(|| panic!("no {text}: {texts:?}"))
 }
 
 /// Opens every section of a window that is high enough for all of them.
@@ -193,7 +174,7 @@ fn the_list_of_keys_is_inside_every_window_and_scrolls() {
     let mut state = state();
     (state.shows_help, state.has_panels) = (true, false);
     let small = [([320, 240], 1.0), ([320, 240], 2.0)];
-    for (size, scale) in windows().into_iter().chain(small) {
+    for (size, scale) in windows().chain(small) {
         let what = format!("{size:?} at {scale}");
         let mut window = FakeWindow::new(size, scale);
         let mut add = |ui: &mut Ui| drop(show_all(ui, &state, &status, &[]));

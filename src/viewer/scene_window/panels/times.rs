@@ -4,7 +4,7 @@ use egui::{Align2, Color32, FontId, Grid, Sense, Stroke, Ui, pos2, vec2};
 
 use super::style::{DIM, PASSES, ms};
 use crate::measure::stats::Summary;
-use crate::viewer::scene_window::timeline::{CAPACITY, Timeline};
+use crate::viewer::scene_window::timeline::{CAPACITY, Timeline, recording_ms};
 
 /// Height of the graph, points.
 const HEIGHT: f32 = 70.0;
@@ -21,7 +21,7 @@ pub fn show(ui: &mut Ui, timeline: &Timeline) {
     let rows = [
         ("frame", Some(frame)),
         ("game step", timeline.summary(|f| f.game_ms)),
-        ("recording", timeline.summary(|f| f.record_ms + f.submit_ms)),
+        ("recording", timeline.summary(recording_ms)),
         ("waiting", timeline.summary(|f| f.wait_ms)),
         ("latency", timeline.summary(|f| f.latency_ms)),
     ];

@@ -56,6 +56,17 @@ fn panels_follow_the_size_until_the_user_chooses() {
 }
 
 #[test]
+fn the_hint_goes_with_any_key() {
+    let keys = SHORTCUTS.iter().map(|s| s.key).chain(FLYING_KEYS.iter().map(|f| f.0));
+    for key in keys.chain(["no key of nimbus"]) {
+        let mut s = state();
+        s.shows_hint = true;
+        s.press(key);
+        assert!(!s.shows_hint, "{key}");
+    }
+}
+
+#[test]
 fn held_keys_fly_until_they_are_released() {
     let mut s = state();
     let from = s.camera.position();

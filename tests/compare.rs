@@ -99,6 +99,24 @@ fn a_run_does_not_differ_from_itself_and_a_slower_one_is_slower() {
 }
 
 #[test]
+fn too_few_frames_are_remarked_on_once() {
+    let dir = temp();
+    for (n, is_few) in [(2, true), (29, true), (30, false)] {
+        let few = results::run(["serial", "parallel"].map(|of| results::mode(of, n, 2)).to_vec());
+        let folder = dir.path().join(n.to_string());
+        fs::create_dir(&folder).expect("a folder");
+        let all = ["serial", "parallel"].map(|of| rows(of, 10.0)[..n + 2].to_vec());
+        write(&folder, &few, all.concat());
+        let folder = folder.to_str().expect("UTF-8");
+        let (code, table, stderr) = compare(&[folder, folder]);
+        assert_eq!((code, stderr.as_str()), (0, ""));
+        let remark = "too few frames: a verdict needs 30 timed frames of A and of B";
+        assert_eq!(table.matches(remark).count(), usize::from(is_few), "{n}: {table}");
+        assert_eq!(table.contains("no difference found"), !is_few, "{n}: {table}");
+    }
+}
+
+#[test]
 fn an_unsteady_machine_is_remarked_on() {
     let dir = temp();
     let a = written(&dir, "a", 10.2, &run());

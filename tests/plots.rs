@@ -7,6 +7,8 @@ mod results;
 mod studies;
 #[path = "harness/svg.rs"]
 mod svg;
+#[path = "plots/sweeps.rs"]
+mod sweeps;
 
 use nimbus::report::charts::{Chart, error, frames, ledger, passes};
 use nimbus::studies::error::front::Front;

@@ -1,10 +1,10 @@
 //! The remarks above and below the tables of `nimbus bench`.
 
-use crate::measure::lows::fps;
 use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::machine::Clocks;
 use crate::timing::overlap::Overlap;
 use crate::timing::records::{Case, Mode, Run, Skipping};
+use crate::timing::still::{StillRemark, empty_frames_text};
 
 /// Returns a time in ms with three decimals.
 pub fn ms(value: f64) -> String {
@@ -131,47 +131,11 @@ pub fn clocks_line(clocks: &Clocks) -> String {
     )
 }
 
-/// Returns the lines that come before all tables if nothing moves in a case: the loops that skip
-/// then draw nothing, and the figure is the loop without skipping.
+/// Returns the lines that come before all tables if nothing moves in a case.
 pub fn still_lines(run: &Run) -> String {
-    let still: Vec<&Case> = run.cases.iter().filter(|c| c.is_still()).collect();
-    let Some(case) = still.first() else { return String::new() };
-    let mut out = match (still.len(), run.cases.len()) {
-        (_, 1) => "NOTHING MOVES".to_owned(),
-        (n, n_all) if n == n_all => format!("NOTHING MOVES in any of the {n_all} cases"),
-        (n, n_all) => format!("NOTHING MOVES in {n} of {n_all} cases"),
-    };
-    out += &format!(
-        ": {}, and the loops that skip show the last picture again.\n",
-        empty_text(case).unwrap_or_default()
-    );
-    out += &match (case.figure_mode(), run.cases.len()) {
-        (None, _) => {
-            "Only a loop without skipping has a time for such a scene; none was timed.\n".to_owned()
-        }
-        (Some(mode), 1) => format!("The figure is {}: {}.\n", mode.name(), figure_text(mode)),
-        (Some(mode), _) => format!("Their figures are of the loop {}.\n", mode.name()),
-    };
-    out + "A moving camera ([[camera.path]]), wind, gusts or an edited light make frames differ.\n\n"
-}
-
-fn figure_text(mode: &Mode) -> String {
-    match (mode.frame_ms, mode.gpu_ms) {
-        (Some(frame), gpu) => format!(
-            "{} ms a frame ({:.1} frames/s){}",
-            ms(frame.of.p50),
-            fps(frame.of.p50),
-            gpu.map_or(String::new(), |gpu| format!(", {} ms of it on the GPU", ms(gpu.of.p50)))
-        ),
-        _ => "no finite time was measured".to_owned(),
-    }
-}
-
-/// Returns how many frames drew nothing, of the loop in which most did.
-fn empty_text(case: &Case) -> Option<String> {
-    let of = |m: &Mode| Some((m.empty_frames.unwrap_or(m.frames), m.frames)).filter(|_| m.skip);
-    let (n_empty, n) = case.modes.iter().filter_map(of).max()?;
-    (n_empty > 0).then(|| format!("{n_empty} of {n} timed frames draw nothing"))
+    let Some(remark) = StillRemark::of(run) else { return String::new() };
+    let StillRemark { scope, reason, figure, advice } = remark;
+    format!("NOTHING MOVES{scope}: {reason}\n{figure}\n{advice}\n\n")
 }
 
 /// Returns why a case that stands still has no ratio of its loops.
@@ -183,7 +147,7 @@ pub fn still_line(case: &Case) -> String {
 
 /// Returns how many frames drew nothing, if some did but less than half.
 pub fn empty_line(case: &Case) -> Option<String> {
-    let text = empty_text(case).filter(|_| !case.is_still())?;
+    let text = empty_frames_text(case).filter(|_| !case.is_still())?;
     Some(format!("{text}: nothing moved in them\n"))
 }
 

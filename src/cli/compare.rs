@@ -9,7 +9,9 @@ use super::compare_pictures;
 use super::output::{self, or_dash};
 use crate::error::{Error, Result};
 use crate::measure::bootstrap::Bootstrap;
-use crate::timing::compare::{Comparison, HEADLINE, MeasureComparison, ModeComparison};
+use crate::timing::compare::{
+    Comparison, HEADLINE, MeasureComparison, ModeComparison, few_frames_remark,
+};
 use crate::timing::difference::{Condition, Difference};
 use crate::timing::records::Run;
 use crate::timing::results::{BenchResults, read_results};
@@ -106,6 +108,7 @@ fn text(sides: [(&Path, &Run); 2], allowed: &[&Difference], found: &Comparison) 
     for mode in &found.modes {
         out += &format!("\n{}", output::table(&rows(mode)));
     }
+    out += &few_frames_remark(&found.modes).map_or(String::new(), |remark| remark + "\n");
     out.push('\n');
     for mode in &found.modes {
         if let Some(headline) = mode.headline() {

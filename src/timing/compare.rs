@@ -116,6 +116,16 @@ impl Comparison {
     }
 }
 
+/// Returns a remark if a measure has too few frames for a verdict.
+pub fn few_frames_remark(modes: &[ModeComparison]) -> Option<String> {
+    let mut measures = modes.iter().flat_map(|mode| &mode.measures);
+    measures.any(|m| m.verdict == Verdict::TooFewFrames).then(|| {
+        let words = Verdict::TooFewFrames.text();
+        let more = "bench --frames or --repeat gives more";
+        format!("{words}: a verdict needs {N_FRAMES_NEEDED} timed frames of A and of B; {more}")
+    })
+}
+
 /// Compares the times of one measure, in ms and in the order in which they were taken.
 fn compare(measure: &str, a: &[f64], b: &[f64]) -> MeasureComparison {
     let n_least = a.len().min(b.len());

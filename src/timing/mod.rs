@@ -4,7 +4,8 @@
 //! loops (serial or parallel, with or without skipping), in interleaved [`blocks`] of frames. Its
 //! samples become the [`records`] of `run.json` ([`outcome`], [`overlap`]) and the rows of
 //! `frames.csv` ([`frame_rows`]), which [`results`] writes and reads with the files beside them
-//! ([`attachments`]). [`compare`] decides which of two results is faster; [`difference`] lists what
+//! ([`attachments`]). [`still`] remarks on scenes in which nothing
+//! moves. [`compare`] decides which of two results is faster; [`difference`] lists what
 //! else differs between them. [`parts`] joins a bench that several nodes timed. [`trace`] writes
 //! the frames as a time line. [`machine`], [`names`] and [`json`] serve all of them, and the
 //! studies too.
@@ -25,6 +26,7 @@ pub mod overlap;
 pub mod parts;
 pub mod records;
 pub mod results;
+pub mod still;
 pub mod sweep;
 pub mod trace;
 

@@ -95,7 +95,7 @@ pub fn contrasts(browser: &mut Browser) {
         [("light", "light", "screen"), ("dark", "dark", "screen"), ("print", "dark", "print")]
     {
         browser.media(scheme, media);
-        let contrasts = browser.eval(CONTRAST);
+        let contrasts = browser.eval(&format!("({CONTRAST})({LUMINANCE})"));
         let contrasts = contrasts.as_array().expect("a list");
         assert!(contrasts.len() > 100, "{} texts", contrasts.len());
         for of in contrasts {
@@ -122,10 +122,8 @@ const LUMINANCE: &str = "c => { const v = c.match(/[0-9.]+/g).slice(0, 3).map(x 
     => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4); return 0.2126 * v[0] + 0.7152 * \
     v[1] + 0.0722 * v[2]; }";
 
-/// Contrast of every element with text against its background.
-const CONTRAST: &str = "(() => { const lum = c => { const v = c.match(/[0-9.]+/g).slice(0, \
-    3).map(x => x / 255).map(x => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4); return \
-    0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2]; };\
+/// Contrast of every element with text against its background, by the function `lum`.
+const CONTRAST: &str = "lum => {\
   const behind = e => { for (; e; e = e.parentElement) { const c = \
   getComputedStyle(e).backgroundColor; if (!c.endsWith(', 0)') && c !== 'transparent') return c; } \
   return 'rgb(255, 255, 255)'; };\
@@ -139,7 +137,7 @@ const CONTRAST: &str = "(() => { const lum = c => { const v = c.match(/[0-9.]+/g
     const [a, b] = [lum(e.namespaceURI.endsWith('svg') ? style.fill : style.color), \
     lum(behind(e))];\
     out.push([(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), own.slice(0, 40)]);\
-  } return out; })()";
+  } return out; }";
 
 /// Without scripts the page has all tables and pictures, but no sliders.
 pub fn without_scripts(browser: &mut Browser) {

@@ -1,6 +1,6 @@
 //! The page of a sweep.
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::browser::Browser;
 use crate::program::{path, run};
@@ -71,4 +71,28 @@ fn a_sweep_has_one_plot_a_measure_and_fits_narrow_pages() {
     }
     // Long tables are folded.
     assert_eq!(browser.eval("document.querySelectorAll('details.folded').length > 0"), json!(true));
+    assert_eq!(hidden(&mut browser, "screen"), json!(true));
+    // Paper shows what a screen shows when everything is unfolded.
+    assert_eq!(hidden(&mut browser, "print"), json!(false));
+    let text = browser.eval("document.body.innerText");
+    let text = text.as_str().expect("text");
+    for remark in [
+        "A value alone has too few values for a confidence interval, which needs 30 frames",
+        "12 charts, one for each point of the sweep",
+    ] {
+        assert!(text.contains(remark), "{remark} in\n{text}");
+    }
+}
+
+/// Returns whether all that is in a fold is hidden in a medium; null if one part is and another is
+/// not.
+fn hidden(browser: &mut Browser, medium: &str) -> Value {
+    browser.media("light", medium);
+    let inside = "[...document.querySelectorAll('details > :not(summary)')]";
+    let is_visible = "e => e.checkVisibility({ contentVisibilityAuto: true }) && \
+        e.getBoundingClientRect().height > 0";
+    browser.eval(&format!(
+        "(() => {{ const all = {inside}.map({is_visible}); return all.length < 14 ? 'few' : \
+        all.every(v => v) ? false : all.some(v => v) ? null : true; }})()"
+    ))
 }

@@ -28,8 +28,8 @@ pub struct Axis {
     zero: Option<f64>,
 }
 
-/// Margin beyond the outermost values, as a share of their span.
-const MARGIN: f64 = 0.06;
+/// Margin beyond the outermost values, as a share of their span: a marker is about as wide.
+pub const MARGIN: f64 = 0.06;
 /// Smallest margin of a logarithmic axis, in decades. A single value spans nothing.
 const MIN_MARGIN: f64 = 0.08;
 

@@ -4,7 +4,7 @@ use std::fmt::{Display, Write as _};
 
 use plotters::prelude::*;
 
-use super::medium::{CELL, INK, MUTED, Medium, PAPER};
+use super::medium::{CELL, INK, MUTED, Medium, PAPER, glyph, series};
 use super::plot_area::{Canvas, MarkerFill, draw_marker};
 use super::text_canvas::{TextCanvas, sgr_of};
 use crate::error::{Error, Result};
@@ -30,6 +30,13 @@ pub struct LegendEntry {
     pub name: String,
     /// The marker of a point; other entries show a square.
     pub marker: Option<MarkerFill>,
+}
+
+impl LegendEntry {
+    /// Returns the entry of data series `i`.
+    pub fn of_series(i: usize, name: &str, marker: Option<MarkerFill>) -> LegendEntry {
+        LegendEntry { color: series(i), glyph: glyph(i), name: name.to_owned(), marker }
+    }
 }
 
 /// A chart of results.

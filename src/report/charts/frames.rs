@@ -161,12 +161,7 @@ impl Chart for FrameChart {
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
-        let entry = |(i, l): (usize, &Loop)| LegendEntry {
-            color: series(i),
-            glyph: glyph(i),
-            name: l.name.clone(),
-            marker: None,
-        };
+        let entry = |(i, l): (usize, &Loop)| LegendEntry::of_series(i, &l.name, None);
         self.loops.iter().enumerate().map(entry).collect()
     }
 

@@ -3,11 +3,11 @@
 
 use plotters::prelude::*;
 
-use super::axis::{Axis, Tick};
+use super::axis::{Axis, MARGIN, Tick};
 use super::chart::{Chart, LegendEntry, Tooltip};
 use super::error::{error_of, metric_name, time_of};
-use super::medium::{glyph, series};
-use super::number::{number, with_interval};
+use super::medium::{SERIES_COLORS, glyph, series};
+use super::number::with_interval;
 use super::plot_area::{Canvas, GridLines, MarkerFill, PlotArea};
 use crate::measure::stats::extremes;
 use crate::studies::error::records::{Configuration, Study};
@@ -16,16 +16,16 @@ use crate::timing::names::{Setting, sweep_text};
 use crate::timing::records::{Case, Measured, Mode, Run};
 use crate::timing::sweep::SIZE_KEY;
 
-/// Greatest number of lines of a chart; a key with more values is not drawn as lines.
-const MOST_LINES: usize = 8;
-/// Greatest number of charts of a measure.
+/// Greatest number of charts of a measure: six rows of two, about three screens.
 const MOST_CHARTS: usize = 12;
-/// Ratio of the greatest to the least value from which on an axis of keys is logarithmic.
+/// Ratio of the greatest to the least value from which on an axis of keys is logarithmic. Swept
+/// values that double three times are crowded on a linear axis.
 const LOG_X_FROM: f64 = 8.0;
-/// The same ratio of an axis of measured values.
+/// The same ratio of an axis of measured values. It is larger because a linear axis begins at 0,
+/// which lets times be compared by eye.
 const LOG_Y_FROM: f64 = 20.0;
-/// Most swept values that are ticks themselves.
-const MOST_TICKS: usize = 9;
+/// Characters of a label that have room at the usual distance of ticks.
+const TICK_CHARS: usize = 7;
 
 /// One measured figure at a point of a sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,10 +95,8 @@ fn figures_of_case(case: &Case, of: fn(&Mode) -> Option<Measured>) -> Vec<SweptF
 /// Returns the charts of a study: its time and its error against each knob.
 pub fn charts_of_study(study: &Study) -> Vec<SweepChart> {
     let mut shapes: Vec<Vec<&str>> = Vec::new();
-    let keys =
-        |c: &Configuration| -> Vec<String> { c.settings.iter().map(|s| s.key.clone()).collect() };
     for c in &study.configurations {
-        let shape: Vec<&str> = c.settings.iter().map(|s| s.key.as_str()).collect();
+        let shape = keys_of(c);
         if !shape.is_empty() && !shapes.contains(&shape) {
             shapes.push(shape);
         }
@@ -107,7 +105,7 @@ pub fn charts_of_study(study: &Study) -> Vec<SweepChart> {
     let mut all = Vec::new();
     for shape in shapes {
         let of = |figure: fn(&Study, &Configuration) -> Option<Figure>| -> Vec<SweptFigure> {
-            let chosen = study.configurations.iter().filter(|c| keys(c) == shape);
+            let chosen = study.configurations.iter().filter(|c| keys_of(c) == shape);
             let swept = |c: &Configuration| {
                 let (point, series) = (c.settings.clone(), String::new());
                 Some(SweptFigure { point, series, figure: figure(study, c)? })
@@ -120,13 +118,19 @@ pub fn charts_of_study(study: &Study) -> Vec<SweepChart> {
     all
 }
 
+/// Returns the keys that a configuration sets.
+fn keys_of(configuration: &Configuration) -> Vec<&str> {
+    configuration.settings.iter().map(|s| s.key.as_str()).collect()
+}
+
 /// Returns the charts of one measure; none if no key has two values.
 pub fn charts(name: &str, measure: &str, figures: &[SweptFigure]) -> Vec<SweepChart> {
     let keys = varied_keys(figures);
     let Some(i_x) = x_key(&keys) else { return vec![] };
     let (key, values) = &keys[i_x];
     let others: Vec<&(String, Vec<String>)> = keys.iter().filter(|(k, _)| k != key).collect();
-    let fits = |n: usize| (2..=MOST_LINES).contains(&n);
+    // More lines than colours could not be told apart.
+    let fits = |n: usize| (2..=SERIES_COLORS.len()).contains(&n);
     let line_key = others
         .iter()
         .filter(|(_, values)| fits(values.len()))
@@ -142,11 +146,11 @@ pub fn charts(name: &str, measure: &str, figures: &[SweptFigure]) -> Vec<SweepCh
         Some(k) => format!("{k}={}", value_of(f, k)),
         None => f.series.clone(),
     };
+    let panel_keys: Vec<&str> =
+        others.iter().map(|(k, _)| k.as_str()).filter(|k| Some(*k) != line_key).collect();
     let panel_name = |f: &SweptFigure| -> Vec<String> {
-        let is_other = |s: &&Setting| s.key != *key && Some(s.key.as_str()) != line_key;
-        let rest: Vec<Setting> = f.point.iter().filter(is_other).cloned().collect();
-        let is_varied = |s: &Setting| others.iter().any(|(k, _)| *k == s.key);
-        let rest: Vec<Setting> = rest.into_iter().filter(is_varied).collect();
+        let is_of_panel = |s: &&Setting| panel_keys.contains(&s.key.as_str());
+        let rest: Vec<Setting> = f.point.iter().filter(is_of_panel).cloned().collect();
         let series = Some(&f.series).filter(|s| line_key.is_some() && !s.is_empty());
         [sweep_text(&rest)].into_iter().chain(series.cloned()).filter(|s| !s.is_empty()).collect()
     };
@@ -163,8 +167,12 @@ pub fn charts(name: &str, measure: &str, figures: &[SweptFigure]) -> Vec<SweepCh
         all[i].1.add(line_name(f), Point { x, figure: f.figure, value });
     }
     let mut charts: Vec<SweepChart> = all.into_iter().map(|(_, chart)| chart).collect();
-    charts.retain(|chart| chart.n_values() > 1);
-    finish(&mut charts);
+    let n_charts = charts.len();
+    // A single value is in the table.
+    charts.retain(|chart| chart.swept().len() > 1);
+    charts.truncate(MOST_CHARTS);
+    let n_more = n_charts - charts.len();
+    finish(&mut charts, n_more);
     charts
 }
 
@@ -180,21 +188,27 @@ fn empty(
     SweepChart { title, key, measure, categories, lines: vec![], notes: vec![] }
 }
 
-/// Sorts the points, and cuts the list of charts with a note.
-fn finish(charts: &mut Vec<SweepChart>) {
-    let n_more = charts.len().saturating_sub(MOST_CHARTS);
-    charts.truncate(MOST_CHARTS);
+/// Sorts the points, and adds notes on intervals and on `n_more` charts that are left out.
+fn finish(charts: &mut [SweepChart], n_more: usize) {
     for chart in charts.iter_mut() {
         for line in &mut chart.lines {
             line.points.sort_by(|a, b| a.x.total_cmp(&b.x));
         }
         if chart.lines.iter().flat_map(|l| &l.points).any(|p| p.figure.low.is_none()) {
-            chart.notes.push("points without a bar have too few frames for an interval".into());
+            chart.notes.push(NO_INTERVAL.to_owned());
         }
     }
     if let (Some(last), true) = (charts.last_mut(), n_more > 0) {
-        last.notes.push(format!("{n_more} more combinations are in the table, and not drawn"));
+        last.notes.push(more_charts_text(n_more));
     }
+}
+
+/// Note of a chart with points that have no interval.
+const NO_INTERVAL: &str = "a point without a bar has too few values for a confidence interval";
+
+fn more_charts_text(n: usize) -> String {
+    let charts = if n == 1 { "chart is" } else { "charts are" };
+    format!("{n} more {charts} not drawn; the table has all values")
 }
 
 /// Returns the keys with more than one value, and their values, in order.
@@ -247,11 +261,12 @@ impl SweepChart {
         self.lines.iter().flat_map(|line| &line.points)
     }
 
-    fn n_values(&self) -> usize {
-        let mut values: Vec<f64> = self.points().map(|p| p.x).collect();
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        values.len()
+    /// Returns the swept values in order, each with its text as given.
+    fn swept(&self) -> Vec<(f64, &str)> {
+        let mut values: Vec<(f64, &str)> = self.points().map(|p| (p.x, p.value.as_str())).collect();
+        values.sort_by(|a, b| a.0.total_cmp(&b.0));
+        values.dedup_by_key(|(x, _)| *x);
+        values
     }
 
     fn x_axis(&self, n_ticks: usize) -> Axis {
@@ -268,19 +283,20 @@ impl SweepChart {
         let mut axis = if low > 0.0 && high / low >= LOG_X_FROM {
             Axis::log(name, values(), false, n_ticks)
         } else {
-            let margin = 0.06 * (high - low);
+            let margin = MARGIN * (high - low);
             Axis::linear(name, low - margin, high + margin, n_ticks)
         };
-        let mut swept: Vec<f64> = values().collect();
-        swept.sort_by(f64::total_cmp);
-        swept.dedup();
-        let ticks: Vec<Tick> = swept
-            .iter()
-            .filter_map(|v| Some(Tick { at: axis.position(*v)?, text: number(*v) }))
-            .collect();
+        let tick =
+            |(v, text): (f64, &str)| Some(Tick { at: axis.position(v)?, text: text.to_owned() });
+        let ticks: Vec<Tick> = self.swept().into_iter().filter_map(tick).collect();
+        // The swept values themselves are the ticks where their labels have room.
         let apart = (axis.range.end - axis.range.start) / n_ticks.max(1) as f64;
-        let is_clear = ticks.windows(2).all(|pair| pair[1].at - pair[0].at >= apart);
-        if swept.len() <= MOST_TICKS && is_clear {
+        let has_room = |pair: &[Tick]| {
+            let n_chars = pair[0].text.chars().count().max(pair[1].text.chars().count());
+            let share = n_chars as f64 / TICK_CHARS as f64;
+            pair[1].at - pair[0].at >= apart * share.max(1.0)
+        };
+        if ticks.windows(2).all(has_room) {
             axis.ticks = ticks;
         }
         axis
@@ -294,7 +310,7 @@ impl SweepChart {
             return Axis::log(&self.measure, values(), false, n_ticks);
         }
         let high = values().fold(0.0, f64::max);
-        Axis::linear(&self.measure, 0.0, 1.06 * high, n_ticks)
+        Axis::linear(&self.measure, 0.0, (1.0 + MARGIN) * high, n_ticks)
     }
 
     fn tooltip(&self, line: &Line, point: &Point) -> String {
@@ -316,11 +332,8 @@ impl Chart for SweepChart {
     }
 
     fn legend(&self) -> Vec<LegendEntry> {
-        let entry = |(i, line): (usize, &Line)| LegendEntry {
-            color: series(i),
-            glyph: glyph(i),
-            name: line.name.clone(),
-            marker: Some(MarkerFill::Full),
+        let entry = |(i, line): (usize, &Line)| {
+            LegendEntry::of_series(i, &line.name, Some(MarkerFill::Full))
         };
         self.lines.iter().enumerate().filter(|(_, l)| !l.name.is_empty()).map(entry).collect()
     }

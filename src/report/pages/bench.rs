@@ -13,6 +13,7 @@ use crate::report::charts::{frames, number, passes, sweep, with_interval};
 use crate::timing::attachments::picture_file;
 use crate::timing::records::{Case, Measured, Mode, PartRecord, Pass, Run};
 use crate::timing::results::BenchResults;
+use crate::timing::still::StillRemark;
 
 /// Returns the name of a case.
 pub fn case_name(case: &Case) -> String {
@@ -55,7 +56,7 @@ pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
         }
         (still(run))
         @if !sweep.is_empty() {
-            h3 { "Sweep" }
+            h3 { "Times against the swept keys" }
             div class="panels" { @for chart in &sweep { (chart) } }
         }
         h3 { "Frames" }
@@ -83,7 +84,9 @@ fn charts_of_frames(charts: &[Markup]) -> Markup {
             @for chart in charts { (chart) }
         } @else {
             details {
-                summary { "The frames of each of the " (charts.len()) " points of the sweep" }
+                summary {
+                    "Time of each frame: " (charts.len()) " charts, one for each point of the sweep"
+                }
                 @for chart in charts { (chart) }
             }
         }
@@ -92,20 +95,11 @@ fn charts_of_frames(charts: &[Markup]) -> Markup {
 
 /// Returns a warning about cases in which nothing moves.
 fn still(run: &Run) -> Markup {
-    let still: Vec<&Case> = run.cases.iter().filter(|c| c.is_still()).collect();
-    let figure = still.first().and_then(|c| c.figure_mode()).map(Mode::name);
+    let Some(remark) = StillRemark::of(run) else { return html! {} };
+    let StillRemark { scope, reason, figure, advice } = remark;
     html! {
-        @if !still.is_empty() {
-            p class="warning" {
-                strong { "Nothing moves" }
-                @if run.cases.len() > 1 { " in " (still.len()) " of " (run.cases.len()) " cases" }
-                ": the loops that skip draw nothing in most frames, and their times are those of "
-                "an empty frame. "
-                @match &figure {
-                    Some(name) => { "The figure is the loop " strong { (name) } "." }
-                    None => { "No loop without skipping was timed." }
-                }
-            }
+        p class="warning" {
+            strong { "Nothing moves" } (scope) ": " (reason) " " (figure) " " (advice)
         }
     }
 }

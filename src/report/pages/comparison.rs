@@ -11,7 +11,9 @@ use super::{error, pictures};
 use crate::error::Result;
 use crate::report::charts::with_interval;
 use crate::timing::attachments::picture_file;
-use crate::timing::compare::{Comparison, HEADLINE, MeasureComparison, ModeComparison};
+use crate::timing::compare::{
+    Comparison, HEADLINE, MeasureComparison, ModeComparison, few_frames_remark,
+};
 use crate::timing::difference::Difference;
 use crate::timing::results::BenchResults;
 
@@ -41,6 +43,7 @@ fn benches(a: &BenchResults, b: &BenchResults, folders: [&Path; 2]) -> Result<Ma
         @for mode in &modes { (headline(mode)) }
         @if !modes.is_empty() {
             (ratios(&modes))
+            @if let Some(remark) = few_frames_remark(&modes) { p class="why" { (remark) } }
             p {
                 "The verdict is that of the measure " (HEADLINE) ". The intervals of the other \
                 measures are not corrected for multiple comparisons: of twenty equal measures \

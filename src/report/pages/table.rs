@@ -4,6 +4,7 @@ use maud::{Markup, html};
 
 use crate::report::charts::{number, with_interval};
 use crate::studies::figure::Figure;
+use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::records::Measured;
 
 /// A cell of a table.
@@ -13,6 +14,7 @@ pub struct Cell {
     value: Option<f64>,
     is_number: bool,
     is_missing: bool,
+    lacks_interval: bool,
 }
 
 /// Returns a cell of text.
@@ -21,13 +23,13 @@ pub fn text(text: &str) -> Cell {
     const SHORT: usize = 18;
     let is_short = text.chars().count() <= SHORT;
     let content = html! { span class=[is_short.then_some("short")] { (text) } };
-    Cell { content, value: None, is_number: false, is_missing: text == MISSING }
+    let is_missing = text == MISSING;
+    Cell { content, value: None, is_number: false, is_missing, lacks_interval: false }
 }
 
 /// Returns a cell of a count.
 pub fn count(n: usize) -> Cell {
-    let content = html! { (n) };
-    Cell { content, value: Some(n as f64), is_number: true, is_missing: false }
+    numeric(Some(n), |n| n as f64, |n| n.to_string())
 }
 
 /// Returns a cell of a number, "—" if there is none.
@@ -47,19 +49,22 @@ pub fn percent(value: Option<f64>) -> Cell {
 
 /// Returns a cell of a number with its interval.
 pub fn figure(figure: Option<Figure>) -> Cell {
-    numeric(figure, |f| f.value, |f| with_interval(f.value, f.low, f.high))
+    let lacks_interval = figure.is_some_and(|f| f.low.is_none());
+    let cell = numeric(figure, |f| f.value, |f| with_interval(f.value, f.low, f.high));
+    Cell { lacks_interval, ..cell }
 }
 
 /// Returns a cell of a median with its interval.
 pub fn median(measured: Option<Measured>) -> Cell {
-    numeric(measured, |m| m.of.p50, |m| with_interval(m.of.p50, m.p50_low, m.p50_high))
+    figure(measured.map(|m| Figure { value: m.of.p50, low: m.p50_low, high: m.p50_high }))
 }
 
 fn numeric<T: Copy>(item: Option<T>, value: fn(T) -> f64, text: fn(T) -> String) -> Cell {
     let is_missing = item.is_none();
     let content = item.map_or(MISSING.to_owned(), text);
     let value = item.map(value).filter(|v| v.is_finite());
-    Cell { content: html! { (content) }, value, is_number: true, is_missing }
+    let content = html! { (content) };
+    Cell { content, value, is_number: true, is_missing, lacks_interval: false }
 }
 
 /// Returns a list of remarks, empty if there are none.
@@ -75,9 +80,25 @@ pub fn remark_list(remarks: &[String]) -> Markup {
 const MISSING: &str = "—";
 
 /// Reasons for a cell without a value.
-const WHY_MISSING: &str = "— : not measured: the device has no timestamps, the pass or the loop \
-    did not run, or the run ended before. A median without an interval has too few values for \
-    one: frames of a loop need 30, rounds of a study 2.";
+const WHY_MISSING: &str = "— : there is no value: the device has no timestamps, the pass or the \
+    loop did not run, or the run ended before it.";
+
+/// Number of rounds of a study that a confidence interval needs: one round has no scatter.
+const N_ROUNDS_NEEDED: usize = 2;
+
+/// Returns the remarks below a table on values and intervals that it lacks.
+fn gaps(rows: &[Vec<Cell>]) -> Markup {
+    let any = |is: fn(&Cell) -> bool| rows.iter().flatten().any(is);
+    html! {
+        @if any(|cell| cell.is_missing) { p class="why" { (WHY_MISSING) } }
+        @if any(|cell| cell.lacks_interval) {
+            p class="why" {
+                "A value alone has too few values for a confidence interval, which needs "
+                (N_FRAMES_NEEDED) " frames of a loop, or " (N_ROUNDS_NEEDED) " rounds of a study."
+            }
+        }
+    }
+}
 
 /// Rows from which on a table is folded.
 const MOST_UNFOLDED: usize = 30;
@@ -101,7 +122,6 @@ pub fn table(caption: &str, header: &[&str], rows: impl IntoIterator<Item = Vec<
 }
 
 fn unfolded(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
-    let has_missing = rows.iter().flatten().any(|cell| cell.is_missing);
     let is_number = |i: usize| rows.iter().any(|row| row.get(i).is_some_and(|cell| cell.is_number));
     html! {
         div class="wide" tabindex="0" role="region" aria-label=(caption) {
@@ -110,23 +130,22 @@ fn unfolded(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
                 thead { tr { @for (i, name) in header.iter().enumerate() {
                     th scope="col" class=[is_number(i).then_some("number")] { (name) }
                 } } }
-                tbody {
-                    @for row in rows {
-                        tr {
-                            @for (i, Cell { content, value, is_number, .. }) in row.iter().enumerate() {
-                                @if i == 0 {
-                                    th scope="row" data-value=[value] { (content) }
-                                } @else {
-                                    td class=[is_number.then_some("number")] data-value=[value] {
-                                        (content)
-                                    }
-                                }
-                            }
-                        }
-                    }
-                }
+                tbody { @for row in rows { tr {
+                    @for (i, cell) in row.iter().enumerate() { (cell_of_row(i, cell)) }
+                } } }
             }
         }
-        @if has_missing { p class="why" { (WHY_MISSING) } }
+        (gaps(rows))
+    }
+}
+
+/// Returns the cell of column `i`; the first is the row's name.
+fn cell_of_row(i: usize, Cell { content, value, is_number, .. }: &Cell) -> Markup {
+    html! {
+        @if i == 0 {
+            th scope="row" data-value=[value] { (content) }
+        } @else {
+            td class=[is_number.then_some("number")] data-value=[value] { (content) }
+        }
     }
 }

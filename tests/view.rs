@@ -81,7 +81,8 @@ impl<'a> View<'a> {
     fn save(&self, key: &str, name: &str) -> PathBuf {
         let path = self.dir.join(name);
         self.display.key(key);
-        wait_for(name, || path.is_file());
+        // The name is claimed by an empty file.
+        wait_for(name, || path.metadata().is_ok_and(|about| about.len() > 0));
         path
     }
 

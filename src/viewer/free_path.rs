@@ -46,10 +46,9 @@ fn claim(name: impl Fn(u32) -> PathBuf) -> Result<Claimed> {
             Err(cause) => return Err(Error::of_io(&path, &cause)),
         }
     }
-    let (first, last) = (name(1), name(MAX_NAMES));
-    let what =
-        format!("this name and all others up to {} are taken; move old files", last.display());
-    Err(Error::io(&first, what))
+    let last = name(MAX_NAMES);
+    let what = format!("all names up to {} are taken; move the files elsewhere", last.display());
+    Err(Error::io(&name(1), what))
 }
 
 #[cfg(test)]

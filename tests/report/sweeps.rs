@@ -1,5 +1,7 @@
 //! The page of a sweep.
 
+use std::path::Path;
+
 use serde_json::{Value, json};
 
 use crate::browser::Browser;
@@ -71,9 +73,9 @@ fn a_sweep_has_one_plot_a_measure_and_fits_narrow_pages() {
     }
     // Long tables are folded.
     assert_eq!(browser.eval("document.querySelectorAll('details.folded').length > 0"), json!(true));
-    assert_eq!(hidden(&mut browser, "screen"), json!(true));
+    assert_eq!(hidden(&mut browser, &page, "screen"), json!(true));
     // Paper shows what a screen shows when everything is unfolded.
-    assert_eq!(hidden(&mut browser, "print"), json!(false));
+    assert_eq!(hidden(&mut browser, &page, "print"), json!(false));
     let text = browser.eval("document.body.innerText");
     let text = text.as_str().expect("text");
     for remark in [
@@ -86,8 +88,10 @@ fn a_sweep_has_one_plot_a_measure_and_fits_narrow_pages() {
 
 /// Returns whether all that is in a fold is hidden in a medium; null if one part is and another is
 /// not.
-fn hidden(browser: &mut Browser, medium: &str) -> Value {
+fn hidden(browser: &mut Browser, page: &Path, medium: &str) -> Value {
     browser.media("light", medium);
+    // A page that is open keeps what it has hidden until its next frame.
+    browser.open(page);
     let inside = "[...document.querySelectorAll('details > :not(summary)')]";
     let is_visible = "e => e.checkVisibility({ contentVisibilityAuto: true }) && \
         e.getBoundingClientRect().height > 0";

@@ -344,6 +344,24 @@ fn keys_are_listed_in_the_window_and_panels_keep_to_a_third_at_every_scale() {
 }
 
 #[test]
+fn the_hint_is_shown_for_a_while() {
+    let display = Display::open();
+    let dir = tempfile::tempdir().expect("a folder");
+    // Without room for panels the hint is the only widget.
+    let view = View::start(&display, dir.path(), &[HELLO, "--size", "320x240"]);
+    let window = display.window_of(view.child.id());
+    let n_hint = || {
+        let (.., rgb) = display.pixels(&window);
+        rgb.chunks_exact(3).filter(|p| **p == [34, 38, 46]).count()
+    };
+    wait_for("hint", || n_hint() > 500);
+    wait_for("picture without the hint", || n_hint() < 50);
+    view.window();
+    display.key("Escape");
+    view.end();
+}
+
+#[test]
 fn a_lost_display_ends_the_window_with_a_message() {
     let display = Display::open();
     let dir = tempfile::tempdir().expect("a folder");

@@ -6,6 +6,8 @@ use egui::{
     Vec2, Window, pos2, vec2,
 };
 
+/// Number of rows of a message: the whole path of a file in the narrowest picture beside panels.
+pub const MESSAGE_ROWS: usize = 8;
 /// Distance of banners from each other and from the picture's edges, points.
 const GAP: f32 = 8.0;
 /// Distance of a banner's text from its edge, points.

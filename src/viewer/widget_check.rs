@@ -128,6 +128,7 @@ fn collect(shape: &Shape, clip: Rect, all: &mut Vec<Text>) {
 
 /// Asserts that no text is cut at its left or right end, also by the window's edge.
 pub fn assert_whole_lines(texts: &[Text], window: Rect, what: &str) {
+    assert!(!texts.is_empty(), "{what}: no text was drawn");
     for t in texts {
         let seen = t.clip.intersect(window);
         let is_inside = t.rect.left() >= seen.left() - 1.0 && t.rect.right() <= seen.right() + 1.0;

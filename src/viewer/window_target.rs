@@ -1,6 +1,7 @@
 //! A window as a render target: surface, swapchain images, and the draws that fill them.
 
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use super::egui_layer::{WidgetFrame, take_widgets};
 use crate::error::Result;
@@ -11,6 +12,9 @@ use crate::gpu::{
 };
 use crate::model::film::{Film, ToneMap};
 use crate::passes::present::{self, Compare, Present};
+
+/// Delay before another attempt while the window has no visible area.
+pub const HIDDEN_DELAY: Duration = Duration::from_millis(50);
 
 /// A window that a device draws pictures and widgets into.
 // Fields are dropped in this order: objects of the device, the device, the surface.

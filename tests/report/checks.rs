@@ -154,6 +154,7 @@ pub fn without_scripts(browser: &mut Browser) {
     // the comparison: differences and ratios.
     assert_eq!(n("table"), 2 * 3 + 2 + 1 + 2);
     assert_eq!(n(".mark title"), n(".mark"));
+    assert!(n(".mark") > 23);
     // The benches' last frames; the study's reference, three pictures and three error maps; two
     // pictures and their difference.
     assert_eq!(n("img"), 2 + 7 + 3);

@@ -78,6 +78,7 @@ const SWEEP: &str =
 
 /// Returns the charts of frames; those of many points of a sweep are folded.
 fn charts_of_frames(charts: &[Markup]) -> Markup {
+    // A sweep has many points, and one chart compares them.
     const MOST_UNFOLDED: usize = 2;
     html! {
         @if charts.len() <= MOST_UNFOLDED {

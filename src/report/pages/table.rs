@@ -100,7 +100,7 @@ fn gaps(rows: &[Vec<Cell>]) -> Markup {
     }
 }
 
-/// Rows from which on a table is folded.
+/// Most rows of a table that is not folded: more do not fit a screen.
 const MOST_UNFOLDED: usize = 30;
 
 /// Returns a table whose first column holds the rows' names; nothing without rows. A long table is

@@ -13,7 +13,7 @@ use crate::viewer::editor::{
     SessionEvent, Setting, mean_rate,
 };
 use crate::viewer::layout::panel_width;
-use crate::viewer::overlay_text::{banner, rows_of_third, shrink_text};
+use crate::viewer::overlay_text::{MESSAGE_ROWS, banner, rows_of_third, shrink_text};
 use crate::viewer::shortcut::Shortcut;
 
 /// Width of the panel, points.
@@ -23,14 +23,13 @@ const WIDTH: f32 = 230.0;
 const MAX_SHARE: f64 = 0.3;
 /// Height of the status line, points.
 const STATUS: f32 = 24.0;
-/// Part of the panel's height that a long list of boxes has at least.
+/// Part of the panel's height that a long list of boxes has at least: five boxes in a window of 640
+/// points.
 const LIST_SHARE: f32 = 0.17;
-/// Height of a long list of boxes at least, points.
+/// Height of a long list of boxes at least, points: two boxes and a half, which show that it scrolls.
 const LEAST_LIST: f32 = 60.0;
 /// Distance of buttons from each other, points.
 const BUTTON_GAP: f32 = 5.0;
-/// Number of rows of a message.
-const MESSAGE_ROWS: usize = 8;
 /// The line over an empty picture.
 const FIRST_STEPS: &str = "A: add a box where the view looks    ?: all keys";
 

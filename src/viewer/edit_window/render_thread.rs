@@ -16,7 +16,7 @@ use crate::viewer::editor::{BoxAcceptance, Document, EditedScene, box_acceptance
 use crate::viewer::egui_layer::SharedWidgets;
 use crate::viewer::posed_player::PosedPlayer;
 use crate::viewer::sync::lock;
-use crate::viewer::window_target::{PictureDraw, WindowTarget};
+use crate::viewer::window_target::{HIDDEN_DELAY, PictureDraw, WindowTarget};
 
 /// State that the render thread draws.
 #[derive(Debug, Clone)]
@@ -67,8 +67,6 @@ impl DrawRequests {
 
 /// Interval of looks at the stop flag, which Ctrl-C sets.
 const MAX_WAIT: Duration = Duration::from_millis(200);
-/// Delay before another attempt while the window has no visible area.
-const HIDDEN_DELAY: Duration = Duration::from_millis(50);
 
 /// An event that the render thread sends to the window.
 #[derive(Debug)]

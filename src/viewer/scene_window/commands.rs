@@ -18,6 +18,13 @@ pub enum Comparison {
     OnlyB,
 }
 
+impl Comparison {
+    /// Two halves.
+    pub const HALVES: Comparison = Comparison::Split(0.5);
+    /// The difference with a gain that shows a tenth of white as nearly white.
+    pub const DIFFERENCE: Comparison = Comparison::Difference(8.0);
+}
+
 /// A command of the user.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {

@@ -2,7 +2,6 @@
 //! loop, and falls back to the last good scene where a change cannot be drawn.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use super::comparison::CameraQueue;
 use super::frame_loop::{FrameLoop, LoopSamples, LoopTimes, loop_times};
@@ -15,7 +14,7 @@ use crate::model::film::Film;
 use crate::model::scene::Scene;
 use crate::viewer::posed_player::PosedPlayer;
 use crate::viewer::sync::lock;
-use crate::viewer::window_target::{PictureDraw, WindowTarget};
+use crate::viewer::window_target::{HIDDEN_DELAY, PictureDraw, WindowTarget};
 
 /// A scene on the device, and the draw that shows it. Fields are dropped in this order.
 struct ActiveScene {
@@ -56,9 +55,6 @@ impl Attempt {
             && self.size.is_none_or(|size| size == state.size)
     }
 }
-
-/// Delay before another attempt while the window has no visible area.
-const HIDDEN_DELAY: Duration = Duration::from_millis(50);
 
 /// Renders a scene into a window.
 pub struct SceneRenderer {

@@ -84,8 +84,6 @@ pub enum Response {
     SaveScene,
 }
 
-/// Gain at which a difference of a tenth of white is nearly white.
-const GAIN: f64 = 8.0;
 /// Angle that the camera turns when the mouse crosses the window, rad.
 const TURN: f64 = std::f64::consts::FRAC_PI_2;
 
@@ -107,7 +105,7 @@ impl ViewState {
             shows_hint: false,
             wants_counts: false,
             variant: None,
-            comparison: Comparison::Split(0.5),
+            comparison: Comparison::HALVES,
             measures_error: false,
             wants_readback: false,
             n_shader_loads: 0,
@@ -183,9 +181,9 @@ impl ViewState {
             }
             Command::NextComparison => {
                 self.comparison = match self.comparison {
-                    Comparison::Split(_) => Comparison::Difference(GAIN),
+                    Comparison::Split(_) => Comparison::DIFFERENCE,
                     Comparison::Difference(_) => Comparison::OnlyB,
-                    Comparison::OnlyB => Comparison::Split(0.5),
+                    Comparison::OnlyB => Comparison::HALVES,
                 };
             }
             Command::Speed(doublings) => {

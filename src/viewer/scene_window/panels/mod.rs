@@ -15,16 +15,15 @@ use super::view_state::ViewState;
 use crate::gpu::Backdrop;
 use crate::viewer::colors;
 use crate::viewer::layout::panel_width;
-use crate::viewer::overlay_text::{self, banner, rows_of_third, shrink_text};
+use crate::viewer::overlay_text::{self, MESSAGE_ROWS, banner, rows_of_third, shrink_text};
 
 /// Width of the panels, points.
 const WIDTH: f32 = 270.0;
 /// Largest part of the window that the panels cover.
 const MAX_SHARE: f64 = 1.0 / 3.0;
-/// Height of the window from which on times and settings begin open together, points.
+/// Height of the window from which on the sections of passes begin open, too, points: below it they
+/// would push the settings out of sight.
 const TALL: f32 = 700.0;
-/// Number of rows of one message.
-const MESSAGE_ROWS: usize = 8;
 
 /// Adds all that is shown over the picture. Returns the clicked commands, and the backdrop behind
 /// the panels where they are shown.

@@ -64,9 +64,14 @@ pub fn playback(ui: &mut Ui, state: &ViewState, status: &ViewStatus, commands: &
     ui.label(RichText::new(&status.device_name).color(DIM).small());
 }
 
-/// Leaves space for the slider's number.
+/// Width of a slider's number, points: five digits and their margins.
+const SLIDER_NUMBER: f32 = 60.0;
+/// Smallest width of a slider that can still be dragged, points.
+const LEAST_SLIDER: f32 = 40.0;
+
+/// Widens sliders to the panel, and leaves space for their numbers.
 fn widen_slider(ui: &mut Ui) {
-    ui.spacing_mut().slider_width = (ui.available_width() - 60.0).max(40.0);
+    ui.spacing_mut().slider_width = (ui.available_width() - SLIDER_NUMBER).max(LEAST_SLIDER);
 }
 
 /// Adds the passes of the last frame, with the reason why each ran or was skipped.
@@ -128,8 +133,8 @@ pub fn compare(ui: &mut Ui, state: &ViewState, status: &ViewStatus, commands: &m
             commands.push(Command::ToggleB);
         }
         for (text, comparison) in [
-            ("split", Comparison::Split(0.5)),
-            ("difference", Comparison::Difference(8.0)),
+            ("split", Comparison::HALVES),
+            ("difference", Comparison::DIFFERENCE),
             ("B alone", Comparison::OnlyB),
         ] {
             let is_selected = discriminant(&comparison) == discriminant(&state.comparison);

@@ -27,12 +27,13 @@ fn texts(chart: &SweepChart) -> Vec<String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
 
     /// A user finds the values in the chart that the user typed.
     #[test]
     fn ticks_are_the_swept_values_as_typed(
-        first in 1u32..20,
+        // The greatest value is less than eight times the least, so the axis is linear.
+        first in 10u32..30,
         forms in prop::collection::vec(0usize..5, 2..5),
         is_size in prop::bool::ANY,
     ) {

@@ -294,7 +294,7 @@ impl App {
 
     /// Hides the hint when the user has seen it for a while.
     fn end_hint(&mut self) {
-        if self.drawn_since.is_none() && lock(&self.links.status).timeline.newest().is_some() {
+        if self.drawn_since.is_none() && lock(&self.links.status).has_picture {
             self.drawn_since = Some(Instant::now());
         }
         if self.drawn_since.is_some_and(|since| since.elapsed() >= HINT_FOR) {

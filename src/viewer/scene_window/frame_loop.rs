@@ -137,9 +137,12 @@ impl FrameLoop<'_> {
         if is_warm && self.variant.is_none() {
             self.samples.entry((threading, now.has_panels)).or_default().push(times.frame_ms);
         }
+        let mut status = lock(&self.links.status);
+        status.has_picture = true;
         if now.has_panels {
-            lock(&self.links.status).timeline.push(times);
+            status.timeline.push(times);
         }
+        drop(status);
         if let Some(n) = self.n_left {
             *n = n.saturating_sub(1);
         }

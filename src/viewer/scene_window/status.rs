@@ -11,6 +11,8 @@ use crate::viewer::error_probe::ProbeStatus;
 /// Status of the scene window.
 #[derive(Debug, Clone, Default)]
 pub struct ViewStatus {
+    /// Whether a picture was presented.
+    pub has_picture: bool,
     /// Times of the last frames.
     pub timeline: Timeline,
     /// Counts of the frame with this number.

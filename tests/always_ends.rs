@@ -11,7 +11,7 @@ use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io::pipe;
 use std::os::unix::ffi::OsStrExt;
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 
 use fixtures::{Fixtures, check_end};
 use proptest::prelude::*;
@@ -68,13 +68,15 @@ fn a_stream_that_fails_ends_nothing_but_the_output() {
             let what = format!("{line} with stdout {stdout:?} and stderr {stderr:?}");
             check_end(&what, &output);
             let errors = String::from_utf8_lossy(&output.stderr);
-            let prints = !(line.contains("-o") || line.contains("no-such"));
-            if prints && stdout == Stream::Full {
-                assert_eq!(output.status.code(), Some(2), "{what}: {errors}");
-                let is_named = stderr != Stream::Sound || errors.contains("error: stdout: ");
-                assert!(is_named, "{what}: {errors}");
-            } else if prints {
-                assert_eq!(output.status.code(), Some(0), "{what}: {errors}");
+            let has_word = |word| line.split(' ').any(|w| w == word);
+            let is_refused = has_word("no-such-command") || has_word("missing.toml");
+            // A command that writes a file prints to stdout only with --json.
+            let prints = has_word("--json") || !has_word("-o");
+            let loses_output = prints && stdout == Stream::Full;
+            let expected = if is_refused || loses_output { 2 } else { 0 };
+            assert_eq!(output.status.code(), Some(expected), "{what}: {errors}");
+            if loses_output && !is_refused && stderr == Stream::Sound {
+                assert!(errors.contains("error: stdout: "), "{what}: {errors}");
             }
         }
     }
@@ -109,6 +111,9 @@ fn paths_that_are_not_utf_8_are_paths_like_others() {
     // JSON has no form for such a path, and nodes get it as text.
     let output = fixtures.run(words("farm plan -o farm").chain([scene]));
     check_end("farm plan", &output);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{errors}");
+    assert!(errors.starts_with("error: ") && errors.contains("UTF-8"), "{errors}");
 }
 
 /// Command lines in which IN is an input.
@@ -169,7 +174,7 @@ fn inputs_that_are_no_files_are_refused_at_once() {
     }
 }
 
-/// A shader that no compiler is to see, or survives only with care.
+/// A shader that ends a compiler, or makes it run for minutes.
 #[derive(Debug, Clone)]
 enum Fault {
     ZeroByte(usize),
@@ -245,28 +250,73 @@ fn a_shader_that_no_compiler_survives_is_refused() {
     });
 }
 
-/// Threads of the driver count, too. Mesa's llvmpipe ends the process where it gets none, so that
-/// only commands without a device are tried.
+/// Runs a command of which the threads and processes that `when` counts cannot be started: the
+/// n-th one of each thread, or all from the n-th one on. Fails unless at least one was not started.
+fn with_failed_threads(fixtures: &Fixtures, line: &str, when: &str) -> Output {
+    let program = fixtures.command(line.split(' '));
+    let log = fixtures.dir.path().join("trace.log");
+    let mut traced = Command::new("strace");
+    let inject = format!("inject=clone,clone3:error=EAGAIN:when={when}");
+    traced.args(["-f", "-qq", "-o"]).arg(&log).args(["-e", "trace=clone,clone3", "-e", &inject]);
+    traced.arg(program.get_program()).args(program.get_args());
+    traced.envs(program.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    traced.env("RAYON_NUM_THREADS", "2").current_dir(fixtures.dir.path()).stdin(Stdio::null());
+    let output = traced.output().expect("strace");
+    let what = format!("{line}, thread {when}");
+    check_end(&what, &output);
+    let log = fs::read_to_string(log).expect("a log of strace");
+    assert!(log.contains("(INJECTED)"), "{what}: every thread was started: {log}");
+    output
+}
+
+/// Commands without a device, with the number of threads that each starts if references have two.
+/// Threads of the driver count, too: Mesa's llvmpipe hangs or ends the process where it gets none.
+const THREADED: [(&str, usize); 6] = [
+    ("render s.toml -o out.png --force --reference model --json", 3),
+    ("inspect s.toml --facets --reference", 3),
+    ("compare a.png a.png --json", 1),
+    ("weather w.nc --step 0", 1),
+    ("farm status --plan farm", 1),
+    ("report run -o out.html --force", 2),
+];
+
 #[test]
-fn a_thread_that_cannot_be_started_is_no_panic() {
+fn a_thread_that_cannot_be_started_costs_time_alone() {
     let fixtures = Fixtures::with_results();
-    for line in [
-        "render s.toml -o out.png --force --reference model",
-        "inspect s.toml --facets --reference",
-        "compare a.png a.png",
-        "weather w.nc --step 0",
-        "farm status --plan farm",
-        "farm local --plan farm --jobs 3",
-        "report run -o out.html --force",
-    ] {
-        for n in ["1", "2", "3", "1+", "2+"] {
-            let program = fixtures.command(line.split(' '));
-            let mut traced = Command::new("strace");
-            let inject = format!("inject=clone,clone3:error=EAGAIN:when={n}");
-            traced.args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=clone,clone3", "-e"]);
-            traced.arg(inject).arg(program.get_program()).args(program.get_args());
-            let output = traced.current_dir(fixtures.dir.path()).output().expect("strace");
-            check_end(&format!("{line}, thread {n}"), &output);
+    for (line, n_threads) in THREADED {
+        let whole = fixtures.run(line.split(' '));
+        let out = line.split(' ').find(|word| word.starts_with("out."));
+        let written = || out.map(|name| fs::read(fixtures.dir.path().join(name)).expect("a file"));
+        let expected = written();
+        let singles = (1..=n_threads).map(|n| n.to_string());
+        for when in singles.chain((1..=n_threads).map(|n| format!("{n}+"))) {
+            let output = with_failed_threads(&fixtures, line, &when);
+            let errors = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(0), "{line}, thread {when}: {errors}");
+            assert!(output.stdout == whole.stdout, "{line}, thread {when}: other output");
+            assert!(written() == expected, "{line}, thread {when}: another file");
+        }
+    }
+}
+
+/// A pool of a farm starts processes. Work that one of them did not do is done by the next pool.
+#[test]
+fn a_process_of_a_farm_that_cannot_be_started_loses_no_work() {
+    let fixtures = Fixtures::new();
+    for (i, when) in ["1", "2", "3", "1+", "2+", "3+"].into_iter().enumerate() {
+        let plan = format!("farm plan s.toml -o plan{i} --reference model --samples 4");
+        assert!(fixtures.run(plan.split(' ')).status.success(), "{plan}");
+        let local = format!("farm local --plan plan{i} --jobs 3");
+        let output = with_failed_threads(&fixtures, &local, when);
+        let errors = String::from_utf8_lossy(&output.stderr);
+        if output.status.code() != Some(0) {
+            let is_told = errors.starts_with("error: ") && errors.lines().count() == 1;
+            assert!(is_told, "process {when}: {errors}");
+        }
+        for line in [local, format!("farm merge --plan plan{i} -o merged{i}")] {
+            let output = fixtures.run(line.split(' '));
+            let errors = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(0), "{line} after process {when}: {errors}");
         }
     }
 }

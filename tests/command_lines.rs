@@ -22,24 +22,26 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 const N_SHORT: usize = 100;
 /// Duration of the long test.
 const LONG: Duration = Duration::from_secs(600);
+/// Least number of command lines of the short test that succeed: a tenth. The others are refused.
+const N_DONE: usize = N_SHORT / 10;
 /// Limit of a run's data, KiB: 2 GiB, and the stacks and code of its threads.
 const MOST_KIB: u32 = 2_400_000;
 /// Limit of a run's time on the processor, s.
 const MOST_S: u32 = 120;
 
-/// The parts of a generated command line: which command, which flags, and with which values. Each
-/// number is a share of the choices that there are.
+/// The parts of a generated command line: the command, its flags and their values. Each number from
+/// 0 to 1 stands for one item of a list.
 #[derive(Debug, Clone)]
 struct Choices {
     command: f64,
-    flags: Vec<(f64, f64, bool)>,
+    flags: Vec<(f64, f64)>,
     /// The positional argument, or flag, that gets a hostile value.
     hostile: Option<(f64, f64)>,
 }
 
 fn choices() -> impl Strategy<Value = Choices> {
     let share = || 0.0..1.0f64;
-    let flags = prop::collection::vec((share(), share(), prop::bool::weighted(0.1)), 0..5);
+    let flags = prop::collection::vec((share(), share()), 0..5);
     (share(), flags, prop::option::weighted(0.8, (share(), share())))
         .prop_map(|(command, flags, hostile)| Choices { command, flags, hostile })
 }
@@ -181,35 +183,36 @@ fn line(choices: &Choices) -> Vec<OsString> {
     let commands = leaves(&Args::command(), &[]);
     let (words, command) = pick(&commands, choices.command);
     let hostile_values = hostile();
-    let mut arguments: Vec<&clap::Arg> = command
+    // Each argument with the share that stands for its value.
+    let mut arguments: Vec<(&clap::Arg, f64)> = command
         .get_positionals()
         .filter(|argument| argument.is_required_set())
         .chain(command.get_arguments().filter(|a| a.is_required_set() && !a.is_positional()))
+        .map(|argument| (argument, 0.3))
         .collect();
     let options: Vec<&clap::Arg> =
         command.get_arguments().filter(|a| !matches!(a.get_id().as_str(), "help")).collect();
-    arguments.extend(choices.flags.iter().map(|(which, ..)| *pick(&options, *which)));
+    arguments.extend(choices.flags.iter().map(|(which, value)| (*pick(&options, *which), *value)));
     let i_hostile = choices.hostile.map(|(which, value)| {
-        let with_value: Vec<usize> =
-            (0..arguments.len()).filter(|&i| arguments[i].get_action().takes_values()).collect();
-        let i = if with_value.is_empty() { 0 } else { *pick(&with_value, which) };
+        let takes_values = |i: &usize| arguments[*i].0.get_action().takes_values();
+        let with_value: Vec<usize> = (0..arguments.len()).filter(takes_values).collect();
+        let i = (!with_value.is_empty()).then(|| *pick(&with_value, which));
         (i, pick(&hostile_values, value).clone())
     });
     let mut all: Vec<OsString> = words.iter().map(OsString::from).collect();
-    for (i, argument) in arguments.iter().enumerate() {
+    for (i, (argument, share)) in arguments.iter().enumerate() {
         let flag = argument.get_long().map(|long| format!("--{long}"));
         if !argument.get_action().takes_values() {
             all.extend(flag.map(OsString::from));
             continue;
         }
-        let share = choices.flags.get(i).map_or(0.3, |(_, value, _)| *value);
         let name = argument.get_value_names().and_then(|names| names.first());
         let name = name.map_or("", |name| name.as_str());
         let possible = argument.get_possible_values();
         let value: OsString = match &i_hostile {
-            Some((at, value)) if *at == i => value.clone(),
-            _ if !possible.is_empty() => pick(&possible, share).get_name().into(),
-            _ => (*pick(good(name, argument.get_id().as_str()), share)).into(),
+            Some((at, value)) if *at == Some(i) => value.clone(),
+            _ if !possible.is_empty() => pick(&possible, *share).get_name().into(),
+            _ => (*pick(good(name, argument.get_id().as_str()), *share)).into(),
         };
         match flag {
             Some(flag) => {
@@ -224,17 +227,19 @@ fn line(choices: &Choices) -> Vec<OsString> {
     all
 }
 
-/// Runs a command line under the limits.
-fn run(fixtures: &Fixtures, line: &[OsString]) {
+/// Runs a command line under the limits. Returns whether it succeeded.
+fn run(fixtures: &Fixtures, line: &[OsString]) -> bool {
     let script = format!("ulimit -c 0 -t {MOST_S}; ulimit -d {MOST_KIB}; exec \"$0\" \"$@\"");
     let program = fixtures.command(line);
     let mut limited = Command::new("/bin/sh");
     limited.args(["-c", &script]).arg(program.get_program()).args(line);
     limited.current_dir(fixtures.dir.path().join("now")).stdin(Stdio::null());
     // No other program is found, so that none is started.
+    limited.envs(program.get_envs().filter_map(|(name, value)| Some((name, value?))));
     limited.env("PATH", "/nowhere").env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
     let output = limited.output().expect("it runs");
     check_end(&format!("{line:?}"), &output);
+    output.status.success()
 }
 
 /// Makes the folder of inputs again: commands replace them.
@@ -245,7 +250,8 @@ fn renew(fixtures: &Fixtures) {
     assert!(copied.success());
 }
 
-/// Runs command lines until `is_done`, which gets their number.
+/// Runs command lines until `is_done`, which gets their number. A part of them must succeed: others
+/// are refused before they do anything.
 fn check(seed: u8, is_done: impl Fn(usize) -> bool) {
     let fixtures = Fixtures::with_results();
     let kept = fixtures.dir.path().join("kept");
@@ -257,16 +263,17 @@ fn check(seed: u8, is_done: impl Fn(usize) -> bool) {
     }
     let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &[seed; 32]);
     let mut runner = TestRunner::new_with_rng(Config::default(), rng);
-    let mut n = 0;
+    let (mut n, mut n_succeeded) = (0, 0);
     while !is_done(n) {
         if n % 20 == 0 {
             renew(&fixtures);
         }
         let choices = choices().new_tree(&mut runner).expect("choices").current();
-        run(&fixtures, &line(&choices));
+        n_succeeded += usize::from(run(&fixtures, &line(&choices)));
         n += 1;
     }
-    println!("{n} command lines");
+    println!("{n} command lines, {n_succeeded} succeeded");
+    assert!(n_succeeded >= N_DONE, "{n_succeeded} of {n} command lines succeeded");
 }
 
 #[test]

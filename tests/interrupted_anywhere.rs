@@ -12,11 +12,10 @@ use std::path::Path;
 use std::process::Stdio;
 
 use fixtures::{Fixtures, check_end};
-use signals::interrupt_after;
+use signals::interrupt;
 
-/// Seconds of the processor, on each of its cores, that a command may use after the signal. It gets
-/// 0.4 s to end its present step; writing what is finished takes the rest.
-const MOST_S: f64 = 1.0;
+/// Most runs of a command in which no signal comes before the end: a busy machine may delay it.
+const MOST_LATE: u64 = 20;
 
 /// The commands, with the place of their results: OUT.
 const COMMANDS: [&str; 14] = [
@@ -27,7 +26,7 @@ const COMMANDS: [&str; 14] = [
     "ledger s.toml --size 160x120 --rounds 400 --frames 20 --out OUT",
     "ledger heavy.toml --pixels all --out OUT",
     "render heavy.toml --reference reflections=4 --samples 64 -o OUT.png",
-    "render s.toml --size 4000x4000 -o OUT.exr",
+    "render s.toml --size 2800x2800 -o OUT.exr",
     "inspect heavy.toml --facets --reference",
     "stress",
     "weather w.nc",
@@ -61,28 +60,33 @@ fn prepared() -> Fixtures {
 #[test]
 fn every_long_command_ends_soon_after_ctrl_c() {
     let fixtures = prepared();
-    let n_cores = std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64);
     let names = |at: &Path| -> Vec<String> {
         let entries = fs::read_dir(at).expect("a folder").map(|e| e.expect("an entry"));
         entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect()
     };
     let before = names(fixtures.dir.path()).len();
     for (i, line) in COMMANDS.iter().enumerate() {
-        for k in 0..n_moments() {
-            // From 0.02 to 3 s, as many in each decade.
-            let after_s = 0.02 * 150f64.powf(uniform(k * 100 + i as u64));
+        let (mut k, mut n_interrupted) = (0, 0);
+        while k < n_moments() || n_interrupted == 0 {
+            assert!(k < n_moments() + MOST_LATE, "{line}: every run ends before its signal");
+            // From 0.02 to 3 s, as many in each decade. Shorter commands are then interrupted at
+            // their begin.
+            let is_generated = k < n_moments();
+            let share = uniform(k * 100 + i as u64);
+            let after_s = if is_generated { 0.02 * 150f64.powf(share) } else { 0.0 };
+            k += 1;
             let what = format!("{line} interrupted after {after_s:.2} s");
             let args = line.split(' ').map(|word| word.replace("OUT", "out"));
             let mut command = fixtures.command(args);
             // This test reads no pipe before the end, and a full one would stop the command.
-            let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
-            let (output, used_s) = interrupt_after(child.expect("a child"), after_s);
+            command.stdout(Stdio::null()).stderr(Stdio::piped());
+            let (output, is_running) = interrupt(&mut command, |used_s| used_s >= after_s);
             check_end(&what, &output);
             let (code, errors) = (output.status.code(), String::from_utf8_lossy(&output.stderr));
-            let expected = if used_s.is_some() { &[130, 0, 1][..] } else { &[0, 1] };
+            // A command may end by itself between the last look at it and the signal.
+            let expected = if is_running { &[130, 0, 1][..] } else { &[0, 1] };
             assert!(code.is_some_and(|code| expected.contains(&code)), "{what}: {code:?} {errors}");
-            let used_s = used_s.unwrap_or(0.0);
-            assert!(used_s < MOST_S * n_cores, "{what}: {used_s} s of the processor: {errors}");
+            n_interrupted += u64::from(code == Some(130));
             check_results(&fixtures, &what);
             assert_eq!(names(fixtures.dir.path()).len(), before, "{what}: something stays");
         }
@@ -103,13 +107,16 @@ fn check_results(fixtures: &Fixtures, what: &str) {
     let _ = fs::remove_dir_all(&out);
     for name in ["out.png", "out.exr"] {
         if at(name).exists() {
-            let read = nimbus::io::image::read(&at(name));
-            // Pictures above the limit of reading are whole if they have a header.
-            assert!(read.is_ok() || name == "out.exr", "{what}: {read:?}");
+            let read = nimbus::io::image::read(&at(name)).map(drop);
+            assert!(read.is_ok(), "{what}: {read:?}");
             fs::remove_file(at(name)).expect("a picture");
         }
     }
-    let _ = fs::remove_file(at("out.json"));
+    if let Ok(text) = fs::read_to_string(at("out.json")) {
+        let read = serde_json::from_str::<serde_json::Value>(&text).map(drop);
+        assert!(read.is_ok(), "{what}: {read:?}: {text}");
+        fs::remove_file(at("out.json")).expect("a file");
+    }
     if let Ok(page) = fs::read_to_string(at("out.html")) {
         assert!(page.trim_end().ends_with("</html>"), "{what}: half a page");
         fs::remove_file(at("out.html")).expect("a page");
@@ -120,7 +127,7 @@ fn check_results(fixtures: &Fixtures, what: &str) {
 #[test]
 fn a_farm_ends_soon_after_ctrl_c() {
     let fixtures = Fixtures::new();
-    let n_cores = std::thread::available_parallelism().map_or(1.0, |n| n.get() as f64);
+    let mut n_tried_again = 0;
     for (k, plan) in [
         "farm plan s.toml -o frames --frames 0..5000 --shard-frames 5000",
         "farm plan s.toml -o reference --reference model --samples 65536 --size 256x192",
@@ -137,10 +144,10 @@ fn a_farm_ends_soon_after_ctrl_c() {
             for (run, code) in [("run --shard 0", 75), ("local", 130)] {
                 let line = format!("farm {run} --plan {name}");
                 let mut command = fixtures.command(line.split(' '));
-                let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
+                command.stdout(Stdio::null()).stderr(Stdio::piped());
                 // A pool waits and uses no processor: it is interrupted at once.
                 let after_s = if code == 75 && k < 2 { after_s } else { 0.0 };
-                let (output, used_s) = interrupt_after(child.expect("a child"), after_s);
+                let (output, _) = interrupt(&mut command, |used_s| used_s >= after_s);
                 let what = format!("{line} interrupted after {after_s:.2} s");
                 check_end(&what, &output);
                 let errors = String::from_utf8_lossy(&output.stderr);
@@ -148,11 +155,11 @@ fn a_farm_ends_soon_after_ctrl_c() {
                 // Before the plan is read there is nothing to keep.
                 let expected = [Some(code), Some(130), Some(0)];
                 assert!(expected.contains(&ended), "{what}: {ended:?} {errors}");
-                let used_s = used_s.unwrap_or(0.0);
-                assert!(used_s < MOST_S * n_cores, "{what}: {used_s} s of the processor");
+                n_tried_again += u64::from(ended == Some(75));
             }
         }
         let status = fixtures.run(["farm", "status", "--plan", name]);
         assert!(status.status.success(), "{}", String::from_utf8_lossy(&status.stderr));
     }
+    assert!(n_tried_again > 0, "no shard ends with 75");
 }

@@ -4,6 +4,8 @@
 //! disk, or kills the process at it. Every call that changes a file or a name can be the one.
 //! Afterwards the old results are there or the new ones, whole, beside the user's own files.
 
+#[path = "harness/jobs.rs"]
+mod jobs;
 #[path = "harness/program.rs"]
 mod program;
 #[path = "harness/tiny.rs"]
@@ -11,9 +13,11 @@ mod tiny;
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use jobs::{JOBS, Job};
 use nimbus::io::claim::Claim;
 use serde_json::Value;
 use tiny::Tiny;
@@ -30,113 +34,13 @@ const FILLING: [&str; 9] = [
     "ftruncate",
     "copy_file_range",
 ];
-/// Calls that take files and names away.
+/// Calls that remove files and names.
 const REMOVING: [&str; 3] = ["unlink", "unlinkat", "rmdir"];
 /// Faults and kills of a job by default. `every_call_of_every_command` tries all calls.
 const N_POINTS: usize = 8;
+const SIGKILL: i32 = 9;
+/// Files of the user in the folder of results.
 const NOTES: [&str; 3] = ["notes.txt", "picture-9.png", "case-7.png"];
-
-/// A command that replaces results.
-struct Job {
-    /// Makes the old results; their settings differ from those of the new ones.
-    old: &'static [&'static [&'static str]],
-    /// The arguments of the command.
-    new: &'static [&'static str],
-    /// The file or folder that has the results.
-    out: &'static str,
-    /// The record of new results that are whole; none for a file.
-    record: Option<&'static str>,
-    /// Files that are written after everything was measured.
-    last: &'static [&'static str],
-}
-
-const BENCH: &[&str] = &[
-    "bench",
-    "scene.toml",
-    "-q",
-    "--repeat=1",
-    "--frames=2",
-    "--warmup=1",
-    "--threading=serial",
-    "--no-saved",
-    "--out=out",
-];
-const ERROR: &[&str] = &[
-    "error",
-    "scene.toml",
-    "-q",
-    "--rounds=1",
-    "--frames=1",
-    "--pixels=64",
-    "--against=thin",
-    "--out=out",
-];
-const LEDGER: &[&str] =
-    &["ledger", "scene.toml", "-q", "--rounds=2", "--frames=1", "--pixels=16", "--out=out"];
-const PLAN: &[&str] = &["farm", "plan", "scene.toml", "--frames=0..3", "-o", "plan"];
-
-const JOBS: [Job; 6] = [
-    Job {
-        old: &[BENCH],
-        new: &["--force", "--plot", "--set=draw.cutoff=2.5"],
-        out: "out",
-        record: Some("run.json"),
-        last: &["frames.csv", "run.json", "case-0.png", "frames.svg"],
-    },
-    Job {
-        old: &[&["--knob=draw.cutoff=2"]],
-        new: &["--force", "--knob=draw.cutoff=2.5,4"],
-        out: "out",
-        record: Some("study.json"),
-        last: &["front.svg"],
-    },
-    Job {
-        old: &[LEDGER],
-        new: &["--force", "--set=draw.cutoff=2.5"],
-        out: "out",
-        record: Some("ledger.json"),
-        last: &["ledger.json", "ledger.svg"],
-    },
-    Job {
-        old: &[&["render", "scene.toml", "-q", "-o", "out.png"]],
-        new: &["--force", "--set=draw.cutoff=2.5"],
-        out: "out.png",
-        record: None,
-        last: &[],
-    },
-    Job {
-        old: &[BENCH, &["report", "out", "-q", "-o", "page.html"]],
-        new: &["--force"],
-        out: "page.html",
-        record: None,
-        last: &[],
-    },
-    Job {
-        old: &[
-            PLAN,
-            &["farm", "local", "--plan=plan", "-q"],
-            &["farm", "merge", "--plan=plan", "-o", "out"],
-        ],
-        new: &["--force"],
-        out: "out",
-        record: None,
-        last: &[],
-    },
-];
-
-impl Job {
-    /// Returns the arguments that make the old results last.
-    fn base(&self) -> Vec<&'static str> {
-        let last = self.old.last().expect("a command");
-        let is_study = self.record == Some("study.json");
-        if is_study { [ERROR, last].concat() } else { last.to_vec() }
-    }
-
-    fn args(&self) -> Vec<&'static str> {
-        let is_study = self.record == Some("study.json");
-        [if is_study { ERROR } else { self.old.last().expect("a command") }, self.new].concat()
-    }
-}
 
 /// Every file below a folder, or the file itself, with its content.
 fn content(path: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -159,8 +63,7 @@ struct Place {
 impl Place {
     fn new(job: &'static Job) -> Place {
         let tiny = Tiny::new();
-        let (_, before) = job.old.split_last().expect("a command");
-        for args in before.iter().copied().chain([&job.base()[..]]) {
+        for args in job.before.iter().copied().chain([&[job.command, job.old].concat()[..]]) {
             tiny.good(args);
         }
         let out = tiny.path(job.out);
@@ -168,6 +71,9 @@ impl Place {
             NOTES.iter().for_each(|name| fs::write(out.join(name), "mine").expect("a file"));
         }
         let old = content(&out);
+        for args in job.between {
+            tiny.good(args);
+        }
         Place { tiny, job, old }
     }
 
@@ -206,6 +112,9 @@ impl Place {
     /// name of the job's folder. Calls are counted by name, as strace counts them.
     fn calls(&self) -> Vec<(String, usize, String)> {
         let names = [&FILLING[..], &REMOVING].concat();
+        // The first run fills the cache of references, which changes the number of calls.
+        self.again();
+        self.reset();
         let output = self.traced(&["-e", &format!("trace={}", names.join(","))]);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(self.is_new(), "{:?}", self.job.args());
@@ -230,13 +139,22 @@ impl Place {
         content(&self.tiny.path(self.job.out)) == self.old
     }
 
-    /// Returns whether the new results are whole, and the user's files as they were.
+    /// Returns whether the new results are there and whole, and the user's files as they were.
     fn is_new(&self) -> bool {
+        !self.is_old() && self.is_whole()
+    }
+
+    fn is_whole(&self) -> bool {
         let out = self.tiny.path(self.job.out);
         if !out.is_dir() {
             let bytes = fs::read(&out).unwrap_or_default();
             let text = String::from_utf8_lossy(&bytes);
-            return image::open(&out).is_ok() || text.trim_end().ends_with("</html>");
+            let is_page = text.trim_end().ends_with("</html>");
+            return if self.job.out.ends_with(".html") {
+                is_page
+            } else {
+                image::open(&out).is_ok()
+            };
         }
         let kind = self.job.record.map_or("frames", |record| record.trim_end_matches(".json"));
         let list = format!("{kind}.sha256");
@@ -264,6 +182,8 @@ impl Place {
         let output = self.traced(&["-e", &format!("trace={name}"), "-e", &inject]);
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
         let at = format!("{:?} at {name} {n}: {line}\n{stderr}", self.job.args());
+        let trace = self.tiny.text("trace.log");
+        assert!(trace.contains("(INJECTED)"), "no call failed: {at}\n{trace}");
         assert!(matches!(output.status.code(), Some(0 | 2 | 75)), "{}: {at}", output.status);
         assert!(!stderr.contains("panicked"), "{at}");
         assert!(self.is_old() || self.is_new(), "neither old nor new results: {at}");
@@ -283,8 +203,10 @@ impl Place {
     fn kill(&self, (name, n, line): &(String, usize, String)) {
         self.reset();
         let inject = format!("inject={name}:signal=SIGKILL:when={n}");
-        self.traced(&["-e", &format!("trace={name}"), "-e", &inject]);
+        let output = self.traced(&["-e", &format!("trace={name}"), "-e", &inject]);
         let at = format!("{:?} killed at {name} {n}: {line}", self.job.args());
+        // strace ends with the signal that ended the program.
+        assert_eq!(output.status.signal(), Some(SIGKILL), "{}: {at}", output.status);
         assert!(self.is_old() || self.is_new(), "neither old nor new results: {at}");
     }
 
@@ -303,8 +225,7 @@ fn outlasts(job: &'static Job, n_points: usize) {
     let chosen = |of: &[&str], offset: f64| {
         let fit: Vec<_> = calls.iter().filter(|(name, ..)| of.contains(&name.as_str())).collect();
         let n = n_points.min(fit.len());
-        let at = move |k: usize| ((k as f64 + offset) / n as f64 * fit.len() as f64) as usize;
-        let fit: Vec<_> = calls.iter().filter(|(name, ..)| of.contains(&name.as_str())).collect();
+        let at = |k: usize| ((k as f64 + offset) / n as f64 * fit.len() as f64) as usize;
         (0..n).map(|k| fit[at(k)].clone()).collect::<Vec<_>>()
     };
     for call in chosen(&FILLING, 0.3) {
@@ -358,10 +279,9 @@ fn the_second_run_into_a_place_says_who_has_it() {
         let place = Place::new(job);
         let claim = Claim::take(&place.tiny.path(job.out)).expect("a free place");
         assert!(claim.is_some());
-        let resumed = [ERROR, &["--resume", "--knob=draw.cutoff=4"]].concat();
         let mut runs = vec![job.args()];
-        if job.record == Some("study.json") {
-            runs.push(resumed);
+        if !job.resume.is_empty() {
+            runs.push([job.command, job.resume].concat());
         }
         for args in &runs {
             let output = place.tiny.run(args);

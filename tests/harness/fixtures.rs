@@ -43,12 +43,21 @@ pub const DOCUMENTED: [i32; 7] = [0, 1, 2, 3, 70, 75, 130];
 /// A folder of inputs.
 pub struct Fixtures {
     pub dir: TempDir,
+    /// The cache of references of these tests alone. It is outside `dir`, whose files are counted.
+    cache: TempDir,
 }
 
 impl Fixtures {
     /// Makes a scene, a picture, results of a bench, a plan, a weather file, a pipe and a folder.
     pub fn new() -> Fixtures {
-        let fixtures = Fixtures { dir: tempfile::tempdir().expect("a folder") };
+        let folder = || tempfile::tempdir().expect("a folder");
+        let fixtures = Fixtures { dir: folder(), cache: folder() };
+        // Compiling shaders takes most of the time of a first run, so that all tests share a cache
+        // of shaders, which has them by content.
+        let spirv = Path::new(env!("CARGO_TARGET_TMPDIR")).join("spirv");
+        fs::create_dir_all(&spirv).expect("room");
+        let link = fixtures.cache.path().join("spirv");
+        std::os::unix::fs::symlink(spirv, link).expect("room");
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let at = |name: &str| fixtures.dir.path().join(name);
         fs::write(at("s.toml"), SCENE).expect("room");
@@ -83,12 +92,13 @@ impl Fixtures {
         fixtures
     }
 
-    /// Returns the program in this folder, without display and without other programs.
+    /// Returns the program in this folder, without display and with its own cache.
     pub fn command<A: AsRef<OsStr>>(&self, args: impl IntoIterator<Item = A>) -> Command {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
         command.env("NIMBUS_PROGRESS_S", "0");
         command.args(args).current_dir(self.dir.path()).stdin(Stdio::null());
         command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+        command.env("NIMBUS_CACHE_DIR", self.cache.path());
         command
     }
 

@@ -7,6 +7,8 @@ use nimbus::io::scene_keys::{Key, tables};
 use proptest::prelude::*;
 use serde_json::Value;
 
+use crate::generated;
+
 fn load(set: &str) -> Result<(), String> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
     scene_file::load(&path, &[set.to_owned()], None).map(drop).map_err(|e| e.to_string())
@@ -85,12 +87,11 @@ fn keys_known_by_other_names_are_found() {
     }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
-
-    /// One edit of a key's name, or one of its words, leads to it or to another key's name.
-    #[test]
-    fn a_mistyped_key_is_suggested(i in any::<prop::sample::Index>(), at in any::<prop::sample::Index>(), c in "[a-z]") {
+/// One edit of a key's name, or one of its words, leads to it or to another key's name.
+#[test]
+fn a_mistyped_key_is_suggested() {
+    let index = any::<prop::sample::Index>;
+    generated::check(256, (index(), index(), "[a-z]"), |(i, at, c)| {
         let keys = keys();
         let (path, key) = &keys[i.index(keys.len())];
         let mut name: Vec<char> = key.name.chars().collect();
@@ -102,15 +103,19 @@ proptest! {
         }
         let message = load(&format!("{table}.{name}=1")).expect_err("unknown");
         prop_assert!(message.contains("; did you mean `"), "{}", message);
-    }
+        Ok(())
+    });
+}
 
-    /// No value makes loading panic, and every refusal is one line without control characters.
-    #[test]
-    fn any_value_is_read_or_refused_in_one_line(i in any::<prop::sample::Index>(), value in ".{0,30}") {
+/// No value makes loading panic, and every refusal is one line without control characters.
+#[test]
+fn any_value_is_read_or_refused_in_one_line() {
+    generated::check(256, (any::<prop::sample::Index>(), ".{0,30}"), |(i, value)| {
         let keys = keys();
         let (path, _) = &keys[i.index(keys.len())];
         if let Err(message) = load(&format!("{path}={value}")) {
             prop_assert!(!message.contains(char::is_control), "{:?}", message);
         }
-    }
+        Ok(())
+    });
 }

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use serde_json::Value;
 
+use crate::generated;
 use crate::program::run;
 
 /// A scene without its texture, which would take most of the time.
@@ -17,27 +18,30 @@ fn bench(more: &[&str]) -> (String, String) {
     (stdout, stderr)
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(6) })]
-
-    /// Whatever is drawn, in however many frames and loops: a bench of a scene that stands still
-    /// has the loop without skipping as its figure, and its frames drew something.
-    #[test]
-    fn the_figure_of_a_still_scene_is_the_loop_without_skipping(
-        cutoff in 2.0f64..4.0,
-        frames in 3u32..6,
-        warm_up in 0u32..2,
-        threading in prop::sample::select(vec!["serial", "parallel", "both"]),
-        is_saved in any::<bool>(),
-        is_swept in any::<bool>(),
-        path in prop::sample::select(vec!["sprites", "tiles"]),
-    ) {
+/// Whatever is drawn, in however many frames and loops: a bench of a scene that stands still
+/// has the loop without skipping as its figure, and its frames drew something.
+#[test]
+fn the_figure_of_a_still_scene_is_the_loop_without_skipping() {
+    let threadings = prop::sample::select(vec!["serial", "parallel", "both"]);
+    let paths = prop::sample::select(vec!["sprites", "tiles"]);
+    let flags = (any::<bool>(), any::<bool>());
+    let settings = (2.0f64..4.0, 3u32..6, 0u32..2, threadings, flags, paths);
+    generated::check(6, settings, |(cutoff, frames, warm_up, threading, flags, path)| {
+        let (is_saved, is_swept) = flags;
         let set = format!("draw.cutoff={cutoff}");
         let sweep = format!("draw.path={path},auto");
         let [frames, warm_up] = [frames, warm_up].map(|n| n.to_string());
         let mut args = vec![
-            "--set", &set, "--frames", &frames, "--warmup", &warm_up, "--threading", threading,
-            "--repeat", "1",
+            "--set",
+            &set,
+            "--frames",
+            &frames,
+            "--warmup",
+            &warm_up,
+            "--threading",
+            threading,
+            "--repeat",
+            "1",
         ];
         if !is_saved {
             args.push("--no-saved");
@@ -61,20 +65,22 @@ proptest! {
         let (text, _) = bench(&args);
         let place = |word: &str| text.find(word).unwrap_or_else(|| panic!("no {word}: {text}"));
         prop_assert!(place("NOTHING MOVES") < place("p50"), "{}", text);
-    }
+        Ok(())
+    });
+}
 
-    /// With anything that moves, the first loop is the figure.
-    #[test]
-    fn a_moving_scene_has_its_first_loop_as_the_figure(
-        set in prop::sample::select(vec![
-            "cloud.0.wind=[1,0,0]",
-            "cloud.0.gust=0.3",
-            "cloud.0.grow_to=2",
-            "camera={ path = [{ time_s = 0, position = [0,0,6], target = [0,0,0] }, \
-             { time_s = 1, position = [1,0,6], target = [0,0,0] }] }",
-        ]),
-        more in prop::sample::select(vec!["--no-saved", "--no-skip", "--quiet"]),
-    ) {
+/// With anything that moves, the first loop is the figure.
+#[test]
+fn a_moving_scene_has_its_first_loop_as_the_figure() {
+    let settings = prop::sample::select(vec![
+        "cloud.0.wind=[1,0,0]",
+        "cloud.0.gust=0.3",
+        "cloud.0.grow_to=2",
+        "camera={ path = [{ time_s = 0, position = [0,0,6], target = [0,0,0] }, \
+         { time_s = 1, position = [1,0,6], target = [0,0,0] }] }",
+    ]);
+    let flags = prop::sample::select(vec!["--no-saved", "--no-skip", "--quiet"]);
+    generated::check(6, (settings, flags), |(set, more)| {
         let args = ["--set", set, "--frames", "3", "--repeat", "1", "--warmup", "1", more];
         let (json, _) = bench(&[&args[..], &["--json"]].concat());
         let found: Value = serde_json::from_str(&json).expect("JSON");
@@ -82,7 +88,8 @@ proptest! {
         prop_assert_eq!(&found["cases"][0]["figure"], name);
         let (text, _) = bench(&args);
         prop_assert!(!text.contains("NOTHING MOVES"), "{}", text);
-    }
+        Ok(())
+    });
 }
 
 #[test]

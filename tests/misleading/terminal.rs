@@ -4,6 +4,7 @@ use nimbus::io::plain_text::is_harmful;
 use proptest::prelude::*;
 use serde_json::Value;
 
+use crate::generated;
 use crate::program::{path, run};
 
 /// Text with escape sequences, bells, returns, C1 codes and marks of direction.
@@ -46,11 +47,9 @@ fn assert_plain(args: &[&str]) -> (Option<i32>, String) {
     (code, stdout)
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(8) })]
-
-    #[test]
-    fn arguments_scenes_and_results_are_printed_plain(evil in hostile()) {
+#[test]
+fn arguments_scenes_and_results_are_printed_plain() {
+    generated::check(8, hostile(), |evil| {
         let dir = tempfile::tempdir().expect("a folder");
         let out = path(&dir, "a.png");
         // Names of files, settings and devices.
@@ -73,8 +72,21 @@ proptest! {
         std::fs::write(&scene, text).expect("a scene");
         let results = path(&dir, "r");
         let (code, json) = assert_plain(&[
-            "bench", &scene, "--size", "16x12", "--frames", "2", "--warmup", "0", "--repeat", "1",
-            "--set", "cloud.0.texture=\"none\"", "--out", &results, "--json",
+            "bench",
+            &scene,
+            "--size",
+            "16x12",
+            "--frames",
+            "2",
+            "--warmup",
+            "0",
+            "--repeat",
+            "1",
+            "--set",
+            "cloud.0.texture=\"none\"",
+            "--out",
+            &results,
+            "--json",
         ]);
         prop_assert_eq!(code, Some(0));
         let run: Value = serde_json::from_str(&json).expect("JSON");
@@ -96,5 +108,6 @@ proptest! {
         if let Ok(html) = std::fs::read_to_string(&page) {
             prop_assert!(!html.chars().any(|c| c != '\n' && c != '\t' && is_harmful(c)));
         }
-    }
+        Ok(())
+    });
 }

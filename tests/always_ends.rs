@@ -277,7 +277,7 @@ const THREADED: [(&str, usize); 6] = [
     ("compare a.png a.png --json", 1),
     ("weather w.nc --step 0", 1),
     ("farm status --plan farm", 1),
-    ("report run -o out.html --force", 2),
+    ("report run -o out.html --force", 1),
 ];
 
 #[test]

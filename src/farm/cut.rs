@@ -91,8 +91,8 @@ impl Cut {
         };
         if sizes.len() > MOST_SHARDS {
             return Err(Error::limit(format!(
-                "{} shards, expected at most {MOST_SHARDS}, which plan.json has room for: expected \
-                 longer ones",
+                "{} shards, expected at most {MOST_SHARDS}, for which plan.json has room; give \
+                 each shard more items",
                 sizes.len()
             )));
         }

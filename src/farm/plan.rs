@@ -242,7 +242,7 @@ impl Plan {
         if text.len() as u64 > RECORD_LIMIT {
             let n = self.shards.len();
             return Err(Error::limit(format!(
-                "a plan of {n} shards is too large to be read again: expected fewer, longer ones"
+                "a plan of {n} shards is too large to be read again; give each shard more items"
             )));
         }
         if path.symlink_metadata().is_ok() {

@@ -22,7 +22,7 @@ use crate::passes::second::MIN_BLOCK;
 use crate::passes::{grid, sort, texture};
 
 /// Most pixels of a picture: 8192 x 4096. Reading one back takes 20 bytes a pixel on the host.
-const MOST_PIXELS: u64 = 1 << 25;
+const MOST_DRAWN_PIXELS: u64 = 1 << 25;
 
 /// Returns the bytes of the buffers and images that grow with the scene. Light tensors and the
 /// scratch of the tile passes are not among them; they are checked when they are made.
@@ -37,9 +37,9 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         )));
     }
     let pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
-    if pixels > MOST_PIXELS {
+    if pixels > MOST_DRAWN_PIXELS {
         return Err(Error::limit(format!(
-            "a picture of {} x {} pixels; expected at most {MOST_PIXELS} pixels in all; reduce \
+            "a picture of {} x {} pixels; expected at most {MOST_DRAWN_PIXELS} pixels in all; reduce \
              film.width or film.height, or --size",
             scene.film.width, scene.film.height
         )));

@@ -18,7 +18,7 @@ use crate::model::film::{Film, dither};
 
 /// Most pixels of a picture that is read: 4096 x 2304. Comparing two of them takes 1.9 GB, as
 /// measured, and no command may take more than 2 GiB.
-const MOST_PIXELS: u64 = 9 << 20;
+const MOST_READ_PIXELS: u64 = 9 << 20;
 
 /// Format of an image file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -88,8 +88,9 @@ pub fn read(path: &Path) -> Result<Image> {
     let reader = || image::ImageReader::with_format(Cursor::new(&bytes), format);
     // A few bytes can declare a picture that fills the memory.
     let (width, height) = reader().into_dimensions().map_err(unread)?;
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
-        let what = format!("{width} x {height} pixels, the limit is {MOST_PIXELS} pixels in all");
+    if u64::from(width) * u64::from(height) > MOST_READ_PIXELS {
+        let what =
+            format!("{width} x {height} pixels, the limit is {MOST_READ_PIXELS} pixels in all");
         return Err(Error::io(path, what));
     }
     let decoded = reader().decode().map_err(unread)?;

@@ -1,4 +1,4 @@
-//! Lists what differs between the conditions of runs: their device, build and scene.
+//! Lists the conditions in which two runs differ: their device, build and scene.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -54,8 +54,8 @@ impl Difference {
 }
 
 const UNSET: &str = "not set";
-/// Keys of the scene that are listed. The first ones show what was changed; two scenes that share
-/// nothing would fill a page.
+/// Most keys of the scene that are listed. The first keys show the change; all keys of two scenes
+/// that share nothing would fill a page.
 const N_KEYS_SHOWN: usize = 5;
 
 /// Lists all conditions that differ between two runs, in the order of [`Condition::ALL`].
@@ -148,7 +148,8 @@ fn add_leaves(value: &Value, at: &str, leaves: &mut BTreeMap<String, String>) {
     }
 }
 
-/// Lists what a reader should know about two runs that may be compared.
+/// Lists remarks on two runs that may be compared: unknown sources, interruptions, still scenes and
+/// other commands.
 pub(super) fn remarks(a: &Run, b: &Run) -> Vec<String> {
     let mut remarks = Vec::new();
     if a.revision == b.revision && (a.revision == "unknown" || a.revision.ends_with("-dirty")) {
@@ -180,8 +181,8 @@ pub(super) fn remarks(a: &Run, b: &Run) -> Vec<String> {
     remarks
 }
 
-/// Returns the command without the program and the arguments that change no time: where results go
-/// and how much is printed.
+/// Returns the command without the program and the arguments that change no time: the place of the
+/// results and the amount of text.
 fn relevant_words(command: &[String]) -> Vec<&str> {
     let mut words = command.iter().skip(1).map(String::as_str);
     let mut kept = Vec::new();

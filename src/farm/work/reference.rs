@@ -25,7 +25,7 @@ use crate::timing::machine::{self, Device};
 /// The greatest number of pieces. A plan with as many shards is about as large as a plan may be.
 const MOST_PIECES: u64 = 40_000;
 /// Most pixels of a picture, whose sums are merged in memory: 4096 x 2048.
-const MOST_PIXELS: u64 = 1 << 23;
+const MOST_MERGED_PIXELS: u64 = 1 << 23;
 /// Largest file of a piece: the sums of a tile of the largest picture.
 const LARGEST_SUMS: u64 = 512 << 20;
 /// The description of the merged picture and of its error.
@@ -164,8 +164,8 @@ impl Work for ReferenceWork {
             return Err("a picture or a tile without pixels".into());
         }
         let n_pixels = u64::from(*width) * u64::from(*height);
-        if n_pixels > MOST_PIXELS {
-            return Err(format!("{n_pixels} pixels, expected at most {MOST_PIXELS}"));
+        if n_pixels > MOST_MERGED_PIXELS {
+            return Err(format!("{n_pixels} pixels, expected at most {MOST_MERGED_PIXELS}"));
         }
         if !(1..=MAX_SAMPLES).contains(n_samples) {
             return Err(format!("{n_samples} samples, expected 1 to {MAX_SAMPLES}"));

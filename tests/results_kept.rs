@@ -1,4 +1,4 @@
-//! Results that are there already outlast everything that can happen to the run that replaces them.
+//! Earlier results outlast every failure of the run that replaces them.
 //!
 //! Each command replaces old results under `strace`, which makes one system call fail as on a full
 //! disk, or kills the process at it. Every call that changes a file or a name can be the one.

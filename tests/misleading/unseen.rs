@@ -17,7 +17,7 @@ fn scene(set: &[&str]) -> Scene {
     scene_file::load(&path, &set, None).expect("a scene").scene
 }
 
-fn told(scene: &Scene, n_shown: Option<u32>, rgba: &[f32]) -> Option<String> {
+fn warning(scene: &Scene, n_shown: Option<u32>, rgba: &[f32]) -> Option<String> {
     unseen(scene, DrawnFrame { time_s: 0.0, n_shown }, rgba).expect("a camera")
 }
 
@@ -28,10 +28,10 @@ fn a_picture_is_empty_if_no_pixel_shows() {
     generated::check(256, (0usize..64, 0.05f32..10.0, 0.0f32..1e-6), |(i, v, dim)| {
         let scene = scene(&["film.background=[0,0,0]"]);
         let mut rgba = vec![dim; 4 * 64];
-        let text = told(&scene, Some(9), &rgba).expect("nothing shows");
+        let text = warning(&scene, Some(9), &rgba).expect("nothing shows");
         prop_assert!(text.starts_with("nothing can be seen in the picture: "));
         rgba[4 * i + i % 3] = v;
-        prop_assert_eq!(told(&scene, Some(9), &rgba), None);
+        prop_assert_eq!(warning(&scene, Some(9), &rgba), None);
         Ok(())
     });
 }
@@ -52,10 +52,10 @@ fn a_camera_that_looks_away_is_named() {
             let to = [at(p.x, d.x), at(p.y, d.y), at(p.z, d.z)];
             format!("camera.target=[{}, {}, {}]", to[0], to[1], to[2])
         };
-        let away = told(&scene(&[&aim(-1.0)]), Some(0), &[0.0; 4]).expect("nothing shows");
+        let away = warning(&scene(&[&aim(-1.0)]), Some(0), &[0.0; 4]).expect("nothing shows");
         // At a great angle a corner of the scene's bounds lies before the camera.
         prop_assert!(away.contains("looks away") || away.contains("looks past"), "{}", away);
-        let toward = told(&scene(&[&aim(1.0)]), Some(0), &[0.0; 4]).expect("nothing shows");
+        let toward = warning(&scene(&[&aim(1.0)]), Some(0), &[0.0; 4]).expect("nothing shows");
         prop_assert!(!toward.contains("looks away"), "{}", toward);
         Ok(())
     });
@@ -65,7 +65,7 @@ fn a_camera_that_looks_away_is_named() {
 fn every_reason_is_named() {
     let hello = scene(&[]);
     let none = [0.0; 4];
-    let of = |scene: &Scene, n, rgba: &[f32]| told(scene, n, rgba).expect("nothing shows");
+    let of = |scene: &Scene, n, rgba: &[f32]| warning(scene, n, rgba).expect("nothing shows");
     assert!(of(&hello, Some(0), &none).contains("too small"));
     assert!(of(&hello, Some(9), &none).contains("is transparent"));
     assert!(of(&hello, None, &none).contains("is transparent"));
@@ -78,5 +78,5 @@ fn every_reason_is_named() {
     bare.clouds.clear();
     assert!(of(&bare, None, &none).contains("no particles"));
     // A number that is not finite is another fault, with a warning of its own.
-    assert_eq!(told(&hello, None, &[f32::NAN, 0.0, 0.0, 0.0]), None);
+    assert_eq!(warning(&hello, None, &[f32::NAN, 0.0, 0.0, 0.0]), None);
 }

@@ -29,12 +29,14 @@ const MOST_KIB: u32 = 2_400_000;
 /// Limit of a run's time on the processor, s.
 const MOST_S: u32 = 120;
 
-/// Flags that keep the commands of a kind short, unless a generated flag is the same.
-const SHORT: [(&str, &[(&str, &str)]); 4] = [
+/// Flags that keep commands short, unless a generated flag is the same. An argument without a flag
+/// has an empty one.
+const SHORT: [(&str, &[(&str, &str)]); 5] = [
     ("bench", &[("frames", "2"), ("warmup", "0"), ("repeat", "1")]),
     ("error", &[("rounds", "1"), ("frames", "1"), ("pixels", "16"), ("knob", "draw.cutoff=2")]),
     ("ledger", &[("rounds", "1"), ("frames", "1"), ("pixels", "16")]),
     ("calibrate", &[("frames", "2")]),
+    ("stress", &[("", "moisture")]),
 ];
 
 /// The parts of a generated command line: the command, its flags and their values. Each number from
@@ -232,10 +234,15 @@ fn line(choices: &Choices) -> Vec<OsString> {
             None => all.push(value),
         }
     }
-    let is_given = |flag: &str| arguments.iter().any(|(a, _)| a.get_long() == Some(flag));
+    let is_given =
+        |flag: &str| arguments.iter().any(|(a, _)| a.get_long().unwrap_or_default() == flag);
     let short = SHORT.iter().filter(|(name, _)| words.last().is_some_and(|word| word == name));
     let missing = short.flat_map(|(_, flags)| *flags).filter(|(flag, _)| !is_given(flag));
-    all.extend(missing.map(|(flag, value)| format!("--{flag}={value}").into()));
+    let word = |(flag, value): &(&str, &str)| match *flag {
+        "" => (*value).into(),
+        _ => format!("--{flag}={value}").into(),
+    };
+    all.extend(missing.map(word));
     all
 }
 

@@ -314,6 +314,17 @@ fn inspect_prints_acceptance_per_box_and_the_plan() {
 }
 
 #[test]
+fn particles_without_size_receive_finite_light() {
+    let dir = temp();
+    std::fs::write(dir.path().join("a.dat"), "9\n1\n9, 1, 1, 1, 0, 0, 0, 0\n").expect("a box");
+    let scene = path(&dir, "a.toml");
+    std::fs::write(&scene, "[[cloud]]\nfrom = \"boxes\"\nfile = \"a.dat\"\n").expect("a scene");
+    let (code, facets, _) = run(&["inspect", &scene, "--facets"]);
+    assert_eq!((code, facets.lines().count()), (0, 1 + 9), "{facets}");
+    assert!(!facets.contains("NaN") && !facets.contains("inf"), "{facets}");
+}
+
+#[test]
 fn devices_lists_at_least_the_one_that_is_used() {
     let (code, json, _) = run(&["devices", "--json"]);
     assert_eq!(code, 0);

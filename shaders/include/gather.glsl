@@ -63,7 +63,8 @@ LoadedSource load_source(uint i, Region emitter, FacetShape facet_shape) {
     if (emitter.kind != REGION_SURFACE) {
         vec4 face = uintBitsToFloat(texelFetch(sources, k + 2));
         s.normal = face.xyz;
-        s.area = face.w;
+        // A facet without area would divide 0 by 0 where it is its own receiver.
+        s.area = max(face.w, 1e-30);
         s.total_area = face.w;
     }
 #if TREE

@@ -111,11 +111,14 @@ pub fn skipping_line(s: &Skipping) -> String {
         Some(false) => "; NOT THE SAME BYTES",
         None => "",
     };
-    format!(
-        "skipping saves {} of {} ms of GPU time a frame ({times}){bytes}\n",
-        ms(saved),
-        ms(s.gpu_no_skip_ms)
-    )
+    let (with, without) = (ms(s.gpu_ms), ms(s.gpu_no_skip_ms));
+    if saved <= 0.0 {
+        return format!(
+            "skipping saves no GPU time that was measured: {with} ms a frame, {without} without \
+             it{bytes}\n"
+        );
+    }
+    format!("skipping saves {} of {without} ms of GPU time a frame ({times}){bytes}\n", ms(saved))
 }
 
 /// Returns the precision of the clocks: a time of about this size means little.

@@ -51,7 +51,6 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
         cut,
     })?;
     plan.write(&args.output)?;
-    output::wrote(&args.output, "the plan", args.quiet);
     if args.json {
         return output::object(&plan.to_json(&args.output)?);
     }
@@ -59,7 +58,7 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
     let items = plan.work.items();
     let (n, noun) = (items.end - items.start, plan.work.noun());
     output::text(&format!(
-        "{n} {noun} in {n_shards} shard{}\n{}\
+        "{n} {noun} in {n_shards} shard{}, planned in {folder}\n{}\
          all of them here:      nimbus farm local --plan {folder}\n\
          by Slurm:              nimbus farm submit slurm --plan {folder}\n\
          one of them:           nimbus farm run --plan {folder} --shard I     (I from 0 to {})\n",

@@ -10,10 +10,10 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::io::atomic::{check_place, write_atomic};
 use crate::io::claim::Claim;
+pub use crate::io::claim::{refuse_any, refuse_existing};
 use crate::io::console::{self, say};
 use crate::io::plain_text::{plain, plain_json};
 use crate::io::result_folder::ResultFolder;
-pub use crate::io::result_folder::{refuse_any, refuse_existing};
 use crate::report::charts::Chart;
 use crate::studies::figure::Figure;
 

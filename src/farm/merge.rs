@@ -8,7 +8,8 @@ use super::ranges::ranges;
 use super::store::{ResultState, Store};
 use super::work::{Merge, Merged, ShardResult};
 use crate::error::{Error, Result};
-use crate::io::result_folder::{Existing, refuse_existing};
+use crate::io::claim::refuse_existing;
+use crate::io::result_folder::Existing;
 
 /// The place of a merged result, and what is allowed there.
 #[derive(Debug, Clone, Copy)]

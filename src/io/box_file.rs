@@ -150,8 +150,10 @@ fn header(line: Option<Line>, meaning: &str, text: &str, path: &Path) -> Result<
     let (fields, _) = line.fields()?;
     let (offset, word) = fields[0];
     let n = word.parse().map_err(|_| {
-        let hint =
-            if word == "x" { "; a list of particles needs from = \"particles\"" } else { "" };
+        let hint = match meaning == FIRST && word == "x" {
+            true => "; a list of particles needs from = \"particles\"",
+            false => "",
+        };
         line.fault(offset, format!("expected {meaning}, found `{}`{hint}", shown(word)))
     })?;
     if let Some(extra) = fields.get(1) {

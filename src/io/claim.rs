@@ -80,11 +80,35 @@ impl Claim {
     }
 }
 
+/// Refuses to replace a file or folder unless `force` is set, before it is claimed.
+///
+/// # Errors
+/// Fails if `path` exists and `force` is not set: [`Error::Transient`] if another run writes there.
+pub fn refuse_existing(path: &Path, force: bool) -> Result<()> {
+    if !force && path.symlink_metadata().is_ok() {
+        refuse_taken(path)?;
+    }
+    refuse_any(path, force)
+}
+
+/// Refuses to replace a file or folder unless `force` is set, whoever writes there. An empty folder
+/// has nothing to replace.
+///
+/// # Errors
+/// Fails if `path` exists and `force` is not set.
+pub fn refuse_any(path: &Path, force: bool) -> Result<()> {
+    let is_empty = || path.read_dir().is_ok_and(|mut entries| entries.next().is_none());
+    if !force && path.symlink_metadata().is_ok() && !is_empty() {
+        return Err(Error::io(path, "exists; --force replaces it"));
+    }
+    Ok(())
+}
+
 /// Refuses a place that another run has claimed, or a folder in which one has.
 ///
 /// # Errors
 /// [`Error::Transient`] when another run has claimed it.
-pub fn refuse_taken(place: &Path) -> Result<()> {
+fn refuse_taken(place: &Path) -> Result<()> {
     let inside = fs::read_dir(place).into_iter().flatten().flatten().map(|entry| entry.path());
     let is_claim = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().as_encoded_bytes();

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 use super::atomic::{Temporary, folder_of, write_atomic};
-use super::claim::{self, Claim};
+use super::claim::{Claim, refuse_any, refuse_existing};
 use super::folder::{check_writable, replace_files};
 use super::text_file::{RECORD_LIMIT, TABLE_LIMIT, read_result};
 use crate::error::{Error, Result};
@@ -32,30 +32,6 @@ pub enum Existing {
     Replace,
     /// Results of the same kind are continued.
     Extend,
-}
-
-/// Refuses to replace a file or folder unless `force` is set, before it is claimed.
-///
-/// # Errors
-/// Fails if `path` exists and `force` is not set: [`Error::Transient`] if another run writes there.
-pub fn refuse_existing(path: &Path, force: bool) -> Result<()> {
-    if !force && path.symlink_metadata().is_ok() {
-        claim::refuse_taken(path)?;
-    }
-    refuse_any(path, force)
-}
-
-/// Refuses to replace a file or folder unless `force` is set, whoever writes there. An empty folder
-/// has nothing to replace.
-///
-/// # Errors
-/// Fails if `path` exists and `force` is not set.
-pub fn refuse_any(path: &Path, force: bool) -> Result<()> {
-    let is_empty = || path.read_dir().is_ok_and(|mut entries| entries.next().is_none());
-    if !force && path.symlink_metadata().is_ok() && !is_empty() {
-        return Err(Error::io(path, "exists; --force replaces it"));
-    }
-    Ok(())
 }
 
 impl Existing {

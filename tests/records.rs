@@ -270,6 +270,9 @@ fn sample_at(date: &str) -> Run {
 fn an_existing_folder_is_refused_unless_forced() {
     let folder = tempfile::tempdir().unwrap();
     let open = |place: &Path, existing| open_results(place, existing, 1, true);
+    // An empty folder has nothing to lose.
+    open(folder.path(), Existing::Refuse).unwrap();
+    fs::write(folder.path().join("notes.txt"), "mine").unwrap();
     let refused = open(folder.path(), Existing::Refuse).unwrap_err();
     assert!(refused.to_string().contains("--force"), "{refused}");
     assert_eq!(refused.exit_code(), 2);

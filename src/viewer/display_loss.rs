@@ -2,10 +2,12 @@
 //! message and the exit code of a missing device.
 //!
 //! Xlib reports a broken connection through a function that must not return. It may be called on
-//! any thread, in the middle of a call of the window system.
+//! any thread, in the middle of a call of the window system. winit has a connection of its own, and
+//! panics where that one is the first to break.
 
 use std::ffi::c_int;
-use std::sync::Mutex;
+use std::panic::{PanicHookInfo, set_hook, take_hook};
+use std::sync::{Mutex, Once};
 
 use x11_dl::xlib;
 
@@ -17,6 +19,8 @@ use crate::io::console::say;
 /// A function that keeps unsaved work.
 type Rescue = Box<dyn FnOnce() + Send>;
 
+/// The hook for panics is set once.
+static HOOK: Once = Once::new();
 /// Called once when the display is lost.
 static RESCUE: Mutex<Option<Rescue>> = Mutex::new(None);
 
@@ -25,6 +29,12 @@ static RESCUE: Mutex<Option<Rescue>> = Mutex::new(None);
 /// Where the system has no Xlib there is no connection that could break.
 pub fn on_loss(rescue: impl FnOnce() + Send + 'static) {
     *lock(&RESCUE) = Some(Box::new(rescue));
+    HOOK.call_once(|| {
+        let others = take_hook();
+        set_hook(Box::new(
+            move |panic| if is_of_display(panic) { end_process() } else { others(panic) },
+        ));
+    });
     if let Ok(library) = xlib::Xlib::open() {
         // SAFETY: the function has the required type, stays valid, and never returns.
         unsafe { (library.XSetIOErrorHandler)(Some(end)) };
@@ -32,6 +42,20 @@ pub fn on_loss(rescue: impl FnOnce() + Send + 'static) {
 }
 
 unsafe extern "C" fn end(_: *mut xlib::Display) -> c_int {
+    end_process()
+}
+
+/// Returns whether winit panicked because its connection to the display broke.
+fn is_of_display(panic: &PanicHookInfo<'_>) -> bool {
+    let payload = panic.payload();
+    let text = payload.downcast_ref::<String>().map(String::as_str);
+    let text = text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or_default();
+    let is_of_winit = panic.location().is_some_and(|at| at.file().contains("winit"));
+    is_of_winit && text.contains("Connection(")
+}
+
+/// Keeps unsaved work and ends the process.
+fn end_process() -> ! {
     // The lock is held until the process ends: another thread that finds the display lost must not
     // end the process while this one keeps unsaved work.
     let mut rescue = lock(&RESCUE);

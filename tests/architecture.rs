@@ -45,8 +45,10 @@ const EMPTY_WORDS: [&str; 9] =
     ["manager", "managers", "util", "utils", "helper", "helpers", "common", "commons", "misc"];
 /// The module of arguments that several passes share.
 const SHARED_BY_PASSES: &str = "blobs";
-/// A little more than the 400 lines that the project aims at.
+/// Most lines of a file.
 const MAX_LINES: usize = 400;
+/// Most characters of a line. rustfmt keeps code within them, but neither comments nor text.
+const MAX_WIDTH: usize = 100;
 /// The only crates that `model` may use.
 const MODEL_CRATES: [&str; 3] = ["glam", "libm", "nalgebra"];
 const SHADER_KINDS: [&str; 3] = ["comp", "vert", "frag"];
@@ -197,9 +199,14 @@ fn check_name_and_length(root: &Path, path: &Path, complaints: &mut Vec<String>)
             complaints.push(format!("{shown}: \"{word}\" in a name says nothing"));
         }
     }
-    let n_lines = String::from_utf8_lossy(&fs::read(path).unwrap()).lines().count();
+    let bytes = fs::read(path).unwrap();
+    let text = String::from_utf8_lossy(&bytes);
+    let n_lines = text.lines().count();
     if n_lines > MAX_LINES {
         complaints.push(format!("{shown}: {n_lines} lines, more than {MAX_LINES}"));
+    }
+    if let Some(i) = text.lines().position(|line| line.chars().count() > MAX_WIDTH) {
+        complaints.push(format!("{shown}:{}: more than {MAX_WIDTH} characters", i + 1));
     }
 }
 

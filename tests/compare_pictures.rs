@@ -1,16 +1,15 @@
 //! `nimbus compare` of two pictures as a user types it: numbers known by hand, and everything that
 //! is no pair of pictures.
 
-use std::process::Command;
+#[path = "harness/program.rs"]
+mod program;
 
 use image::{ImageBuffer, Rgb, Rgba};
 use serde_json::Value;
 
 /// Exit code, stdout, stderr.
 fn compare(args: &[&str]) -> (i32, String, String) {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
-    command.env("NIMBUS_PROGRESS_S", "0");
-    let output = command.arg("compare").args(args).output().expect("the program runs");
+    let output = program::run(&[&["compare"], args].concat());
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
     (output.status.code().expect("an exit code"), text(output.stdout), text(output.stderr))
 }

@@ -17,8 +17,8 @@ use display::{Display, wait_for};
 use nimbus::io::box_file;
 use program::nimbus;
 
-/// Times between the key that saves and SIGKILL, in milliseconds: from before the editor has the key
-/// to after its save.
+/// Times between the key that saves and SIGKILL, in milliseconds: from before the editor has the
+/// key to after its save.
 const DELAYS_MS: [u64; 8] = [0, 5, 10, 20, 40, 80, 160, 320];
 
 /// Starts the editor, and adds a box. Returns the editor and its window.

@@ -1,12 +1,16 @@
 //! Ctrl-C in the middle of a bench: exit code 130, and results of the frames that were finished,
 //! which are results like any others. In either loop and in both.
 
+#[path = "harness/program.rs"]
+mod program;
+
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use nimbus::timing::results::{BenchResults, read_results};
+use program::nimbus;
 use serde_json::Value;
 
 /// Frames of a block. On two cores of a software device they take a second or more.
@@ -14,13 +18,6 @@ const N_FRAMES: u32 = 600;
 const N_WARM_UP: u32 = 4;
 /// Timed frames that `compare` surely has an opinion of.
 const N_COMPARED: usize = 100;
-
-fn nimbus(args: &[&str]) -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
-    command.env("NIMBUS_PROGRESS_S", "0");
-    command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
-    command
-}
 
 fn bench(threading: &str, out: &str) -> Child {
     let (n_frames, n_warm_up) = (N_FRAMES.to_string(), N_WARM_UP.to_string());

@@ -1,6 +1,8 @@
 //! Charts: positions of data, read back from the SVG, agree with the axes' ticks; degenerate input
 //! is drawn.
 
+#[path = "harness/generated.rs"]
+mod generated;
 #[path = "harness/results.rs"]
 mod results;
 #[path = "harness/studies.rs"]

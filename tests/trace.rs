@@ -157,8 +157,8 @@ fn zones_are_nested_and_passes_lie_in_their_frames() {
         assert_eq!((count(&drawing, name), count("thread game", name)), (n, n), "{name}");
     }
     // After each loop its last frame is read back, and after the last one facets and light, each
-    // once more recorded, submitted and waited for; to see whether anything shows the picture; and to
-    // count what is odd the picture, status, facets and light.
+    // once more recorded, submitted and waited for; then the picture, to see whether it shows
+    // anything, and, to count what is odd, status, facets and light.
     for (name, extra) in [
         ("render step", 0),
         ("plan", 0),

@@ -29,8 +29,8 @@ pub struct BenchCases {
 /// Loads the scene at `path` at every point of the sweep.
 ///
 /// # Errors
-/// Fails if the sweep or a scene is faulty, there are no such cases as `--part` names, or the records
-/// of all frames would not fit in memory.
+/// Fails if the sweep or a scene is faulty, `--part` names cases that are not there, or the
+/// records of all frames would not fit in memory.
 pub fn bench_cases(args: &BenchArgs, path: &Path, options: &SceneArgs) -> Result<BenchCases> {
     let modes: &[Threading] = match args.threading {
         ThreadingArg::Serial => &[Threading::Serial],

@@ -100,24 +100,23 @@ pub fn drawn_line(case: &Case) -> Option<String> {
 
 /// Returns what skipping saved.
 pub fn skipping_line(s: &Skipping) -> String {
-    let saved = s.gpu_no_skip_ms - s.gpu_ms;
-    let times = if s.gpu_ms > 0.0 {
-        format!("{:.1} times less", s.gpu_no_skip_ms / s.gpu_ms)
-    } else {
-        "nothing is left to do".to_owned()
-    };
     let bytes = match s.same_bytes {
         Some(true) => "; same bytes",
         Some(false) => "; NOT THE SAME BYTES",
         None => "",
     };
     let (with, without) = (ms(s.gpu_ms), ms(s.gpu_no_skip_ms));
+    let saved = s.gpu_no_skip_ms - s.gpu_ms;
     if saved <= 0.0 {
         return format!(
-            "skipping saves no GPU time that was measured: {with} ms a frame, {without} without \
-             it{bytes}\n"
+            "skipping saves no GPU time here: {with} ms a frame with it, {without} without{bytes}\n"
         );
     }
+    let times = if s.gpu_ms > 0.0 {
+        format!("{:.1} times less", s.gpu_no_skip_ms / s.gpu_ms)
+    } else {
+        "nothing is left to do".to_owned()
+    };
     format!("skipping saves {} of {without} ms of GPU time a frame ({times}){bytes}\n", ms(saved))
 }
 
@@ -154,30 +153,21 @@ pub fn empty_line(case: &Case) -> Option<String> {
     Some(format!("{text}: nothing moved in them\n"))
 }
 
-/// Returns a line about passes that the loops which skip ran in only some frames, or in none though
-/// the sweep changes what they compute: times of these loops then say little about such a pass.
-pub fn irregular_line(run: &Run) -> Option<String> {
-    const OF_LIGHT: [&str; 6] = ["grid", "facets", "transmit", "first", "second", "contract"];
-    let sweeps_light =
-        run.cases.iter().flat_map(|c| &c.sweep).any(|s| s.key.starts_with("lighting."));
+/// Returns a line with the passes whose work skipping left out of some timed frames, if there are
+/// any. The times of the loops that skip lack this work.
+pub fn skipped_line(run: &Run) -> Option<String> {
+    let loops = run.modes().filter(|(case, mode)| mode.skip && !case.is_still());
     let mut names: Vec<&str> = Vec::new();
-    for case in run.cases.iter().filter(|case| !case.is_still()) {
-        for pass in case.modes.iter().filter(|m| m.skip).flat_map(|m| &m.passes) {
-            let is_swept = sweeps_light && OF_LIGHT.contains(&pass.name.as_str());
-            // A pass that has nothing to do has no time in the loop without skipping either.
-            let is_missed = pass.n_run == 0 && is_swept && pass.saved_ms.is_some_and(|s| s > 0.0);
-            let is_irregular = pass.n_skipped > 0 && (pass.n_run > 0 || is_missed);
-            if is_irregular && !names.contains(&pass.name.as_str()) {
-                names.push(&pass.name);
-            }
+    for pass in loops.flat_map(|(_, mode)| &mode.passes).filter(|pass| pass.lacks_work()) {
+        if !names.contains(&pass.name.as_str()) {
+            names.push(&pass.name);
         }
     }
-    (!names.is_empty()).then(|| {
-        format!(
-            "skipped in some timed frames or in all: {}; their times are those of the loop `no-skip`\n",
-            names.join(", ")
-        )
-    })
+    let names = (!names.is_empty()).then(|| names.join(", "))?;
+    Some(format!(
+        "skipped in some timed frames or in all: {names}; the loop without skipping times them in \
+         every frame\n"
+    ))
 }
 
 /// Returns a line for each kind of figure that a table shows as "-", with the reason.

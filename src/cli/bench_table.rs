@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::bench_remarks::{
-    clocks_line, drawn_line, empty_line, irregular_line, latency_line, missing_lines, ms,
-    overlap_lines, skipping_line, spread_lines, still_line, still_lines,
+    clocks_line, drawn_line, empty_line, latency_line, missing_lines, ms, overlap_lines,
+    skipped_line, skipping_line, spread_lines, still_line, still_lines,
 };
 use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
@@ -52,7 +52,7 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
         );
     }
     if run.cases.len() > 1 {
-        out += &irregular_line(run).unwrap_or_default();
+        out += &skipped_line(run).unwrap_or_default();
     }
     out + &missing_lines(run) + &clocks_line(&run.clocks)
 }

@@ -278,7 +278,7 @@ struct Recorder<'a> {
 impl Recorder<'_> {
     fn on(&mut self, event: Event<'_>) -> Result<()> {
         match event {
-            Event::More(n) => self.bar.expect(n as u64),
+            Event::More(n) => self.bar.add_parts(n as u64),
             Event::Block => self.bar.advance(),
             Event::Picture { i, rgba, results } => {
                 self.bar.advance();

@@ -73,12 +73,13 @@ fn refusal(key: &str) -> Option<&'static str> {
     let last = key.rsplit('.').next().unwrap_or_default().trim();
     match key.split('.').next().unwrap_or_default().trim() {
         _ if key == SIZE_KEY => Some(ONE_SIZE),
-        "draw" if last.starts_with("impostor") => Some(
-            "a frame alone, as it is compared, is drawn without; bench --sweep times them",
-        ),
+        "draw" if last.starts_with("impostor") => {
+            Some("a frame alone, as it is compared, is drawn without; bench --sweep times them")
+        }
         "film" | "lighting" | "draw" => CONTENT.contains(&key).then_some(IS_CONTENT),
         "surface" => (last != "subdivide").then_some(
-            "changes what is asked for, and not how it is computed; a surface's knob is `subdivide`",
+            "changes what is asked for, and not how it is computed; a surface's knob is \
+             `subdivide`",
         ),
         "cloud" => (!["particles", "gust_waves"].contains(&last)).then_some(
             "changes what is asked for, and not how it is computed; a cloud's knobs are \

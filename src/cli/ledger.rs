@@ -143,8 +143,7 @@ fn deliver(args: &LedgerArgs, folder: &SharedFolder, ledger: &Ledger) -> Result<
             output::write_chart(&folder.join(CHART), &charts::ledger::chart(ledger))?;
             json::write(&folder.join(Ledger::FILE), ledger)
         };
-        let written = folder.write_last(!ledger.interrupted, &FILES, write);
-        written?;
+        folder.write_last(!ledger.interrupted, &FILES, write)?;
         output::wrote_folder(folder, !ledger.interrupted, args.options.quiet);
     }
     printed

@@ -155,8 +155,8 @@ pub fn wrote_picture(path: &Path, width: u32, height: u32, quiet: bool) {
     wrote(path, &format!("{width} × {height} pixels"), quiet);
 }
 
-/// Says on stderr where the results of a run are. Those of one that ended early may be kept apart
-/// from earlier ones.
+/// Says on stderr where the results of a run are. A run that ended early may have kept its results
+/// apart from earlier ones.
 pub fn wrote_folder(folder: &ResultFolder, is_finished: bool, quiet: bool) {
     let (n, list) = folder.n_files();
     let files = format!("{n} files, listed in {list}");

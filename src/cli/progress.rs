@@ -21,25 +21,27 @@ const LINE_STEP_S: f64 = 15.0;
 
 /// Where progress is shown.
 #[derive(Clone, Copy)]
-enum Shown {
-    Nowhere,
-    OnTerminal,
-    /// In lines, this time apart.
-    InLines(Duration),
+enum Medium {
+    /// Nowhere.
+    Nothing,
+    /// On a terminal, which shows a line that changes.
+    Terminal,
+    /// In a log, whose lines are this time apart.
+    Log(Duration),
 }
 
-impl Shown {
-    fn new(quiet: bool) -> Shown {
+impl Medium {
+    fn new(quiet: bool) -> Medium {
         if quiet {
-            return Shown::Nowhere;
+            return Medium::Nothing;
         }
         if std::io::stderr().is_terminal() {
-            return Shown::OnTerminal;
+            return Medium::Terminal;
         }
         let asked = std::env::var("NIMBUS_PROGRESS_S").ok().and_then(|text| text.parse().ok());
         match Duration::try_from_secs_f64(asked.unwrap_or(LINE_STEP_S)) {
-            Ok(step) if !step.is_zero() => Shown::InLines(step),
-            _ => Shown::Nowhere,
+            Ok(step) if !step.is_zero() => Medium::Log(step),
+            _ => Medium::Nothing,
         }
     }
 }
@@ -48,7 +50,7 @@ impl Shown {
 /// from the terminal.
 pub struct Progress {
     bar: ProgressBar,
-    shown: Shown,
+    medium: Medium,
     begin: Instant,
     /// The time of the last line.
     last: Mutex<Instant>,
@@ -59,7 +61,7 @@ pub fn progress(n: u64, what: &str, quiet: bool) -> Progress {
     let bar = ProgressBar::with_draw_target(Some(n), ProgressDrawTarget::hidden());
     let bar = styled(bar.with_message(what.to_owned()), "{msg} {wide_bar} {pos}/{len} {eta}");
     let begin = Instant::now();
-    Progress { bar, shown: Shown::new(quiet), begin, last: Mutex::new(begin) }
+    Progress { bar, medium: Medium::new(quiet), begin, last: Mutex::new(begin) }
 }
 
 fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
@@ -73,28 +75,28 @@ impl Progress {
     /// Counts one more part as done.
     pub fn advance(&self) {
         self.bar.inc(1);
-        match self.shown {
-            Shown::OnTerminal if self.bar.is_hidden() && self.begin.elapsed() > DELAY => {
+        match self.medium {
+            Medium::Terminal if self.bar.is_hidden() && self.begin.elapsed() > DELAY => {
                 self.bar.set_draw_target(ProgressDrawTarget::stderr());
             }
-            Shown::InLines(step) => {
+            Medium::Log(step) => {
                 let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
                 if last.elapsed() >= step {
                     *last = Instant::now();
                     say!("{}", self.line());
                 }
             }
-            Shown::OnTerminal | Shown::Nowhere => {}
+            Medium::Terminal | Medium::Nothing => {}
         }
     }
 
     /// Adds parts that were not known before.
-    pub fn expect(&self, n: u64) {
+    pub fn add_parts(&self, n: u64) {
         self.bar.inc_length(n);
     }
 
     /// Names the work that follows.
-    pub fn name(&self, what: &'static str) {
+    pub fn set_name(&self, what: &'static str) {
         self.bar.set_message(what);
     }
 
@@ -133,9 +135,9 @@ pub struct Spinner {
 pub fn spinner(what: &'static str, quiet: bool) -> Spinner {
     let (done, waiting) = mpsc::channel::<()>();
     let is_over = move |time| waiting.recv_timeout(time) != Err(RecvTimeoutError::Timeout);
-    let drawing: Box<dyn FnOnce() + Send> = match Shown::new(quiet) {
-        Shown::Nowhere => return Spinner { drawn: None },
-        Shown::OnTerminal => Box::new(move || {
+    let drawing: Box<dyn FnOnce() + Send> = match Medium::new(quiet) {
+        Medium::Nothing => return Spinner { drawn: None },
+        Medium::Terminal => Box::new(move || {
             if is_over(DELAY) {
                 return;
             }
@@ -147,7 +149,7 @@ pub fn spinner(what: &'static str, quiet: bool) -> Spinner {
             }
             spinner.finish_and_clear();
         }),
-        Shown::InLines(step) => Box::new(move || {
+        Medium::Log(step) => Box::new(move || {
             let begin = Instant::now();
             while !is_over(step) {
                 say!("progress: {what}, for {} now", about(begin.elapsed().as_secs_f64()));

@@ -48,7 +48,7 @@ pub fn run(args: &StressArgs) -> Result<()> {
         if stop.load(Ordering::Relaxed) {
             break;
         }
-        bar.name(case.name);
+        bar.set_name(case.name);
         let outcome = case.run(&mut context);
         lock(&done).push(outcome);
         bar.advance();

@@ -39,8 +39,8 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
     if pixels > MOST_DRAWN_PIXELS {
         return Err(Error::limit(format!(
-            "a picture of {} x {} pixels; expected at most {MOST_DRAWN_PIXELS} pixels in all; reduce \
-             film.width or film.height, or --size",
+            "a picture of {} x {} pixels; expected at most {MOST_DRAWN_PIXELS} pixels in all; \
+             reduce film.width or film.height, or --size",
             scene.film.width, scene.film.height
         )));
     }

@@ -25,8 +25,8 @@ pub(super) fn in_progress() -> MutexGuard<'static, Vec<PathBuf>> {
     IN_PROGRESS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes every temporary, keeps all threads from beginning or finishing another file, and ends
-/// the process without exit handlers: other threads may still use the driver, whose handlers would
+/// Removes every temporary and ends the process. Until then no thread can begin or finish another
+/// file. Exit handlers are not run: other threads may still use the driver, whose handlers would
 /// free what they use.
 pub fn abandon_and_exit(code: u8) -> ! {
     let paths = in_progress();

@@ -80,7 +80,8 @@ impl Claim {
     }
 }
 
-/// Refuses to replace a file or folder unless `force` is set, before it is claimed.
+/// Refuses to replace a file or folder unless `force` is set. For a place that this run has not
+/// claimed yet; [`refuse_any`] is for one that it has.
 ///
 /// # Errors
 /// Fails if `path` exists and `force` is not set: [`Error::Transient`] if another run writes there.

@@ -168,8 +168,8 @@ impl ResultFolder {
         self.put(&at, &[], names, &write)
     }
 
-    /// Writes the last files of a run: as [`ResultFolder::finish`] if its results are finished, else
-    /// as [`ResultFolder::replace`].
+    /// Writes the last files of a run: as [`ResultFolder::finish`] if its results are finished,
+    /// else as [`ResultFolder::replace`].
     ///
     /// # Errors
     /// Fails as these.

@@ -4,11 +4,10 @@
 //! loops (serial or parallel, with or without skipping), in interleaved [`blocks`] of frames. Its
 //! samples become the [`records`] of `run.json` ([`outcome`], [`overlap`]) and the rows of
 //! `frames.csv` ([`frame_rows`]), which [`results`] writes and reads with the files beside them
-//! ([`attachments`]). [`still`] remarks on scenes in which nothing
-//! moves. [`compare`] decides which of two results is faster; [`difference`] lists what
-//! else differs between them. [`parts`] joins a bench that several nodes timed. [`trace`] writes
-//! the frames as a time line. [`machine`], [`names`] and [`json`] serve all of them, and the
-//! studies too.
+//! ([`attachments`]). [`still`] remarks on scenes in which nothing moves. [`compare`] decides which
+//! of two results is faster; [`difference`] lists what else differs between them. [`parts`] joins a
+//! bench that several nodes timed. [`trace`] writes the frames as a time line. [`machine`],
+//! [`names`] and [`json`] serve all of them, and the studies too.
 
 pub mod attachments;
 pub mod blocks;

@@ -247,6 +247,14 @@ pub struct Pass {
     pub saved_ms: Option<f64>,
 }
 
+impl Pass {
+    /// Returns whether skipping left work of this pass out, as far as the loop without skipping
+    /// tells. A pass that the scene does not need has no work.
+    pub fn lacks_work(&self) -> bool {
+        self.n_skipped > 0 && self.saved_ms.is_some_and(|saved| saved > 0.0)
+    }
+}
+
 /// Why a pass was skipped, and in how many frames.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reason {

@@ -9,11 +9,11 @@ use crate::measure::lows::fps;
 pub struct StillRemark {
     /// The cases in which nothing moves, after the words "nothing moves"; empty for a single case.
     pub scope: String,
-    /// What the loops that skip have done, a sentence.
+    /// A sentence on the frames of the loops that skip.
     pub reason: String,
-    /// The loop that has the figure, a sentence.
+    /// A sentence on the loop that has the figure.
     pub figure: String,
-    /// What makes frames differ, a sentence.
+    /// A sentence on the keys that make frames differ.
     pub advice: &'static str,
 }
 

@@ -49,7 +49,7 @@ fn correct_tree_has_no_complaints() {
 }
 
 /// A faulty file each, in a tree without other faults, and a part of the only complaint.
-const BREACHES: [(&str, &str, &str); 22] = [
+const BREACHES: [(&str, &str, &str); 23] = [
     ("src/model/a.rs", "use crate::io;", "a.rs:1: model may not import io"),
     (
         "src/io/a.rs",
@@ -80,7 +80,16 @@ const BREACHES: [(&str, &str, &str); 22] = [
     ("src/model/box_helper.rs", "", "\"helper\" in a name"),
     ("shaders/include/common.glsl", "", "\"common\" in a name"),
     ("src/reference/long.rs", LONG, "lines, more than 400"),
+    ("src/reference/wide.rs", WIDE, "wide.rs:2: more than 100 characters"),
 ];
+
+/// A text with a line of 101 characters, most of them of two bytes, after a line of 100.
+const WIDE: &str = concat!(
+    "//äääääääääääääääääääääääääääääääääääääääääääääääää",
+    "äääääääääääääääääääääääääääääääääääääääääääääääää\n",
+    "//äääääääääääääääääääääääääääääääääääääääääääääääää",
+    "ääääääääääääääääääääääääääääääääääääääääääääääääää\n",
+);
 
 /// A text of 401 lines.
 const LONG: &str = {

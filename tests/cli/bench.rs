@@ -203,3 +203,21 @@ fn an_interrupted_bench_keeps_its_finished_part() {
     assert_eq!(json["interrupted"], true);
     assert!(json["cases"][0]["modes"][0]["frames"].as_u64().is_some_and(|n| n > 0));
 }
+
+/// A sweep names the passes whose work the loops that skip left out, and only these.
+#[test]
+fn a_sweep_names_the_passes_whose_work_was_skipped() {
+    let dir = temp();
+    let scene = path(&dir, "a.toml");
+    std::fs::write(dir.path().join("a.dat"), "40\n1\n40, 2, 1, 1, 0, 0, 0, 0.4\n").expect("a box");
+    let cloud = "[[cloud]]\nfrom = \"boxes\"\nfile = \"a.dat\"\ngust = 0.2\n";
+    std::fs::write(&scene, cloud).expect("a scene");
+    let small = ["--size", "32x24", "--frames", "4", "--repeat", "1", "--threading", "serial"];
+    let args = [&["bench", &scene, "--sweep", "lighting.grid=8,16"], &small[..]].concat();
+    let (code, table, _) = run(&args);
+    let line =
+        table.lines().find_map(|l| l.strip_prefix("skipped in some timed frames or in all: "));
+    let names = line.and_then(|l| l.split_once("; ")).expect(&table).0;
+    // Gusts move the particles, but their boxes are filled once.
+    assert_eq!((code, names), (0, "generate"), "{table}");
+}

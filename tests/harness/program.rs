@@ -9,6 +9,7 @@ use tempfile::TempDir;
 
 pub fn nimbus(args: &[&str]) -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
+    // Lines about progress come after a time, and a busy machine may need it.
     command.env("NIMBUS_PROGRESS_S", "0");
     command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
     command

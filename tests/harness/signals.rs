@@ -11,8 +11,8 @@ use std::time::Duration;
 const TICKS_PER_S: f64 = 100.0;
 /// Threads of the device and of references: a limit of the processor's time holds on every machine.
 const N_THREADS: u32 = 2;
-/// Seconds of the processor, on each thread, that a command may use after the signal. A command gets
-/// 0.4 s to end its present step; writing the finished results takes the rest.
+/// Seconds of the processor, on each thread, that a command may use after the signal. A command
+/// gets 0.4 s to end its present step; writing the finished results takes the rest.
 const MOST_S: f64 = 1.0;
 /// SIGINT in a mask of signals.
 const INTERRUPT: u64 = 1 << 1;
@@ -42,8 +42,8 @@ fn pause() {
 
 /// Starts a command on [`N_THREADS`] threads, and sends it SIGINT once it listens and `is_due`,
 /// which gets the seconds of the processor that the command has used. Returns its output, and
-/// whether it was running when the signal was sent. Fails if the command then uses the processor for
-/// more than [`MOST_S`] on each thread.
+/// whether it was running when the signal was sent. Fails if the command then uses the processor
+/// for more than [`MOST_S`] on each thread.
 pub fn interrupt(command: &mut Command, is_due: impl Fn(f64) -> bool) -> (Output, bool) {
     for variable in ["LP_NUM_THREADS", "RAYON_NUM_THREADS"] {
         command.env(variable, N_THREADS.to_string());

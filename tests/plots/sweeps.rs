@@ -6,6 +6,7 @@ use nimbus::studies::figure::Figure;
 use nimbus::timing::names::Setting;
 use proptest::prelude::*;
 
+use crate::generated;
 use crate::svg::{draw, elements, parse, text};
 
 /// Returns the figure at a point, with an interval.
@@ -26,28 +27,27 @@ fn texts(chart: &SweepChart) -> Vec<String> {
     elements(&parse(&svg), "text").map(text).collect()
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
-
-    /// A user finds the values in the chart that the user typed.
-    #[test]
-    fn ticks_are_the_swept_values_as_typed(
-        // The greatest value is less than eight times the least, so the axis is linear.
-        first in 10u32..30,
-        forms in prop::collection::vec(0usize..5, 2..5),
-        is_size in prop::bool::ANY,
-    ) {
-        let typed: Vec<String> = forms.iter().enumerate().map(|(i, form)| {
-            let v = first + 20 * i as u32;
-            match (is_size, form) {
-                (true, _) => format!("{v}x{v}"),
-                (_, 0) => format!("{v}"),
-                (_, 1) => format!("{v}.0"),
-                (_, 2) => format!("{v}.2500"),
-                (_, 3) => format!("{v}e0"),
-                _ => format!("+{v}"),
-            }
-        }).collect();
+/// A user finds the values in the chart that the user typed.
+#[test]
+fn ticks_are_the_swept_values_as_typed() {
+    // The greatest value is less than eight times the least, so the axis is linear.
+    let values = (10u32..30, prop::collection::vec(0usize..5, 2..5), prop::bool::ANY);
+    generated::check(64, values, |(first, forms, is_size)| {
+        let typed: Vec<String> = forms
+            .iter()
+            .enumerate()
+            .map(|(i, form)| {
+                let v = first + 20 * i as u32;
+                match (is_size, form) {
+                    (true, _) => format!("{v}x{v}"),
+                    (_, 0) => format!("{v}"),
+                    (_, 1) => format!("{v}.0"),
+                    (_, 2) => format!("{v}.2500"),
+                    (_, 3) => format!("{v}e0"),
+                    _ => format!("+{v}"),
+                }
+            })
+            .collect();
         let key = if is_size { "size" } else { "draw.cutoff" };
         let figures: Vec<_> = typed.iter().map(|v| swept(&[(key, v)], 1.0)).collect();
         let all = charts("Time", "ms", &figures);
@@ -59,11 +59,14 @@ proptest! {
         }
         let n = shown.iter().filter(|t| t.contains('x') && typed.contains(*t)).count();
         prop_assert!(!is_size || n == typed.len() || n == 0, "{:?}", shown);
-    }
+        Ok(())
+    });
+}
 
-    /// No chart and no interval is left out without a word.
-    #[test]
-    fn charts_that_are_left_out_are_counted(n_panels in 9usize..30, has_interval in prop::bool::ANY) {
+/// No chart and no interval is left out without a word.
+#[test]
+fn charts_that_are_left_out_are_counted() {
+    generated::check(64, (9usize..30, prop::bool::ANY), |(n_panels, has_interval)| {
         let mut figures = Vec::new();
         for panel in 0..n_panels {
             for (x, line) in [("1", "a"), ("2", "a"), ("1", "b"), ("2", "b"), ("3", "a")] {
@@ -90,7 +93,8 @@ proptest! {
         }
         let n_without = notes.iter().filter(|note| note.contains("confidence interval")).count();
         prop_assert_eq!(n_without, usize::from(!has_interval));
-    }
+        Ok(())
+    });
 }
 
 #[test]

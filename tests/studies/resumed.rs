@@ -85,6 +85,29 @@ fn a_resumed_study_measures_nothing_twice() {
 }
 
 #[test]
+fn a_study_without_a_folder_prints_its_rounds_at_ctrl_c() {
+    let tiny = Tiny::new();
+    // A step takes longer than the time that Ctrl-C leaves it.
+    let long = ["error", "scene.toml", "--against=thin", "--frames=500", "--rounds=1000"];
+    let mut command = tiny.command(&[&long[..], &["--grid", "--knob=draw.cutoff=2"]].concat());
+    let log = fs::File::create(tiny.path("log")).expect("a file");
+    let child = command.env("NIMBUS_PROGRESS_S", "1e-9").stderr(log).spawn().expect("it begins");
+    // Of two configurations: their pictures and two rounds.
+    let is_due = || tiny.text("log").contains("progress: configurations: 6 of ");
+    let begin = Instant::now();
+    while !is_due() {
+        assert!(begin.elapsed() < Duration::from_secs(120), "it never has a round");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(killed.expect("kill").success());
+    let output = child.wait_with_output().expect("it ends");
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(130), "{}", tiny.text("log"));
+    assert!(stdout.contains("INTERRUPTED") && stdout.contains("draw.cutoff=2"), "{stdout}");
+}
+
+#[test]
 fn a_study_ended_by_ctrl_c_can_be_resumed() {
     let tiny = Tiny::new();
     let knob = [

@@ -27,7 +27,8 @@ pub struct PictureTime {
 }
 
 /// Extrapolates the time of [`super::render_model`] with `n_reflections` at `pixels` from some of
-/// its points and pixels, in a few seconds. Points differ, so that the time may be off by a half.
+/// its points and pixels. This takes the picture's set-up and some seconds. Points differ, so that
+/// the time serves to plan a run and not to compare two.
 ///
 /// # Errors
 /// As [`super::render_model`].

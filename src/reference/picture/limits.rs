@@ -11,8 +11,8 @@ const SUM_BYTES: u64 = 56;
 /// Bytes of a particle and its facet, and of its row in a table, as measured.
 const PARTICLE_BYTES: u64 = 320;
 
-/// Checks that a reference at `n_pixels` with `n_samples` each, of a scene of `n_particles`, fits in
-/// memory.
+/// Checks that a reference at `n_pixels` with `n_samples` each, of a scene of `n_particles`, fits
+/// in memory.
 ///
 /// # Errors
 /// Fails if it does not; the error says what it takes and what would fit.

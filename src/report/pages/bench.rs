@@ -212,8 +212,8 @@ fn pass_table(run: &Run) -> Markup {
         ]
     };
     let rows = run.modes().flat_map(|(case, mode)| {
-        let ran = mode.passes.iter().filter(|p| p.n_run > 0);
-        ran.map(move |pass| row(case, mode, pass))
+        let shown = mode.passes.iter().filter(|p| p.n_run > 0 || p.lacks_work());
+        shown.map(move |pass| row(case, mode, pass))
     });
     let header = [
         "pass",
@@ -226,5 +226,5 @@ fn pass_table(run: &Run) -> Markup {
         "saved, ms",
         "why skipped (frames)",
     ];
-    table("Passes that ran", &header, rows)
+    table("Passes that ran, or whose work was skipped", &header, rows)
 }

@@ -207,6 +207,9 @@ impl LedgerStudy<'_> {
     /// # Errors
     /// As [`LedgerStudy::run`].
     pub fn expected_s(&self) -> Result<f64> {
+        /// Most pictures in the light of the device or of its reference: one for each of the links
+        /// "drawing", "thin sprites", "first reflection" and "second reflection".
+        const N_OTHERS: f64 = 4.0;
         let scene = &ReferenceKind::without_approximations(self.scene);
         let (mut sum, mut drawing_s) = (0.0, 0.0);
         for (_, how) in self.models(scene) {
@@ -214,8 +217,7 @@ impl LedgerStudy<'_> {
             sum += time.lighting_s + time.drawing_s;
             drawing_s = time.drawing_s;
         }
-        // The pictures in the light of the device and of its reference.
-        Ok(sum + 4.0 * drawing_s)
+        Ok(sum + N_OTHERS * drawing_s)
     }
 
     /// Times rounds of one block for each configuration, every second round in reverse order.

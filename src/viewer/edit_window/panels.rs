@@ -26,7 +26,7 @@ const STATUS: f32 = 24.0;
 /// Part of the panel's height that a long list of boxes has at least: five boxes in a window of 640
 /// points.
 const LIST_SHARE: f32 = 0.17;
-/// Height of a long list of boxes at least, points: two boxes and a half, which show that it scrolls.
+/// Least height of a long list of boxes, points: two boxes and a half, which show that it scrolls.
 const LEAST_LIST: f32 = 60.0;
 /// Distance of buttons from each other, points.
 const BUTTON_GAP: f32 = 5.0;

@@ -124,12 +124,15 @@ fn highlighted(text: RichText) -> RichText {
     text.color(Color32::WHITE).background_color(ERROR)
 }
 
+const KEEP_B: &str =
+    "keeps the present settings as B, to compare later ones (A) with them, or drops B (m)";
+
 /// Adds the comparison of A with B, and the error of both.
 pub fn compare(ui: &mut Ui, state: &ViewState, status: &ViewStatus, commands: &mut Vec<Command>) {
     let has_b = state.variant.is_some();
     ui.horizontal_wrapped(|ui| {
         let label = ui.selectable_label(has_b, "B");
-        if label.on_hover_text("keeps the present settings as B, to compare later ones (A) with them, or drops B (m)").clicked() {
+        if label.on_hover_text(KEEP_B).clicked() {
             commands.push(Command::ToggleB);
         }
         for (text, comparison) in [

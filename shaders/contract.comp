@@ -32,21 +32,21 @@ layout(push_constant) uniform Push {
 } push;
 READS(0, Facet, facets)
 READS(1, Light, lights)
-layout(binding = 2) uniform usamplerBuffer regions;
+TEXELS(2, regions)
 #include "regions.glsl"
 // RGB coefficients by column.
-layout(binding = 3) uniform usamplerBuffer coefficients;
+TEXELS(3, coefficients)
 // [light][row]
-layout(binding = 4) uniform samplerBuffer t1;
+FLOATS(4, t1)
 // Indexed by second_at() of tensor.glsl.
-layout(binding = 5) uniform samplerBuffer t2;
+FLOATS(5, t2)
 // By region the first span and the number of its spans. Behind them the spans: the first column and
 // the number of columns that the region can receive light from.
 READS(6, uvec2, spans)
 WRITES(7, Lit, lit)
 
 vec3 coefficient_of(uint column) {
-    return uintBitsToFloat(texelFetch(coefficients, int(column)).rgb);
+    return uintBitsToFloat(TEXEL(coefficients, int(column)).rgb);
 }
 
 // The facet as a receiver: coefficient and row of each of its bases.
@@ -65,11 +65,11 @@ struct Sum {
 // bases.
 Sum of_light(uint l, uvec2 own_spans, uint n_shiny) {
     uint at[N_BASES];
-    float direct = texelFetch(t1, int(l * push.n_rows + rows[0])).x;
+    float direct = FLOAT(t1, int(l * push.n_rows + rows[0]));
     Sum sum = Sum(vec3(direct), vec3(0.0), own[0] * direct, vec3(0.0));
     for (uint k = 0u; k < n_shiny; ++k) {
         [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
-            sum.first += own[b] * texelFetch(t1, int(l * push.n_rows + rows[b])).x;
+            sum.first += own[b] * FLOAT(t1, int(l * push.n_rows + rows[b]));
         }
     }
     [[unroll]] for (uint b = 0u; b < N_BASES; ++b) {
@@ -79,11 +79,11 @@ Sum of_light(uint l, uvec2 own_spans, uint n_shiny) {
         uvec2 span = spans[own_spans.x + i];
         for (uint c = span.x; c < span.x + span.y; ++c) {
             vec3 column = coefficient_of(c);
-            float indirect = texelFetch(t2, int(at[0] + c * TILE)).x;
+            float indirect = FLOAT(t2, int(at[0] + c * TILE));
             vec3 second = own[0] * indirect;
             for (uint k = 0u; k < n_shiny; ++k) {
                 [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
-                    second += own[b] * texelFetch(t2, int(at[b] + c * TILE)).x;
+                    second += own[b] * FLOAT(t2, int(at[b] + c * TILE));
                 }
             }
             sum.indirect += column * indirect;
@@ -104,12 +104,12 @@ struct Sum {
 
 void add_light(inout Sum sum, REAL3 energy, uint l, uvec2 own_spans, uint n_shiny) {
     uint at[N_BASES];
-    REAL3 direct = energy * texelFetch(t1, int(l * push.n_rows + rows[0])).x;
+    REAL3 direct = energy * FLOAT(t1, int(l * push.n_rows + rows[0]));
     ADD(sum.direct, direct);
     ADD(sum.first, direct * own[0]);
     for (uint k = 0u; k < n_shiny; ++k) {
         UNROLL for (uint b = 1u; b < N_BASES; ++b) {
-            ADD(sum.first, energy * own[b] * texelFetch(t1, int(l * push.n_rows + rows[b])).x);
+            ADD(sum.first, energy * own[b] * FLOAT(t1, int(l * push.n_rows + rows[b])));
         }
     }
     [[unroll]] for (uint b = 0u; b < N_BASES; ++b) {
@@ -119,12 +119,12 @@ void add_light(inout Sum sum, REAL3 energy, uint l, uvec2 own_spans, uint n_shin
         uvec2 span = spans[own_spans.x + i];
         for (uint c = span.x; c < span.x + span.y; ++c) {
             REAL3 column = energy * coefficient_of(c);
-            REAL3 indirect = column * texelFetch(t2, int(at[0] + c * TILE)).x;
+            REAL3 indirect = column * FLOAT(t2, int(at[0] + c * TILE));
             ADD(sum.indirect, indirect);
             ADD(sum.second, indirect * own[0]);
             for (uint k = 0u; k < n_shiny; ++k) {
                 UNROLL for (uint b = 1u; b < N_BASES; ++b) {
-                    ADD(sum.second, column * own[b] * texelFetch(t2, int(at[b] + c * TILE)).x);
+                    ADD(sum.second, column * own[b] * FLOAT(t2, int(at[b] + c * TILE)));
                 }
             }
         }

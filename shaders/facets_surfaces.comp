@@ -9,7 +9,7 @@
 // roundings of f32.
 
 layout(push_constant) uniform Push { uint n_facets; } push;
-layout(binding = 0) uniform usamplerBuffer regions;
+TEXELS(0, regions)
 #include "regions.glsl"
 // Region of each facet.
 READS(1, uint, i_region)

@@ -11,7 +11,7 @@ layout(push_constant) uniform Push {
     uint n_facets;
     uint i_first_facet;
 } push;
-layout(binding = 0) uniform usamplerBuffer regions;
+TEXELS(0, regions)
 #include "regions.glsl"
 // Facets relative to their ground's origin.
 READS(1, Facet, ground)

@@ -7,9 +7,11 @@
 // Law: a homography gives the pixel's place in the shell's picture; Catmull-Rom cubics interpolate
 // between its texels.
 
+#include "buffers.glsl"
+#include "half.glsl"
 #include "impostors.glsl"
 // Four floats a texel, rows from the top.
-layout(binding = 0) uniform usamplerBuffer shell;
+TEXELS(0, shell)
 
 layout(location = 0) out vec4 out_color;
 
@@ -19,7 +21,7 @@ vec4 weights(float t) {
            * vec4(2.0 * t2 - t - t3, 2.0 - 5.0 * t2 + 3.0 * t3, t + 4.0 * t2 - 3.0 * t3, t3 - t2);
 }
 
-vec4 texel(int i, int j) { return uintBitsToFloat(texelFetch(shell, j * int(push.width) + i)); }
+vec4 texel(int i, int j) { return uintBitsToFloat(TEXEL(shell, j * int(push.width) + i)); }
 
 void main() {
     vec3 pixel = vec3(gl_FragCoord.xy - push.middle, 1.0);
@@ -39,5 +41,5 @@ void main() {
                     + across.z * texel(i.z, j[k]) + across.w * texel(i.w, j[k]);
         sum += down[k] * line;
     }
-    out_color = vec4(max(sum.xyz, 0.0), clamp(sum.w, 0.0, 1.0));
+    out_color = vec4(in_target(max(sum.xyz, 0.0)), clamp(sum.w, 0.0, 1.0));
 }

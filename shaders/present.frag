@@ -1,9 +1,12 @@
 #version 460
+#extension GL_GOOGLE_include_directive : require
 
 // Shows a picture on a display: over the background, tone-mapped, in sRGB, dithered; or two
 // pictures compared (passes.md "present").
 // In: one or two pictures, premultiplied linear RGBA. Out: code values of 8 bits. Error: half a
 // code value, by dithering.
+
+#include "buffers.glsl"
 
 // 0: bytes, 1: half floats, 2: floats.
 layout(constant_id = 0) const uint FORMAT = 1;
@@ -19,8 +22,8 @@ layout(push_constant) uniform Push {
     float gain;
 } push;
 // Four words a texel, which devices read best.
-layout(binding = 0) uniform usamplerBuffer picture_a;
-layout(binding = 1) uniform usamplerBuffer picture_b;
+TEXELS(0, picture_a)
+TEXELS(1, picture_b)
 
 layout(location = 0) out vec4 out_color;
 
@@ -39,7 +42,7 @@ const float DESATURATION = 0.15;
 vec4 pixel_at(bool is_b, uvec2 p) {
     uint i = p.y * push.size.x + p.x;
     int at = int(FORMAT == 0 ? i >> 2 : FORMAT == 1 ? i >> 1 : i);
-    uvec4 words = is_b ? texelFetch(picture_b, at) : texelFetch(picture_a, at);
+    uvec4 words = is_b ? TEXEL(picture_b, at) : TEXEL(picture_a, at);
     if (FORMAT == 0) {
         return unpackUnorm4x8(words[i & 3u]);
     }
@@ -52,7 +55,9 @@ vec4 pixel_at(bool is_b, uvec2 p) {
 
 // Khronos PBR Neutral.
 vec3 neutral(vec3 color) {
-    float peak = max(max(color.r, color.g), color.b);
+    // NaN counts as 0: the maximum of NaN and a number may be either (GLSL.std.450, FMax).
+    vec3 known = mix(vec3(0.0), color, greaterThan(color, vec3(0.0)));
+    float peak = max(max(known.r, known.g), known.b);
     if (!(peak >= START_COMPRESSION)) {
         return color;
     }

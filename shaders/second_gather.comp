@@ -92,11 +92,15 @@ void add_cell(
     uint i, LoadedSource source, SourceView view, Region emitter, Receiver receiver,
     CellSamples seen, Walk walk, Cell cell, float part, uint i_own, const bool own
 ) {
-#if GLOSSY
+#if GLOSSY && !WIDE
     vec4 taken = taken_from(cell, receiver);
 #endif
     UNROLL for (uint l = 0u; l < N_LIGHTS; ++l) {
         vec4 g = part * arriving_by(i, source, walk, cell, seen, i_own, own, l);
+#if GLOSSY && WIDE
+        // Again for each light: before the light, it would take registers beside the light's.
+        vec4 taken = taken_from(cell, receiver);
+#endif
         vec3 diffuse = LIGHT(l).energy * emitter.kd * PI_INVERSE;
         ADD(indirect, diffuse * dot(g, vec4(1.0)));
 #if GLOSSY

@@ -25,7 +25,7 @@ READS(1, Light, lights)
 // [facet][light], and the clouds' share of it.
 READS(2, float, transmittance)
 READS(3, float, through)
-layout(binding = 4) uniform usamplerBuffer regions;
+TEXELS(4, regions)
 #include "regions.glsl"
 // Facet of each place in the order of facets.
 READS(5, uint, order)

@@ -6,7 +6,7 @@
 #include "philox.glsl"
 #include "functions.glsl"
 
-layout(binding = 8) uniform usamplerBuffer pool;
+TEXELS(8, pool)
 #define SAMPLES_TEXTURE
 #include "texture.glsl"
 

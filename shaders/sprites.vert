@@ -3,6 +3,7 @@
 #include "records.glsl"
 #include "blob.glsl"
 #include "strip.glsl"
+#include "half.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
 #include "texture.glsl"
@@ -62,7 +63,7 @@ void main() {
     out_place = texture_sample.place;
     out_gain = texture_sample.gain;
     uint facet = GROUPED != 0 ? i_facet[i] : push.i_first_facet + i;
-    out_radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color;
+    out_radiance = in_target(LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color);
     float reach = push.cutoff;
     bool empty = !(tau > 0.0);
     if (THRESHOLD != 0) {

@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "half.glsl"
 #include "camera.glsl"
 
 // 1: surfaces hide blobs and are not seen.
@@ -63,5 +64,5 @@ void main() {
     if (in_plane.w > 0.0) {
         radiance = interpolated(regions[in_i], vec2(s, t) / (vec2(in_s.w, in_t.w) * d));
     }
-    out_color = vec4(radiance, 1.0);
+    out_color = vec4(in_target(radiance), 1.0);
 }

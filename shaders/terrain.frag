@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "half.glsl"
 #include "camera.glsl"
 
 // 1: ground hides blobs and is not seen.
@@ -50,5 +51,5 @@ void main() {
         float t = clamp(dot(ray, in_t.xyz) * inverse / in_t.w, 0.0, 1.0 - s);
         radiance = in_corner * (1.0 - s - t) + in_along * s + in_across * t;
     }
-    out_color = vec4(radiance, 1.0);
+    out_color = vec4(in_target(radiance), 1.0);
 }

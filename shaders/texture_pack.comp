@@ -13,16 +13,14 @@
 
 layout(push_constant) uniform Push { uint n_texels; } push;
 // Real and imaginary parts.
-layout(binding = 0) uniform samplerBuffer work;
+FLOATS(0, work)
 WRITES(1, uvec4, pool)
 
 float field_at(uint part, uint level, uvec2 at) {
     uint log_side = 8u - level;
     uvec2 within = at & ((1u << log_side) - 1u);
-    return texelFetch(
-               work, int(part + 2u * (level_offset(level) + (within.y << log_side) + within.x))
-    )
-        .r;
+    uint i = part + 2u * (level_offset(level) + (within.y << log_side) + within.x);
+    return FLOAT(work, int(i));
 }
 
 // Returns the field at the texel's four corners.

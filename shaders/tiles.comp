@@ -39,7 +39,7 @@
 #define TEXTURED 0
 #endif
 #if TEXTURED
-layout(binding = 9) uniform usamplerBuffer pool;
+TEXELS(9, pool)
 #define SAMPLES_TEXTURE
 #include "texture.glsl"
 #endif
@@ -49,7 +49,7 @@ layout(binding = 9) uniform usamplerBuffer pool;
 #define ELLIPSOIDS 0
 #endif
 #if ELLIPSOIDS
-layout(binding = 10) uniform usamplerBuffer conics;
+TEXELS(10, conics)
 #endif
 
 // 0: there is one round, and no state is kept.
@@ -76,7 +76,7 @@ layout(push_constant) uniform Push {
     float y_up;
     float y_forward;
 } push;
-layout(binding = 0) uniform usamplerBuffer splats;
+TEXELS(0, splats)
 READS(1, uvec2, pairs)
 READS(2, Round, rounds)
 READS(3, uvec4, ranges)
@@ -91,7 +91,7 @@ READS(7, uint, depths)
 #endif
 
 #if TEXTURED
-layout(binding = 8) uniform usamplerBuffer splat_textures;
+TEXELS(8, splat_textures)
 #endif
 
 #include "tile_splats.glsl"
@@ -199,7 +199,7 @@ void compose(Loaded splat, float y) {
 // Composes the found splats from k on, one loaded by each invocation. Invocations without one load
 // `spare`, any splat, without depth and light.
 void compose_some(uint k, uint n, uint spare, float y) {
-    uint t = gl_LocalInvocationID.x;
+    uint t = lane();
     Loaded splat = load_splat(int(k + t < n ? found[k + t] : spare));
     splat.fours[0].w = k + t < n ? splat.fours[0].w : 0u;
     splat.fours[1].xyz = k + t < n ? splat.fours[1].xyz : uvec3(0);
@@ -215,9 +215,11 @@ void compose_some(uint k, uint n, uint spare, float y) {
 #else
     share_splat(splat, t);
     uint m = 0;
+    // By twos, too: the number of iterations bounds the splats of a round (passes.md "tiles").
     do {
         compose(of_invocation(m), y);
-        ++m;
+        compose(of_invocation(m + 1), y);
+        m += 2;
     } while (m < end);
     barrier();
 #endif
@@ -238,7 +240,7 @@ vec4 seen(uint j, uint p) { return vec4(color[j], alpha[j]) + (1.0 - alpha[j]) *
 
 // Draws tile i_tile of the bin that the range belongs to.
 void draw_tile(uvec4 range, uint i_tile) {
-    uint t = gl_LocalInvocationID.x;
+    uint t = lane();
     uvec2 tile = TILES_ACROSS * uvec2(range.z % push.n_bins_x, range.z / push.n_bins_x)
                  + uvec2(i_tile % TILES_ACROSS, i_tile / TILES_ACROSS);
     uvec2 at = tile * uvec2(TILE_WIDTH, ROWS) + uvec2(RUN * (t / ROWS), t % ROWS);

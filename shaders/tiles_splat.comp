@@ -37,9 +37,9 @@ layout(push_constant) uniform Push {
 READS(0, uvec2, entries)
 // Texels, which llvmpipe fetches for all invocations at once: a Placed is one texel, a Particle
 // three, a Lit four.
-layout(binding = 1) uniform usamplerBuffer placed;
-layout(binding = 2) uniform usamplerBuffer particles;
-layout(binding = 3) uniform usamplerBuffer lit;
+TEXELS(1, placed)
+TEXELS(2, particles)
+TEXELS(3, lit)
 READS(4, uint, i_facet)
 READS(5, uint, i_group)
 READS(6, Drawn, drawn)
@@ -70,8 +70,8 @@ uint project(uint i, uint r) {
     if (i == NO_PARTICLE) {
         return 0u;
     }
-    vec4 place = uintBitsToFloat(texelFetch(placed, int(i))),
-         shade = uintBitsToFloat(texelFetch(particles, int(3 * i + 1)));
+    vec4 place = uintBitsToFloat(TEXEL(placed, int(i))),
+         shade = uintBitsToFloat(TEXEL(particles, int(3 * i + 1)));
     vec3 v = along_camera(push.camera, place.xyz - push.camera.eye);
     float sigma = place.w;
     float tau = SQRT_TAU * shade.w * sigma;
@@ -84,7 +84,7 @@ uint project(uint i, uint r) {
     float deepest = tau;
     Shape shape;
     if (ELLIPSOIDS != 0) {
-        shape = shape_of(push.camera, uintBitsToFloat(texelFetch(particles, int(3 * i + 2)).x));
+        shape = shape_of(push.camera, uintBitsToFloat(TEXEL(particles, int(3 * i + 2)).x));
         deepest *= shape.wider;
     }
     float reach_in_sigma = push.cutoff;
@@ -109,8 +109,8 @@ uint project(uint i, uint r) {
     vec3 radiance = shade.xyz;
     if (LIT != 0) {
         int facet = int(GROUPED != 0 ? i_facet[i] : push.i_first_facet + i);
-        radiance = uintBitsToFloat(texelFetch(lit, 4 * facet + 2).xyz)
-                   + uintBitsToFloat(texelFetch(lit, 4 * facet + 3).xyz);
+        radiance = uintBitsToFloat(TEXEL(lit, 4 * facet + 2).xyz)
+                   + uintBitsToFloat(TEXEL(lit, 4 * facet + 3).xyz);
     }
     // A Splat, by fours.
     splats[2 * r] = floatBitsToUint(vec4(s, scale, tau));
@@ -138,7 +138,7 @@ uint project(uint i, uint r) {
 
 // Returns (sum of n over the invocations up to this one, sum over all).
 uvec2 sums_of(uint n) {
-    uint t = gl_LocalInvocationID.x;
+    uint t = lane();
 #if ONE_SUBGROUP
     uint sum = n;
     [[unroll]] for (uint apart = 1; apart < INVOCATIONS; apart *= 2) {
@@ -159,7 +159,7 @@ uvec2 sums_of(uint n) {
 }
 
 void main() {
-    uint t = gl_LocalInvocationID.x;
+    uint t = lane();
     uint n_splats = kept[0].sort.w;
     uint before = 0;
     for (uint k = 0; k < BLOCK; k += INVOCATIONS) {

@@ -27,9 +27,9 @@ layout(push_constant) uniform Push {
 } push;
 READS(0, Facet, facets)
 READS(1, Light, lights)
-layout(binding = 2) uniform usamplerBuffer regions;
+TEXELS(2, regions)
 #include "regions.glsl"
-layout(binding = 3) uniform samplerBuffer density;
+FLOATS(3, density)
 // [facet][light]
 WRITES(4, float, transmittance)
 WRITES(5, float, through)

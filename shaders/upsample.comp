@@ -36,7 +36,7 @@ bool is_plain(uvec2 first, uvec2 at) {
     uint p = at.y * push.width + at.x, last = push.width * push.height - 1u;
     // Pixels beside the run may share its texels.
     [[unroll]] for (uint k = 0; k <= ACROSS; k += 4) {
-        vec4 d = depths_of(texelFetch(depths, int(min(p + k, last) / 4)));
+        vec4 d = depths_of(TEXEL(depths, int(min(p + k, last) / 4)));
         low = min(low, d);
         high = max(high, d);
     }
@@ -93,7 +93,7 @@ void draw_pair(uint x, uint i) {
         [[unroll]] for (uint j = 0; j < ROWS; ++j) { w[j] = weight(r, t[j]); }
         uint texel = ((first.y + r) * push.small_width + first.x) / TEXEL_PIXELS;
         [[unroll]] for (uint k = 0; k < AHEAD + COLUMNS; k += TEXEL_PIXELS) {
-            uvec4 words = texelFetch(small, int(min(texel + k / TEXEL_PIXELS, push.last_texel)));
+            uvec4 words = TEXEL(small, int(min(texel + k / TEXEL_PIXELS, push.last_texel)));
             [[unroll]] for (uint m = 0; m < TEXEL_PIXELS; ++m) {
                 if (k + m >= AHEAD && k + m < AHEAD + COLUMNS) {
                     vec4 value = pixel_of(words, m);

@@ -118,11 +118,11 @@ impl Error {
     }
 
     /// Returns [`Error::Transient`] for a failure that may pass later or on another node (a full
-    /// disk, a file server that is away), and [`Error::Io`] for any other.
+    /// disk, a file server that is away, too many processes), and [`Error::Io`] for any other.
     pub fn of_io(path: &Path, cause: &io::Error) -> Self {
         use io::ErrorKind::{
-            HostUnreachable, Interrupted, NetworkDown, NetworkUnreachable, QuotaExceeded,
-            ResourceBusy, StaleNetworkFileHandle, StorageFull, TimedOut,
+            HostUnreachable, Interrupted, NetworkDown, NetworkUnreachable, OutOfMemory,
+            QuotaExceeded, ResourceBusy, StaleNetworkFileHandle, StorageFull, TimedOut, WouldBlock,
         };
         match cause.kind() {
             StorageFull
@@ -133,7 +133,10 @@ impl Error {
             | ResourceBusy
             | HostUnreachable
             | NetworkDown
-            | NetworkUnreachable => Error::transient(path, cause),
+            | NetworkUnreachable
+            // The system has no room for another thread or process.
+            | OutOfMemory
+            | WouldBlock => Error::transient(path, cause),
             // A disk or a server that answers with an error: Rust has no kind for it.
             _ if cause.raw_os_error() == Some(EIO) => Error::transient(path, cause),
             _ => Error::io(path, cause),

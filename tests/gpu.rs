@@ -50,7 +50,7 @@ fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
 #[test]
 fn a_missing_barrier_between_dispatches_is_reported() {
     let mut gpu = Gpu::new();
-    let without = hazards_of_two_dispatches(&mut gpu, Barriers::Omitted);
+    let without = hazards_of_two_dispatches(&mut gpu, Barriers::OmittedIn(""));
     assert!(without.iter().any(|m| m.contains("SYNC-HAZARD-READ-AFTER-WRITE")), "{without:?}");
     assert_eq!(hazards_of_two_dispatches(&mut gpu, Barriers::Placed), [""; 0]);
 }
@@ -66,7 +66,7 @@ fn a_missing_barrier_between_copies_is_reported() {
         ("SYNC-HAZARD-WRITE-AFTER-WRITE", [&a, &b, &c, &b]),
     ];
     for (hazard, [from, to, then_from, then_to]) in cases {
-        for barriers in [Barriers::Omitted, Barriers::Placed] {
+        for barriers in [Barriers::OmittedIn(""), Barriers::Placed] {
             let recorded = gpu.commands.record(barriers, |rec| {
                 rec.copy(from, to);
                 rec.copy(then_from, then_to);
@@ -75,7 +75,7 @@ fn a_missing_barrier_between_copies_is_reported() {
             recorded.unwrap();
             let messages = gpu.instance.messages().take();
             match barriers {
-                Barriers::Omitted => {
+                Barriers::OmittedIn(_) => {
                     assert!(messages.iter().any(|m| m.contains(hazard)), "{hazard}: {messages:?}")
                 }
                 Barriers::Placed => assert!(messages.is_empty(), "{messages:?}"),
@@ -145,6 +145,10 @@ fn sizes_beyond_the_device_are_refused_before_anything_is_allocated() {
     assert_eq!(nimbus::gpu::storage_bytes(limits, "test", most, 32), Ok(32 * most));
     assert!(nimbus::gpu::storage_bytes(limits, "test", most + 1, 32).is_err());
     assert_eq!(nimbus::gpu::storage_bytes(limits, "test", 0, 32), Ok(32));
+    // A buffer is bound by whole texels of 16 bytes, which an odd limit must hold.
+    let odd = nimbus::gpu::Limits { max_storage_buffer_bytes: 111, ..*limits };
+    assert_eq!(nimbus::gpu::storage_bytes(&odd, "test", 96, 1), Ok(96));
+    assert!(nimbus::gpu::storage_bytes(&odd, "test", 97, 1).is_err());
 }
 
 #[test]
@@ -248,6 +252,37 @@ fn a_dispatch_of_several_rows_of_workgroups_processes_every_record() {
         rec.dispatch(&kernel, &[&sums, &density], &push, n)
     });
     assert!(gpu.download::<f32>(&density, n as usize).iter().all(|d| *d == 0.0));
+}
+
+/// Every workgroup, or row of workgroups, is a part if nothing is within the limit.
+#[test]
+fn work_beyond_the_limit_of_a_submission_is_submitted_in_parts() {
+    for (max_submit_ms, is_parted) in [(None, false), (Some(1e6), false), (Some(1e-6), true)] {
+        let mut gpu = Gpu::with_options(|options| options.max_submit_ms = max_submit_ms);
+        let fields = grid::ResolvePush::FIELDS;
+        let kernel = Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", fields).unwrap();
+        let n = 100 * kernel.local_size_x() - 7;
+        let words: Vec<[u32; 2]> = (0..n).map(|i| [i, 0]).collect();
+        let sums = gpu.upload(&words);
+        let density = gpu.buffer::<f32>(n as usize);
+        let push = grid::ResolvePush { n_cells: n, density_per_quantum: 1.0 };
+        // The second time the rate is known.
+        for is_known in [false, true] {
+            gpu.run(|rec| {
+                rec.fill(&density, 0xffff_ffff);
+                rec.dispatch(&kernel, &[&sums, &density], &push, n)
+            });
+            let n_parts = gpu.commands.n_parts();
+            match (is_parted, is_known) {
+                (true, _) => assert!(n_parts >= 100, "{n_parts} parts"),
+                (false, true) => assert_eq!(n_parts, 1),
+                // Ten parts at most are timed, and two are around each.
+                (false, false) => assert!(n_parts <= 21, "{n_parts} parts"),
+            }
+            let found = gpu.download::<f32>(&density, n as usize);
+            assert!((0..n).zip(&found).all(|(i, d)| *d == i as f32));
+        }
+    }
 }
 
 #[test]

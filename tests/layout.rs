@@ -160,7 +160,7 @@ fn a_region_read_by_texels_equals_its_record() {
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 layout(local_size_x = 1) in;
-layout(binding = 0) uniform usamplerBuffer regions;
+TEXELS(0, regions)
 layout(std430, binding = 1) writeonly buffer Copies { Region copies[]; };
 #include "regions.glsl"
 void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
@@ -186,14 +186,14 @@ void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
         size_of::<SplatRecord>(),
     ];
     assert_eq!(texels, [16, 48, 64, 32]);
-    assert!(text_of("tiles_splat.comp").contains("texelFetch(particles, int(3 * i + 1))"));
-    assert!(text_of("tiles_splat.comp").contains("texelFetch(lit, 4 * facet + 2)"));
+    assert!(text_of("tiles_splat.comp").contains("TEXEL(particles, int(3 * i + 1))"));
+    assert!(text_of("tiles_splat.comp").contains("TEXEL(lit, 4 * facet + 2)"));
     let gather = text_of("include/gather.glsl");
     for (record, n_texels) in [
         ("sources", size_of::<SourceRecord>() / 16),
         ("cell_samples", size_of::<PackedRecord>() / 16),
     ] {
-        let first = gather.split(&format!("texelFetch({record}, k)")).next().unwrap();
+        let first = gather.split(&format!("TEXEL({record}, k)")).next().unwrap();
         assert!(first.ends_with("Float(") || first.ends_with("Packed("), "{record}");
         let stride = first.rsplit_once("* ").unwrap().1.split(';').next().unwrap();
         assert_eq!(stride.parse(), Ok(n_texels), "{record}");

@@ -177,7 +177,7 @@ const FAULTS: &[Fault] = &[
         "place.comp",
         "FOR_EACH(i, push.n_particles) {",
         "FOR_EACH(i, push.n_particles - 1u) {",
-        "determinism/poison",
+        "determinism/guard",
     ),
     (
         "an epsilon added to an optical depth",

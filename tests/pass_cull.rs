@@ -131,7 +131,8 @@ impl Scene {
         let entries = gpu.upload(&vec![UNTOUCHED; self.placed.len()]);
         let kept = gpu.upload(&[KeptRecord { sort: [9; 4], draw: [9; 4], splat: [9; 4] }]);
         let View { width, height, cutoff, threshold, smallest, .. } = self.view;
-        let blobs = BlobView { camera: &self.camera, cutoff, threshold, saturated: 0.0 };
+        let blobs =
+            BlobView { camera: &self.camera, cutoff, threshold, saturated: 0.0, extents: None };
         let view = CullView { blobs, size: [width, height], smallest };
         let order = Order { depths: self.depths(), sort_tile: TILE, splat_block: 256 };
         let buffers = CullBuffers {

@@ -11,7 +11,7 @@ use nimbus::gpu::{Compiler, DeviceCount};
 use nimbus::layout::particle::{DrawnRecord, PlacedRecord};
 use nimbus::passes;
 use nimbus::passes::blobs::Depths;
-use nimbus::passes::sort::{Count, Sort, TILE};
+use nimbus::passes::sort::{Count, Form, Sort, TILE};
 use nimbus::reference::sort::{depths, key32, order};
 
 type Entry = [u32; 2];
@@ -33,6 +33,14 @@ fn misplaced(found: &[Entry], keys: &[u32], n_bits: u32) -> Option<usize> {
     (0..found.len()).find(|&k| found[k] != [keys[expected[k] as usize], expected[k]])
 }
 
+/// The forms of a sort: as a CPU sorts, and as GPUs do.
+fn forms(gpu: &Gpu) -> [Form; 2] {
+    // A device without subgroup operations can scan by blocks, too.
+    let limits = gpu.device.limits();
+    let ballots = limits.is_one_subgroup(limits.subgroup_size.clamp(8, 64));
+    [Form { ballots: false, blocks: false }, Form { ballots, blocks: true }]
+}
+
 /// Keys of many kinds: random; equal; sorted; reversed; of few digits; the greatest ones.
 fn kinds(n: u32) -> Vec<(&'static str, Vec<u32>)> {
     let mut random = Random(u64::from(n) + 1);
@@ -50,15 +58,17 @@ fn kinds(n: u32) -> Vec<(&'static str, Vec<u32>)> {
 fn entries_come_out_in_the_stable_order_of_their_keys() {
     let mut gpu = Gpu::new();
     for n in [0, 1, 2, 31, 32, 33, 1023, 1024, 1025, 5000, 100_000] {
-        let sort = Sort::new(&gpu.device, &gpu.compiler, n).expect("sort");
-        for (kind, keys) in kinds(n) {
-            for n_bits in [16, 32] {
-                let found = sorted(&mut gpu, &sort, &keys, n_bits);
-                assert_eq!(
-                    misplaced(&found, &keys, n_bits),
-                    None,
-                    "{n} {kind} keys of {n_bits} bits"
-                );
+        for form in forms(&gpu) {
+            let sort = Sort::with_form(&gpu.device, &gpu.compiler, n, 8, form).expect("sort");
+            for (kind, keys) in kinds(n) {
+                for n_bits in [16, 32] {
+                    let found = sorted(&mut gpu, &sort, &keys, n_bits);
+                    assert_eq!(
+                        misplaced(&found, &keys, n_bits),
+                        None,
+                        "{n} {kind} keys of {n_bits} bits by {form:?}"
+                    );
+                }
             }
         }
     }
@@ -69,8 +79,13 @@ fn keys_of_any_width_come_out_in_order_counted_by_the_device() {
     let mut gpu = Gpu::new();
     let n = 5000u32;
     let mut random = Random(4);
-    for n_bits in [1, 5, 8, 9, 10, 15, 18, 27] {
-        let sort = Sort::for_bits(&gpu.device, &gpu.compiler, n, n_bits).expect("sort");
+    let (widths, forms) = ([1u32, 5, 8, 9, 10, 15, 18, 27], forms(&gpu));
+    for (n_bits, form) in widths.into_iter().flat_map(|n| forms.map(|form| (n, form))) {
+        // A scan has an invocation a digit.
+        let most: u32 = if gpu.device.limits().max_workgroup_invocations < 512 { 8 } else { 9 };
+        let n_passes = n_bits.div_ceil(most);
+        let digit_bits = n_bits.div_ceil(n_passes);
+        let sort = Sort::with_form(&gpu.device, &gpu.compiler, n, digit_bits, form).expect("sort");
         // Above the key nothing, as above the number of a bin there is nothing up to the next
         // multiple of any digits.
         let entries: Vec<Entry> =
@@ -86,7 +101,8 @@ fn keys_of_any_width_come_out_in_order_counted_by_the_device() {
             });
             let found: Vec<Entry> = gpu.download(&out, n_counted as usize);
             let keys: Vec<u32> = entries[..n_counted as usize].iter().map(|e| e[0]).collect();
-            assert_eq!(misplaced(&found, &keys, n_bits), None, "{n_counted} keys of {n_bits} bits");
+            let what = format!("{n_counted} keys of {n_bits} bits by {form:?}");
+            assert_eq!(misplaced(&found, &keys, n_bits), None, "{what}");
         }
     }
 }

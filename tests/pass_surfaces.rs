@@ -355,8 +355,13 @@ fn a_target_that_does_not_fit_is_refused() {
                     textured: &buffer,
                     pool: &buffer,
                 };
-                let view =
-                    BlobView { camera: &camera, cutoff: 3.0, threshold: 0.0, saturated: 0.0 };
+                let view = BlobView {
+                    camera: &camera,
+                    cutoff: 3.0,
+                    threshold: 0.0,
+                    saturated: 0.0,
+                    extents: None,
+                };
                 let count = BlobCount { n: RecordCount::Known(0), i_first_facet: 0 };
                 pass.record(rec, &buffers, (target, start), &view, count)
             }

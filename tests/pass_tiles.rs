@@ -1,5 +1,6 @@
 //! tiles: whole pictures against the f64 reference within a bound that follows the composition near
-//! to far, in both formats, with what subgroups can do and without, in one round and in many.
+//! to far, in both formats, with what subgroups can do and without, in one round and in many. The
+//! rounds alone against a serial reference.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -8,6 +9,8 @@ mod harness;
 mod mixed;
 #[path = "harness/picture.rs"]
 mod picture;
+#[path = "pass_tiles/rounds.rs"]
+mod rounds;
 #[path = "harness/scenery.rs"]
 mod scenery;
 #[path = "harness/sheets.rs"]
@@ -188,6 +191,12 @@ fn wrong_pictures_are_noticed() {
         ("tiles_ranges.comp", "lower_bound(n, bin + 1u)", "lower_bound(n, bin + 1u) - 1u"),
         ("include/blob.glsl", "min(low, high) > 0.0", "true"),
     ] {
+        let limits = gpu.device.limits();
+        // Where a workgroup is no subgroup, no operation of subgroups is compiled.
+        if from.contains("subgroup") && !limits.is_one_subgroup(passes::tiles::invocations(limits))
+        {
+            continue;
+        }
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{from}");
         let compiler = Compiler::new(sources, None).expect("shaderc");

@@ -22,7 +22,7 @@ use nimbus::gpu::Compiler;
 use nimbus::model::grid::GridSpec;
 use nimbus::model::light::Light;
 use nimbus::model::sums::{Precision, Sums};
-use sums::{KAHAN, PAIRWISE, PLAIN, every_way};
+use sums::{KAHAN, PAIRWISE, PLAIN, every_way, has_doubles, ways_of};
 use ways::{Case, case, in_cloud, room, sun};
 
 /// A block of one density: nothing but the sum is rounded much. Ways along it and to a lamp, of
@@ -58,7 +58,7 @@ fn every_way_to_sum_is_within_its_own_bound() {
         case.facets.truncate(400);
         for step in steps {
             let truths = case.truth(step, 0.0);
-            for sums in every_way() {
+            for sums in ways_of(&gpu.device) {
                 let values = case.run_as(&mut gpu, None, [step, 0.0], sums);
                 let (bounds, _) = case.bounds_as(step, 0.0, sums);
                 for k in [0, 1] {
@@ -77,6 +77,7 @@ fn every_way_to_sum_is_within_its_own_bound() {
 #[test]
 fn wrong_doubles_and_floats_in_their_place_are_noticed() {
     let mut gpu = Gpu::new();
+    let has_doubles = has_doubles(&gpu.device);
     let mut case = room();
     case.facets.truncate(400);
     let (step, doubles) = (0.37, Sums { precision: Precision::F64, ..PLAIN });
@@ -88,7 +89,11 @@ fn wrong_doubles_and_floats_in_their_place_are_noticed() {
             &bounds[1],
         )
     };
-    assert!(ratio(None, doubles) <= 1.0 && ratio(None, KAHAN) > 1.0);
+    assert!(ratio(None, KAHAN) > 1.0);
+    if !has_doubles {
+        return;
+    }
+    assert!(ratio(None, doubles) <= 1.0);
     for (file, from, to) in [
         ("transmit.comp", "#define DEEP DOUBLE", "#define DEEP 0"),
         ("transmit.comp", "LightPath(d > 0.0 ? offset / d", "LightPath(d > 0.0 ? offset"),

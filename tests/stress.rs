@@ -114,6 +114,7 @@ fn unknown_case_is_reported() {
     assert_eq!(code, Some(2));
     assert!(
         stderr.contains("no case begins with \"functoins\"")
+            && stderr.contains("; did you mean `functions`? expected one of")
             && stderr.contains("functions, generation"),
         "{stderr}"
     );

@@ -262,8 +262,16 @@ fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
     limits.max_storage_buffer_bytes = bytes - 4;
     assert_eq!(shape.fits(&limits, u64::MAX), Tensors::TooLarge { bytes, most: bytes - 4 });
     limits.max_storage_buffer_bytes = u64::MAX;
+    // A device with few texels reads storage buffers instead.
     limits.max_texels = bytes / 4 - 1;
-    assert_eq!(shape.fits(&limits, u64::MAX), Tensors::TooLarge { bytes, most: bytes - 4 });
+    assert_eq!(shape.fits(&limits, u64::MAX), Tensors::Kept);
+    limits.max_texels = 1 << 27;
+    let rows = |n_rows| Shape { n_rows, ..shape.clone() };
+    let most = 4 << 27;
+    let fit = most / (4 * 3 * 22);
+    assert_eq!(rows(fit).fits(&limits, u64::MAX), Tensors::Kept);
+    let bytes = 4 * 3 * (fit + 1) * 22;
+    assert_eq!(rows(fit + 1).fits(&limits, u64::MAX), Tensors::TooLarge { bytes, most });
     // Sizes beyond 64 bits are still only large.
     let huge = Shape { n_rows: u64::MAX / 4, ..shape };
     assert!(matches!(huge.fits(&limits, u64::MAX), Tensors::TooLarge { bytes: u64::MAX, .. }));

@@ -52,7 +52,7 @@ Walk start_walk(uint s) { return Walk(s, 0u, uvec2(0u)); }
 #define MAX_DEFERRED 8
 #endif
 #ifndef MAX_EDGE_FACETS
-#define MAX_EDGE_FACETS 32
+#define MAX_EDGE_FACETS (WIDE != 0 ? 4 : 32)
 #endif
 
 // Returns 2^-level.

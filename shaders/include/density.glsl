@@ -1,5 +1,5 @@
 // Trilinear density between cell centres, 0 outside their hull (passes.md
-// "sample"). Needs `Grid grid` in the push constants and `samplerBuffer density`.
+// "sample"). Needs `Grid grid` in the push constants and `FLOATS density`.
 
 // 1: places and weights are doubles.
 #ifndef DEEP
@@ -25,7 +25,7 @@ PLACE cell_edges() { return push.grid.cell * PLACE(1.0, push.grid.aspect, 1.0); 
 // Returns the length of d in widths of cells: 1 for a unit vector where cells are cubes.
 WEIGHT in_widths(PLACE d) { return length(PLACE(d.x, d.y * push.grid.inv_aspect, d.z)); }
 
-float cell_at(int c) { return texelFetch(density, c).x; }
+float cell_at(int c) { return FLOAT(density, c); }
 
 WEIGHT density_at(PLACE p) {
     PLACE g = IN_CELLS(p - push.grid.low) - 0.5;

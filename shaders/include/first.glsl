@@ -5,8 +5,8 @@ const float INV_PI = 0.318309886183791;
 READS(0, Facet, facets)
 READS(1, Light, lights)
 READS(2, float, transmittance)
-layout(binding = 3) uniform usamplerBuffer regions;
+TEXELS(3, regions)
 #include "regions.glsl"
-layout(binding = 4) uniform samplerBuffer table;
+FLOATS(4, table)
 
 #include "lobe.glsl"

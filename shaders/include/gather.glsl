@@ -53,15 +53,15 @@ struct LoadedSource {
 
 LoadedSource load_source(uint i, Region emitter, FacetShape facet_shape) {
     int k = int(i) * 5;
-    vec4 place = uintBitsToFloat(texelFetch(sources, k)),
-         sent = uintBitsToFloat(texelFetch(sources, k + 1));
+    vec4 place = uintBitsToFloat(TEXEL(sources, k)),
+         sent = uintBitsToFloat(TEXEL(sources, k + 1));
     LoadedSource s = LoadedSource(
         place.xyz, place.w, sent.xyz, 1u, sent.w < 0.0, emitter.normal, facet_shape.area,
         facet_shape.area, vec3(0.0), vec3(0.0)
     );
     // Surfaces' facets share normal and area, which need not be loaded.
     if (emitter.kind != REGION_SURFACE) {
-        vec4 face = uintBitsToFloat(texelFetch(sources, k + 2));
+        vec4 face = uintBitsToFloat(TEXEL(sources, k + 2));
         s.normal = face.xyz;
         // A facet without area would divide 0 by 0 where it is its own receiver.
         s.area = max(face.w, 1e-30);
@@ -70,10 +70,10 @@ LoadedSource load_source(uint i, Region emitter, FacetShape facet_shape) {
 #if TREE
     s.n_nodes = uint(max(sent.w, 1.0));
     if (s.n_nodes > 1u) {
-        vec4 extent = uintBitsToFloat(texelFetch(sources, k + 3));
+        vec4 extent = uintBitsToFloat(TEXEL(sources, k + 3));
         s.total_area = extent.x;
         s.square = extent.yzw;
-        s.leaning = uintBitsToFloat(texelFetch(sources, k + 4).xyz);
+        s.leaning = uintBitsToFloat(TEXEL(sources, k + 4).xyz);
     }
 #endif
     return s;
@@ -81,12 +81,12 @@ LoadedSource load_source(uint i, Region emitter, FacetShape facet_shape) {
 
 // Returns source i's flux by light l, as second_sources.comp wrote it.
 vec4 flux_at(uint i, uint l) {
-    return uintBitsToFloat(texelFetch(fluxes, int(i * push.n_lights + l)));
+    return uintBitsToFloat(TEXEL(fluxes, int(i * push.n_lights + l)));
 }
 
 Packed packed_samples_at(uint i, uint l) {
     int k = int(i * push.n_lights + l) * 2;
-    return Packed(texelFetch(cell_samples, k), texelFetch(cell_samples, k + 1));
+    return Packed(TEXEL(cell_samples, k), TEXEL(cell_samples, k + 1));
 }
 
 // The receiver: its place, the direction it reflects to, and its diffuse albedo over pi.
@@ -130,6 +130,7 @@ uint n_loaded(OccluderList occluder_list) {
     return occluder_list.whole ? 0u : min(occluder_list.n, MAX_LOADED);
 }
 
+#if !WIDE
 Region loaded_occluder(OccluderList occluder_list, uint k) {
     Region r = occluder_list.first;
     if (k == 1u) {
@@ -140,6 +141,7 @@ Region loaded_occluder(OccluderList occluder_list, uint k) {
     }
     return r;
 }
+#endif
 
 // Returns x: the share of a ball about q that the occluders leave visible from p; y: whether a
 // shadow's edge crosses the ball. Nothing is looked at unless `wanted`.
@@ -148,11 +150,13 @@ vec2 visible_part(
 ) {
     uint n = wanted ? occluder_list.n : 0u, n_near = min(n, n_loaded(occluder_list));
     vec2 found = vec2(1.0, 0.0);
+#if !WIDE
     for (uint k = 0u; k < n_near; ++k) {
         vec2 by = hides_ball(loaded_occluder(occluder_list, k), p, q, radius);
         found = vec2(found.x * (1.0 - by.x), max(found.y, by.y));
         n_iterations += 1u;
     }
+#endif
     for (uint k = n_near; k < n; ++k) {
         vec2 by = hides_ball(region_at(occluder_of(pairing, occluder_list, k)), p, q, radius);
         found = vec2(found.x * (1.0 - by.x), max(found.y, by.y));
@@ -166,10 +170,12 @@ void subtract_shadows(
     inout CellSamples seen, Pairing pairing, OccluderList occluder_list, vec3 p, Cell cell, uint n
 ) {
     uint n_near = min(n, n_loaded(occluder_list));
+#if !WIDE
     for (uint k = 0u; k < n_near; ++k) {
         subtract_shadow(seen, loaded_occluder(occluder_list, k), p, 1.0, cell);
         n_iterations += 1u;
     }
+#endif
     for (uint k = n_near; k < n; ++k) {
         subtract_shadow(seen, region_at(occluder_of(pairing, occluder_list, k)), p, 1.0, cell);
         n_iterations += 1u;

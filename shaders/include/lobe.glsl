@@ -1,5 +1,5 @@
 // Tabulated lobes over t = (1 - cos gamma)^(1/4), gamma between the normal and the half vector
-// (model.md §6). Needs `samplerBuffer table`, one lobe a row.
+// (model.md §6). Needs `FLOATS table`, one lobe a row.
 
 const uint N_NODES = 1025;
 
@@ -17,7 +17,7 @@ Knot knot_at(float w) {
 
 float value_at(uint i_row, Knot knot) {
     int k = int(i_row * N_NODES + knot.i);
-    return mix(texelFetch(table, k).x, texelFetch(table, k + 1).x, knot.part);
+    return mix(FLOAT(table, k), FLOAT(table, k + 1), knot.part);
 }
 
 float lobe_at(uint i_row, float w) { return value_at(i_row, knot_at(w)); }

@@ -6,7 +6,7 @@
 // at.
 const uint MAX_LISTED = 8u;
 // Listed occluders that are held in registers.
-const uint MAX_LOADED = 3u;
+const uint MAX_LOADED = WIDE != 0 ? 0u : 3u;
 // Planes through p are trusted to this share of the lengths that define them: some hundred units of
 // round-off.
 const float PLANE_TRUST = 1e-5;
@@ -19,10 +19,12 @@ struct OccluderList {
     uvec2 list;
     // One surface alone hides all of the emitter.
     bool closed;
+#if !WIDE
     // The first three, loaded unless `whole`: most lists are no longer.
     Region first;
     Region second;
     Region third;
+#endif
 };
 
 vec3 corner(Region r, uint k) {
@@ -91,12 +93,14 @@ OccluderList find_occluders(Pairing pairing, Region emitter, vec3 p, bool wanted
     occluder_list.whole = occluder_list.n > MAX_LISTED || emitter.kind != REGION_SURFACE
                           || pairing.n_occluders > 256u;
     occluder_list.n = occluder_list.whole ? pairing.n_occluders : occluder_list.n;
+#if !WIDE
     uint last = max(occluder_list.n, 1u) - 1u;
     for (uint k = 0u; k < (occluder_list.whole ? 0u : min(occluder_list.n, 1u)); ++k) {
         occluder_list.first = region_at(occluder_of(pairing, occluder_list, 0u));
         occluder_list.second = region_at(occluder_of(pairing, occluder_list, min(1u, last)));
         occluder_list.third = region_at(occluder_of(pairing, occluder_list, min(2u, last)));
     }
+#endif
     return occluder_list;
 }
 

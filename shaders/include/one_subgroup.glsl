@@ -8,6 +8,16 @@
 #extension GL_KHR_shader_subgroup_basic : require
 #endif
 
+// Returns the number of an invocation in its workgroup. In a workgroup that is one subgroup it is
+// that of subgroup operations, which Vulkan does not promise to be the local index.
+uint lane() {
+#if ONE_SUBGROUP
+    return gl_SubgroupInvocationID;
+#else
+    return gl_LocalInvocationID.x;
+#endif
+}
+
 void wait_for_all() {
 #if ONE_SUBGROUP
     subgroupMemoryBarrierShared();

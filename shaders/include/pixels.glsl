@@ -54,6 +54,10 @@ vec4 depths_of(uvec4 words) {
 }
 
 uvec4 packed(vec4 value) {
+#if PIXEL_WORDS == 2
+    // The device may round greater values to infinity.
+    value = mix(value, vec4(65504.0), greaterThan(value, vec4(65504.0)));
+#endif
 #if PIXEL_WORDS == 1
     return uvec4(packUnorm4x8(value));
 #elif PIXEL_WORDS == 2

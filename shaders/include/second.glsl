@@ -14,6 +14,13 @@
 #define GLOSSY 1
 #endif
 
+// 1: few registers: lists lie in shared memory, and occluders are loaded where they are looked at.
+// For devices that run the fewer subgroups at once, the more registers an invocation has, and that
+// keep indexed arrays in memory.
+#ifndef WIDE
+#define WIDE 0
+#endif
+
 layout(local_size_x = WORKGROUP) in;
 
 layout(push_constant) uniform Push {
@@ -43,16 +50,23 @@ READS(1, Pairing, pairings)
 READS(2, uint, occluders)
 READS(3, uint, order)
 READS(4, Facet, facets)
-layout(binding = 5) uniform usamplerBuffer regions;
+#if WIDE
+// All invocations of a workgroup read the same emitter and the same region of their own. A GPU
+// loads these from a storage buffer to registers that they share, and texels to registers of each.
+READS(5, uvec4, regions)
+#define REGION_WORDS(k) regions[k]
+#else
+TEXELS(5, regions)
+#endif
 READS(6, Light, lights)
-layout(binding = 7) uniform usamplerBuffer sources;
-layout(binding = 8) uniform usamplerBuffer fluxes;
-layout(binding = 9) uniform samplerBuffer table;
-layout(binding = 10) uniform samplerBuffer density;
+TEXELS(7, sources)
+TEXELS(8, fluxes)
+FLOATS(9, table)
+FLOATS(10, density)
 // By facet: the first source that was not looked at yet, or DONE.
 UPDATES(13, uint, reached)
 // As second_sources.comp writes them.
-layout(binding = 14) uniform usamplerBuffer cell_samples;
+TEXELS(14, cell_samples)
 // Workgroups of each round, three numbers a round: a receiver that is not done counts for the next.
 UPDATES(15, uint, rounds)
 

@@ -10,7 +10,7 @@ READS(0, Placed, placed)
 READS(1, Particle, particles)
 READS(2, uint, i_group)
 READS(3, Group, groups)
-layout(binding = 4) uniform samplerBuffer density;
+FLOATS(4, density)
 WRITES(5, Facet, facets)
 
 #include "density.glsl"

@@ -1,7 +1,7 @@
 // Textured splats, for every path that draws them (model.md §9, passes.md "texture").
 // texture_sample_of() computes what a splat needs, once; texture_exponent() returns ln of the
 // factor on tau in a pixel. Needs records, functions and philox; pixels need SAMPLES_TEXTURE and
-// `usamplerBuffer pool`.
+// `TEXELS pool`.
 
 // "text": the stream's counters differ from those of particles.
 const uint TEXTURE_STREAM = 0x74657874u;
@@ -81,7 +81,7 @@ float texture_exponent(vec2 delta, vec4 turn, uvec2 place, vec3 gain) {
     vec2 low = floor(at), share = at - low;
     // Two's complement: the lowest bits are the remainder, of negative numbers too.
     uvec2 corner = uvec2(ivec2(low)) & ((1u << place.y) - 1u);
-    uvec4 words = texelFetch(pool, int(place.x + (corner.y << place.y) + corner.x));
+    uvec4 words = TEXEL(pool, int(place.x + (corner.y << place.y) + corner.x));
     vec2 near = weighted(words.x, words.z, gain), far = weighted(words.y, words.w, gain);
     vec2 along = near + share.y * (far - near);
     return along.x + share.x * (along.y - along.x) - gain.z;

@@ -59,14 +59,14 @@ bool all_agree(bool b) {
 
 Loaded load_splat(int r) {
     Loaded splat;
-    [[unroll]] for (int k = 0; k < 2; ++k) { splat.fours[k] = texelFetch(splats, 2 * r + k); }
+    [[unroll]] for (int k = 0; k < 2; ++k) { splat.fours[k] = TEXEL(splats, 2 * r + k); }
 #if TEXTURED
     [[unroll]] for (int k = 0; k < 3; ++k) {
-        splat.fours[2 + k] = texelFetch(splat_textures, 3 * r + k);
+        splat.fours[2 + k] = TEXEL(splat_textures, 3 * r + k);
     }
 #endif
 #if ELLIPSOIDS
-    splat.fours[N_FOURS - 1] = texelFetch(conics, r);
+    splat.fours[N_FOURS - 1] = TEXEL(conics, r);
 #endif
     return splat;
 }

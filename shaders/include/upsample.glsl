@@ -13,6 +13,7 @@
 #define SHIFT 0
 #endif
 
+#include "buffers.glsl"
 #define PICTURE 1
 #include "pixels.glsl"
 
@@ -27,7 +28,7 @@ layout(push_constant) uniform Push {
     uint n_pairs;
     uint last_texel;
 } push;
-layout(binding = 0) uniform usamplerBuffer small;
+TEXELS(0, small)
 
 // Depths that differ by no more than this share of the nearer one belong to one surface.
 const float ALIKE = 0.0625;
@@ -43,13 +44,13 @@ float weight(uint k, float t) {
 
 #if BEHIND
 // The surfaces' picture; near/z of the small pixels and of the full ones.
-layout(binding = 2) uniform usamplerBuffer under;
-layout(binding = 3) uniform usamplerBuffer small_depths;
-layout(binding = 4) uniform usamplerBuffer depths;
+TEXELS(2, under)
+TEXELS(3, small_depths)
+TEXELS(4, depths)
 
 vec4 small_depths_at(uint texel) {
     return depths_of(
-        texelFetch(small_depths, int(min(texel, push.small_width * push.small_height / 4 - 1u)))
+        TEXEL(small_depths, int(min(texel, push.small_width * push.small_height / 4 - 1u)))
     );
 }
 
@@ -66,7 +67,7 @@ void store(uint p, vec4 value) {
     }
 }
 
-float depth_at(uint p) { return depths_of(texelFetch(depths, int(p / 4)))[p % 4]; }
+float depth_at(uint p) { return depths_of(TEXEL(depths, int(p / 4)))[p % 4]; }
 #endif
 
 // Composes the blobs' value `sum` over `behind`.
@@ -78,7 +79,7 @@ vec4 over_this(vec4 sum, vec4 behind) {
 // The same for pixel p.
 vec4 over(vec4 sum, uint p) {
 #if BEHIND
-    return over_this(sum, pixel_of(texelFetch(under, int(p / TEXEL_PIXELS)), p % TEXEL_PIXELS));
+    return over_this(sum, pixel_of(TEXEL(under, int(p / TEXEL_PIXELS)), p % TEXEL_PIXELS));
 #else
     return over_this(sum, vec4(0.0));
 #endif
@@ -87,7 +88,7 @@ vec4 over(vec4 sum, uint p) {
 // Composes and stores pixels p and on, TOGETHER of them.
 void store_all(uint p, vec4 sums[TOGETHER]) {
 #if BEHIND && FOURS
-    uvec4 behind = texelFetch(under, int(p / TEXEL_PIXELS));
+    uvec4 behind = TEXEL(under, int(p / TEXEL_PIXELS));
     [[unroll]] for (uint m = 0; m < TOGETHER; ++m) {
         sums[m] = over_this(sums[m], pixel_of(behind, m));
     }
@@ -153,12 +154,12 @@ vec4 beside_edges(uvec2 pixel, uint p) {
         bool alike = order > 2 || apart(small_depths_at(i / 4)[i % 4], depth) == 0.0;
         float w = alike ? wx[tap.x] * wy[tap.y] : 0.0;
         total += w;
-        sum += w * pixel_of(texelFetch(small, int(i / TEXEL_PIXELS)), i % TEXEL_PIXELS);
+        sum += w * pixel_of(TEXEL(small, int(i / TEXEL_PIXELS)), i % TEXEL_PIXELS);
     }
     if (order > 2) {
         return sum;
     }
-    vec4 nearest = pixel_of(texelFetch(small, int(i_best / TEXEL_PIXELS)), i_best % TEXEL_PIXELS);
+    vec4 nearest = pixel_of(TEXEL(small, int(i_best / TEXEL_PIXELS)), i_best % TEXEL_PIXELS);
     return total > 0.0 ? sum / total : nearest;
 }
 #endif

@@ -11,8 +11,24 @@ float n_cut = 0.0;
 
 // Facets that a light's shadow edge crosses and that must be split, as (source, pairing). Their
 // cells' own light is found after all else, so that no other cell waits for it.
+#if WIDE
+shared uvec2 edge_facets[MAX_EDGE_FACETS * WORKGROUP];
+shared uint deferred[MAX_DEFERRED * WORKGROUP];
+#define OWN(k) ((k) * WORKGROUP + gl_LocalInvocationID.x)
+#else
 uvec2 edge_facets[MAX_EDGE_FACETS];
+uint deferred[MAX_DEFERRED];
+#define OWN(k) k
+#endif
 uint n_edge_facets = 0u;
+// Short lists are often full: then the walk goes on in the same dispatch.
+#define AGAIN (WIDE && !STORES_PAIRINGS)
+
+#if WIDE
+// The cell stayed too wide: the next iteration adds its bound. Otherwise the registers of the bound
+// would live beside those of the cell.
+bool is_bound = false;
+#endif
 
 // Adds one cell of a facet, or returns true where the cell must be split.
 bool add_or_split(
@@ -24,6 +40,15 @@ bool add_or_split(
     bool is_split =
         view.is_too_wide && walk.level < push.pair_levels && n_iterations < SPLIT_ITERATIONS;
     float scale = cell_scale(walk.level);
+#if WIDE
+    if (is_bound) {
+        add_unresolved(i, source, view, emitter, receiver, scale * scale * source.area);
+        n_iterations += 1u;
+        is_bound = false;
+        return false;
+    }
+    is_bound = view.is_too_wide && !is_split;
+#endif
     Cell cell = Cell(view.position, scale * facet_shape.half_u, scale * facet_shape.half_v);
     // Share of the facet, and a sixteenth of it for each point.
     float part = is_split ? 0.0 : 0.0625 * scale * scale;
@@ -36,28 +61,39 @@ bool add_or_split(
     part *= attenuation(receiver.position, view.position, part > 0.0);
 #endif
     add_cell(i, source, view, emitter, receiver, seen, walk, cell, part, pairing.i_region, own);
+#if !WIDE
     for (uint k = 0u; k < (view.is_too_wide && !is_split ? 1u : 0u); ++k) {
         add_unresolved(i, source, view, emitter, receiver, scale * scale * source.area);
         n_iterations += 1u;
     }
+#endif
     n_iterations += CELL_ITERATIONS;
     return is_split;
+}
+
+// Moves on from a cell that add_or_split() has looked at.
+Walk next_of(Walk walk, bool is_split) {
+#if WIDE
+    if (is_bound) {
+        return walk;
+    }
+#endif
+    return advance(walk, is_split);
 }
 
 // Walks the cells of the deferred facets. One iteration is one cell, so that neighbouring
 // invocations need not wait for each other's facets.
 void gather_cells(
     Pairing pairing, Region emitter, Receiver receiver, OccluderList occluder_list,
-    FacetShape facet_shape, uint deferred[MAX_DEFERRED], uint n_deferred
+    FacetShape facet_shape, uint n_deferred
 ) {
     Walk walk = start_walk(0u);
     while (walk.s < n_deferred) {
-        walk = advance(
-            walk, add_or_split(
-                      deferred[walk.s], walk, pairing, emitter, receiver, occluder_list,
-                      facet_shape, false
-                  )
+        bool is_split = add_or_split(
+            deferred[OWN(walk.s)], walk, pairing, emitter, receiver, occluder_list, facet_shape,
+            false
         );
+        walk = next_of(walk, is_split);
     }
     n_cut += float(n_deferred - walk.s);
 }
@@ -66,17 +102,15 @@ void gather_cells(
 void gather_edge_facets(Receiver receiver) {
     Walk walk = start_walk(0u);
     while (walk.s < n_edge_facets) {
-        uvec2 facet = edge_facets[walk.s];
+        uvec2 facet = edge_facets[OWN(walk.s)];
         Pairing pairing = pairings[facet.y];
         Region emitter = region_at(pairing.i_region);
         // All surfaces in between: finding a list would not pay for one facet.
         OccluderList occluder_list = all_occluders(pairing);
-        walk = advance(
-            walk, add_or_split(
-                      facet.x, walk, pairing, emitter, receiver, occluder_list,
-                      facet_shape_of(emitter), true
-                  )
+        bool is_split = add_or_split(
+            facet.x, walk, pairing, emitter, receiver, occluder_list, facet_shape_of(emitter), true
         );
+        walk = next_of(walk, is_split);
     }
     n_cut += float(n_edge_facets - walk.s);
     n_edge_facets = 0u;
@@ -89,7 +123,6 @@ void gather(
     inout uint s, uint end
 ) {
     FacetShape facet_shape = facet_shape_of(emitter);
-    uint deferred[MAX_DEFERRED];
     // Deferred facets are finished in the same dispatch, which needs room for them.
     while (s < end && n_iterations < BATCH_ITERATIONS && n_edge_facets < MAX_EDGE_FACETS) {
         uint n_deferred = 0u;
@@ -119,14 +152,14 @@ void gather(
             add_whole(i, source, view, emitter, receiver, share);
             bool by_cells = closer && !cluster;
             bool is_split = by_cells && source.is_partly_shadowed && view.is_split;
-            edge_facets[n_edge_facets] = uvec2(i, i_pairing);
+            edge_facets[OWN(n_edge_facets)] = uvec2(i, i_pairing);
             n_edge_facets += is_split ? 1u : 0u;
-            deferred[n_deferred] = i;
+            deferred[OWN(n_deferred)] = i;
             n_deferred += by_cells && !is_split ? 1u : 0u;
             s += closer && cluster ? 1u : source.n_nodes;
             n_iterations += STEP_ITERATIONS;
         }
-        gather_cells(pairing, emitter, receiver, occluder_list, facet_shape, deferred, n_deferred);
+        gather_cells(pairing, emitter, receiver, occluder_list, facet_shape, n_deferred);
         n_iterations += 1u;
         share_iteration_count();
     }
@@ -150,12 +183,16 @@ void main() {
     }
     KEEP_LIGHTS
     Facet facet = facets[j];
-    Region own = region_at(facet.i_region);
+    // All receivers of a block are of one region. The compiler knows so where the block gives it.
+    Region own = region_at(facets[order[block.i_first]].i_region);
     vec3 to_eye = push.eye - facet.position;
     vec3 albedo = own.kd * facet.color * PI_INVERSE;
     Receiver receiver = Receiver(facet.position, facet.normal, normalize(to_eye), albedo, own);
     front = dot(to_eye, facet.normal) > 0.0 ? 1.0 : 0.0;
     uint last = 0u;
+#if AGAIN
+    do {
+#endif
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];
         last = pairing.i_source + pairing.n_sources;
@@ -168,12 +205,15 @@ void main() {
 #if STORES_PAIRINGS
         clear();
 #endif
-        gather(
-            block.i_pairing + k, pairing, emitter, receiver, occluder_list, s,
-            occluder_list.closed ? 0u : n
-        );
+        uint end = occluder_list.closed ? 0u : n;
+#if STORES_PAIRINGS
+        do {
+#endif
+        gather(block.i_pairing + k, pairing, emitter, receiver, occluder_list, s, end);
 #if STORES_PAIRINGS
         gather_edge_facets(receiver);
+        // A full list has ended the gather before its last source.
+        } while (s < end && n_iterations < BATCH_ITERATIONS);
 #endif
         s = occluder_list.closed && open ? pairing.n_sources : s;
         next = open ? pairing.i_source + s : next;
@@ -187,13 +227,16 @@ void main() {
 #if !STORES_PAIRINGS
     gather_edge_facets(receiver);
 #endif
+#if AGAIN
+    } while (next < last && n_iterations < BATCH_ITERATIONS);
+#endif
     if (is_receiver) {
         // Sources that no dispatch has reached are counted, and then there is no bound.
         bool is_last = push.i_round + 1u == push.n_rounds;
         store_receiver(j, receiver, n_cut + (is_last ? float(last - min(next, last)) : 0.0));
         reached[j] = next >= last ? DONE : next;
         if (next < last) {
-            atomicMax(rounds[3u * (push.i_round + 1u)], gl_NumWorkGroups.x);
+            atomicMax(rounds[3u * (push.i_round + 1u)], gl_WorkGroupID.x + 1u);
         }
     }
 }

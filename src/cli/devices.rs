@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::args::DevicesArgs;
-use super::output;
+use super::{kernels, output};
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceInfo, Instance, no_permission};
 use crate::io::console::say;
@@ -13,6 +13,9 @@ use crate::io::console::say;
 /// # Errors
 /// Fails if there is no Vulkan or no such device, or with `--validation` if there are messages.
 pub fn run(args: &DevicesArgs) -> Result<()> {
+    if !args.kernels.is_empty() {
+        return kernels::run(args);
+    }
     let instance = Instance::new(args.validation)?;
     let devices = DeviceInfo::list(&instance)?;
     let used = DeviceInfo::choose(devices.clone(), args.device.as_deref());
@@ -97,6 +100,7 @@ fn to_json(d: &DeviceInfo, i_used: Option<usize>) -> serde_json::Value {
         "limits": {
             "device_memory_bytes": l.device_memory_bytes,
             "max_storage_buffer_bytes": l.max_storage_buffer_bytes,
+            "max_storage_buffers": l.max_storage_buffers,
             "max_texels": l.max_texels,
             "max_workgroups_x": l.max_workgroups_x,
             "max_workgroup_invocations": l.max_workgroup_invocations,
@@ -104,6 +108,7 @@ fn to_json(d: &DeviceInfo, i_used: Option<usize>) -> serde_json::Value {
             "max_push_constant_bytes": l.max_push_constant_bytes,
             "max_image_extent": l.max_image_extent,
             "subgroup_size": l.subgroup_size,
+            "max_loop_iterations": l.max_loop_iterations,
             "timestamp_valid_bits": l.timestamp_valid_bits,
             "timestamp_period_ns": l.timestamp_period_ns,
         },

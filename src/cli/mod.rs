@@ -23,6 +23,7 @@ mod farm_plan;
 mod farm_told;
 mod inspect;
 mod interrupt;
+mod kernels;
 mod ledger;
 mod output;
 mod progress;

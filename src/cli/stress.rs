@@ -12,6 +12,8 @@ use super::output::{self, header};
 use super::progress::progress;
 use crate::error::{Error, Result};
 use crate::frame::DeviceChoice;
+use crate::gpu::DeviceOptions;
+use crate::io::suggestion;
 use crate::stress::{Case, Outcome, StressContext, Verdict, Worst, cases};
 use crate::timing::machine::{self, Device};
 
@@ -31,7 +33,12 @@ pub fn run(args: &StressArgs) -> Result<()> {
         device: args.device.clone(),
         shaders: args.shaders.clone(),
         validation: args.validation,
-        poison: false,
+        options: DeviceOptions {
+            limits: args.limits.clone(),
+            guard: args.guard,
+            max_submit_ms: args.max_submit_ms,
+            reports_pipelines: false,
+        },
     };
     let mut context = StressContext::open(&choice)?;
     let stop = graceful_stop();
@@ -136,8 +143,10 @@ fn chosen(names: &[String]) -> Result<Vec<Case>> {
     {
         let mut families: Vec<&str> = all.iter().map(Case::family).collect();
         families.dedup();
+        let names: Vec<&str> = families.iter().copied().chain(all.iter().map(|c| c.name)).collect();
+        let near = suggestion(unknown, &names);
         return Err(Error::usage(format!(
-            "no case begins with \"{unknown}\"; expected one of `nimbus stress --list`, or \
+            "no case begins with \"{unknown}\"{near} expected one of `nimbus stress --list`, or \
              a family: {}",
             families.join(", ")
         )));

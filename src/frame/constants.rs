@@ -4,7 +4,7 @@ use super::features::{saturation_bound, target_format};
 use crate::gpu::TargetFormat;
 use crate::layout::frame::CameraRecord;
 use crate::model::scene::Scene;
-use crate::passes::blobs::BlobView;
+use crate::passes::blobs::{BlobView, Extent};
 use crate::passes::transmit::MarchParams;
 
 /// Counts of records, and parameters of the passes.
@@ -57,9 +57,9 @@ impl FrameConstants {
         u64::from(self.size[0]) * u64::from(self.size[1]) * self.format.bytes_per_pixel()
     }
 
-    /// Returns `camera`'s view of the blobs.
-    pub fn view<'a>(&self, camera: &'a CameraRecord) -> BlobView<'a> {
+    /// Returns `camera`'s view of the blobs of groups with `extents`.
+    pub fn view<'a>(&self, camera: &'a CameraRecord, extents: &'a [Extent]) -> BlobView<'a> {
         let FrameConstants { cutoff, threshold, saturated, .. } = *self;
-        BlobView { camera, cutoff, threshold, saturated }
+        BlobView { camera, cutoff, threshold, saturated, extents: Some(extents) }
     }
 }

@@ -38,8 +38,9 @@ pub struct Counts {
     pub sources_lost: u64,
 }
 
-/// The greatest finite half float.
-const HALF_MAX: f32 = 65504.0;
+/// The least colour that counts as the end of half floats: four steps below the greatest, which
+/// rounded sums of layers reach.
+const LEAST_HALF_END: f32 = 65504.0 - 4.0 * 32.0;
 
 impl Counts {
     /// Returns the counts of the last frame that `renderer` drew of `scene`.
@@ -62,7 +63,7 @@ impl Counts {
     fn of_picture(rgba: &[f32], format: FilmFormat) -> Counts {
         let end = match format {
             FilmFormat::Rgba8 => 1.0,
-            FilmFormat::Rgba16f => HALF_MAX,
+            FilmFormat::Rgba16f => LEAST_HALF_END,
             FilmFormat::Rgba32f => f32::MAX,
         };
         let count =

@@ -56,13 +56,13 @@ impl Culling {
 pub(super) fn cull_view<'a>(
     camera: &'a CameraRecord,
     size: [u32; 2],
-    packet: &Packet,
+    packet: &'a Packet,
     c: &FrameConstants,
 ) -> CullView<'a> {
     // The bound is in pixels of the film, of which a slope has another number.
     let pixels = f64::from(size[1]) * f64::from(packet.camera.tan_y)
         / (f64::from(c.size[1]) * f64::from(camera.tan_y));
-    CullView { blobs: c.view(camera), size, smallest: c.smallest * pixels }
+    CullView { blobs: c.view(camera, &packet.extents), size, smallest: c.smallest * pixels }
 }
 
 /// Returns the depths that sort keys are made of.

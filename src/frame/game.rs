@@ -10,7 +10,7 @@ use tracing::info_span;
 use super::clock::ms;
 use super::features::{has_impostors, has_live, is_glossy};
 use super::live::{disc_records, live_particles};
-use super::packet::{Extent, Packet};
+use super::packet::Packet;
 use super::tensor_shape::{Shape, basis_of, is_edited, kind_of};
 use super::visibility::drawn_groups;
 use crate::error::Result;
@@ -26,6 +26,7 @@ use crate::model::gust::Mode;
 use crate::model::gust_lanes::{LANES, Lanes, Waves};
 use crate::model::material::{Brdf, Material};
 use crate::model::scene::Scene;
+use crate::passes::blobs::Extent;
 
 /// The game side of a scene, which makes the packet of any frame.
 pub struct Game {
@@ -212,11 +213,8 @@ impl Game {
         self.scene.draw.sort_bits.of(radius, sigmas.fold(f64::INFINITY, f64::min))
     }
 
-    /// Returns the extents of the groups, for impostors.
+    /// Returns the extents of the groups.
     fn extents(&self, groups: &[Group], origins: &[DVec3]) -> Vec<Extent> {
-        if !has_impostors(&self.scene) {
-            return vec![];
-        }
         let of = |g: &Group| Extent {
             center: origins[g.i_cloud] + g.center,
             half: g.half_extent + DVec3::splat(g.gust_reach),

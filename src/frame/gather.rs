@@ -1,7 +1,7 @@
 //! The gather of the second reflection: its pipelines, buffers and push constants.
 
 use super::features::gathers_from_tree;
-use super::gather_lists::{GatherLists, gather_variant, n_rounds, n_sources_max};
+use super::gather_lists::{GatherLists, gather_variant, n_rounds, n_sources};
 use super::morton_sort::MortonSort;
 use super::packet::Packet;
 use super::staging::upload;
@@ -18,7 +18,7 @@ use super::buffers::SceneBuffers;
 buffers! {
     /// The buffers that grow with the number of sources.
     pub(super) struct GatherScratch(scene: &Scene) {
-        sources: Buffer => SourceRecord, n_sources_max(scene), "second.sources", Texels;
+        sources: Buffer => SourceRecord, n_sources(scene), "second.sources", Texels;
         /// By source and light.
         fluxes: Buffer => [f32; 4], n_fluxes(scene), "second.fluxes", Texels;
         /// By source and light.
@@ -29,7 +29,7 @@ buffers! {
 }
 
 fn n_fluxes(scene: &Scene) -> u64 {
-    n_sources_max(scene) * scene.lights.len() as u64
+    n_sources(scene) * scene.lights.len() as u64
 }
 
 /// A contiguous range of blocks of receivers.
@@ -85,7 +85,7 @@ impl IndirectGather {
             counts.scan(0, |first, n| Some((std::mem::replace(first, *first + n), n))).collect();
         let places: Vec<u32> = (0..scene.n_facets() as u32).collect();
         let blocks = [&lists.diffuse[..], &lists.glossy[..]].concat();
-        let n_rounds = n_rounds(scene, lists.tree.n_nodes.len() as u64);
+        let n_rounds = n_rounds(scene, device, lists.tree.n_nodes.len() as u64);
         // One more than there are: the last round counts into it.
         let at_rest = [0, 1, 1].repeat(n_rounds as usize + 1);
         let mut made = |name: &str, data: &[u32], min_words: usize| -> Result<Buffer> {
@@ -100,7 +100,7 @@ impl IndirectGather {
             second: Second::new(
                 device,
                 compiler,
-                &gather_variant(scene, has_tree),
+                &gather_variant(scene, device, has_tree),
                 &lighting.sums.into(),
             )?,
             order: has_tree.then(order).transpose()?,

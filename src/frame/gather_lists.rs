@@ -2,6 +2,7 @@
 //! scene.
 
 use super::features::{gathers_from_tree, has_glossy, is_glossy, region_sizes};
+use crate::gpu::Device;
 use crate::layout::facet::lobe_width;
 use crate::layout::second::{BlockRecord, PairingRecord};
 use crate::model::pairings::{Pairing, pairings};
@@ -70,11 +71,10 @@ pub(super) fn region_pairings(scene: &Scene) -> Vec<Vec<Pairing>> {
     pairings(&scene.surfaces, scene.terrains.len() + scene.clouds.len())
 }
 
-/// Returns a bound of the number of sources: a tree has at most a cluster for every three of its
-/// facets, and each region a root.
-pub(super) fn n_sources_max(scene: &Scene) -> u64 {
+/// Returns the number of sources: facets, and where there is a tree its clusters.
+pub(super) fn n_sources(scene: &Scene) -> u64 {
     match gathers_from_tree(scene) {
-        true => scene.n_facets() * 4 / 3 + scene.n_regions() as u64,
+        true => region_sizes(scene).iter().map(|n| Tree::n_nodes_over((*n).into())).sum(),
         false => scene.n_facets(),
     }
 }
@@ -88,29 +88,37 @@ fn scattered(blocks: &[BlockRecord]) -> Vec<BlockRecord> {
     order.into_iter().map(|i| blocks[i as usize]).collect()
 }
 
-/// Iterations that the loops of an invocation may take together; nested ones count too. llvmpipe
-/// silently ends every loop when they are used up (LP_MAX_TGSI_LOOP_ITERATIONS), and a
-/// watchdog may be as strict.
-const MAX_ITERATIONS: u32 = 65_000;
+/// Iterations that the loops of an invocation may take together in one dispatch on any device; a
+/// watchdog may end a dispatch that takes longer. Some tens of milliseconds at 10⁸ iterations a
+/// second.
+const MAX_ITERATIONS: u32 = 1 << 22;
+/// Iterations below the device's limit that stay unused: room for the loops of a kernel that are
+/// not counted, of at most some hundred iterations.
+const SPARE_ITERATIONS: u32 = 535;
 /// The most lights that a gather keeps in registers.
 const MAX_KEPT_LIGHTS: usize = 4;
 /// Facets that a receiver collects before it visits their cells, unless a facet may have thousands.
 const COLLECTED: u32 = 8;
+/// The same on wide devices, where they take shared memory: 1 KiB a workgroup of 64.
+const COLLECTED_WIDE: u32 = 4;
 /// The width below which a lobe may make thousands of cells of a facet.
 const NARROW: f64 = 0.03;
 
 /// Returns the variant of the scene's gather.
-pub(super) fn gather_variant(scene: &Scene, has_tree: bool) -> GatherVariant {
+pub(super) fn gather_variant(scene: &Scene, device: &Device, has_tree: bool) -> GatherVariant {
     GatherVariant {
         has_clouds: scene.n_particles() > 0,
         has_tree,
         is_glossy: has_glossy(scene),
-        budget: iteration_budget(scene),
+        is_wide: is_wide(device),
+        budget: iteration_budget(scene, device),
     }
 }
 
 /// Returns how a gather divides the iterations of its loops.
-fn iteration_budget(scene: &Scene) -> IterationBudget {
+fn iteration_budget(scene: &Scene, device: &Device) -> IterationBudget {
+    let limits = device.limits();
+    let most = limits.max_loop_iterations.saturating_sub(SPARE_ITERATIONS).min(MAX_ITERATIONS);
     let from = region_pairings(scene);
     let n_occluders = from.iter().flatten().map(|p| p.occluders.len()).max().unwrap_or(0);
     let n_lights = scene.lights.len();
@@ -119,18 +127,30 @@ fn iteration_budget(scene: &Scene) -> IterationBudget {
     // before every light.
     let of_cell =
         16 + 5 * n_lights + n_occluders + n_lights * scene.surfaces.len() + march as usize;
-    let aside = if is_narrow(scene) { 1 } else { COLLECTED };
+    let aside = match is_narrow(scene) {
+        true => 1,
+        false if is_wide(device) => COLLECTED_WIDE,
+        false => COLLECTED,
+    };
     // When no cell is subdivided any more, three cells of each level and the other collected facets
     // remain.
-    let left =
-        (aside + 3 * scene.lighting.pairs.levels + 1) * of_cell.min(MAX_ITERATIONS as usize) as u32;
-    let quarter = MAX_ITERATIONS.saturating_sub(left).max(MAX_ITERATIONS / 2);
+    let left = (aside + 3 * scene.lighting.pairs.levels + 1) * of_cell.min(most as usize) as u32;
+    let quarter = most.saturating_sub(left).max(most / 2);
     IterationBudget {
         quarter,
         batch: quarter / 2,
         aside,
-        kept: if n_lights <= MAX_KEPT_LIGHTS { n_lights as u32 } else { 0 },
+        kept: match n_lights {
+            1..=MAX_KEPT_LIGHTS if !is_wide(device) => n_lights as u32,
+            _ => 0,
+        },
     }
+}
+
+/// Returns whether registers cost a device more than loads: it runs fewer subgroups at once, the
+/// more registers an invocation has.
+fn is_wide(device: &Device) -> bool {
+    device.info().kind != "cpu"
 }
 
 /// Returns whether some lobe is so narrow that a facet may have thousands of cells.
@@ -142,9 +162,9 @@ fn is_narrow(scene: &Scene) -> bool {
 /// Returns the most dispatches of a gather of `n_sources`. Dispatches without unfinished receivers
 /// have no workgroups. A source takes about ten iterations as a whole and some hundred by its
 /// cells, and a dispatch where lobes are narrow.
-pub(super) fn n_rounds(scene: &Scene, n_sources: u64) -> u32 {
-    let of_sources =
-        n_sources.saturating_mul(128).div_ceil(u64::from(iteration_budget(scene).batch));
+pub(super) fn n_rounds(scene: &Scene, device: &Device, n_sources: u64) -> u32 {
+    let batch = u64::from(iteration_budget(scene, device).batch);
+    let of_sources = n_sources.saturating_mul(128).div_ceil(batch);
     let of_lobes = if is_narrow(scene) { n_sources.min(64) } else { 0 };
     (of_sources + of_lobes).min(1 << 16) as u32 + 1
 }

@@ -4,11 +4,12 @@
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
-use super::packet::{Extent, Packet};
+use super::packet::Packet;
 use crate::layout::facet::{REGION_SURFACE, REGION_TERRAIN, RegionRecord};
 use crate::layout::frame::CameraRecord;
 use crate::model::impostor::{FarField, Shell, View};
 use crate::model::scene::Scene;
+use crate::passes::blobs::Extent;
 
 /// Margin of a layer at each edge, as a share of the picture's side.
 const MARGIN: f64 = 0.125;

@@ -4,12 +4,11 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use glam::DVec3;
-
 use crate::layout::disc::DiscRecord;
 use crate::layout::facet::{RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::passes::blobs::Extent;
 
 /// The state of a scene at a frame's time.
 #[derive(Debug, Clone)]
@@ -56,21 +55,6 @@ pub struct Packet {
     pub radius: f64,
     /// Bits of a sort key: 16 or 32.
     pub sort_bits: u32,
-    /// Extent of each group; empty without impostors.
+    /// Extent of each group.
     pub extents: Vec<Extent>,
-}
-
-/// The region of space that a group's particles are in.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Extent {
-    /// Center of the particles' positions, relative to the lighting origin.
-    pub center: DVec3,
-    /// The positions are within ± half of the center.
-    pub half: DVec3,
-    /// Greatest σ along any axis.
-    pub sigma_max: f64,
-    /// Mean σ along the shortest axis.
-    pub sigma_mean: f64,
-    /// Number of particles.
-    pub n_particles: u32,
 }

@@ -11,6 +11,23 @@ use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::boxes::MAX_ATTEMPTS;
 
+/// Facets and the light that arrives at them, relative to the lighting origin.
+#[derive(Debug, Clone, Default)]
+pub struct LitFacets {
+    /// The facets.
+    pub facets: Vec<FacetRecord>,
+    /// Transmittance `[facet][light]`.
+    pub transmittance: Vec<f32>,
+}
+
+impl LitFacets {
+    /// Returns the transmittance from light `i` to each facet.
+    pub fn transmittance_to(&self, i: usize) -> impl Iterator<Item = f32> {
+        let n_lights = self.transmittance.len() / self.facets.len().max(1);
+        self.transmittance.iter().skip(i).step_by(n_lights.max(1)).copied()
+    }
+}
+
 /// Returns the numbers of a picture from its bytes in a target.
 pub(super) fn floats(format: TargetFormat, bytes: Vec<u8>) -> Vec<f32> {
     match format {
@@ -128,6 +145,17 @@ impl Renderer {
     pub fn facets(&mut self, device: &Device) -> Result<(Vec<FacetRecord>, Vec<LitRecord>)> {
         let n = self.passes.constants.march.n_facets;
         Ok((self.read(device, |b| &b.facets, n)?, self.read(device, |b| &b.lit, n)?))
+    }
+
+    /// Returns the last frame's transmittance from each light to each facet, `[facet][light]`,
+    /// which is meaningful only in a lit scene.
+    ///
+    /// # Errors
+    /// Fails if a frame is in flight or the device is lost.
+    pub fn transmittance(&mut self, device: &Device) -> Result<Vec<f32>> {
+        let march = &self.passes.constants.march;
+        let n = march.n_facets * march.n_lights;
+        self.read(device, |b| &b.transmittance, n)
     }
 
     /// Returns the median duration that the device measures for an empty pass, in ns; `None`

@@ -290,7 +290,7 @@ impl FramePasses {
             RecordCount::Known(packet.n_drawn)
         };
         let count = BlobCount { n, i_first_facet: c.n_solid_facets };
-        let (view, all) = (c.view(camera), b.of_blobs());
+        let (view, all) = (c.view(camera, &packet.extents), b.of_blobs());
         pass(rec, plan, Pass::Impostors, |rec| {
             match (&mut picture.impostors, picture.full.target(i)) {
                 (Some(impostors), Some(target)) => {
@@ -305,7 +305,7 @@ impl FramePasses {
         for draws in [Pass::Sprites, Pass::Tiles] {
             pass(rec, plan, draws, |rec| match &mut picture.low_res {
                 Some(low_res) => {
-                    let view = c.view(&blob_camera);
+                    let view = c.view(&blob_camera, &packet.extents);
                     low_res.target.record_blobs(rec, 0, false, &blobs, &view, count)
                 }
                 None => picture.full.record_blobs(rec, i, has_layer, &blobs, &view, count),

@@ -36,6 +36,7 @@ pub struct Renderer {
     last_end: Instant,
     /// A frame has failed, so that the state of the device is unknown.
     pub(super) failed: bool,
+    barriers: Barriers,
 }
 
 /// A submitted frame that has not been waited for.
@@ -92,7 +93,13 @@ impl Renderer {
             n_begun: 0,
             last_end: Instant::now(),
             failed: false,
+            barriers: Barriers::Placed,
         })
+    }
+
+    /// Returns the time of the last frame that began, in seconds of the scene.
+    pub fn last_time_s(&self) -> Option<f64> {
+        self.last.as_ref().map(|packet| packet.time_s)
     }
 
     /// Draws one frame and waits for it.
@@ -134,7 +141,7 @@ impl Renderer {
         }
         info_span!("upload").in_scope(|| self.passes.write(slot, &packet))?;
         let (frame, passes) = (&mut self.frames[slot], &mut self.passes);
-        frame.record(Barriers::Placed, |rec| passes.record(rec, slot, &packet, &plan))?;
+        frame.record(self.barriers, |rec| passes.record(rec, slot, &packet, &plan))?;
         let recorded = [begin, Instant::now()];
         let pending = frame.submit()?;
         let (i_picture, submitted) = (passes.picture.i, Instant::now());
@@ -187,6 +194,11 @@ impl Renderer {
     /// Sets whether frames skip passes whose input is unchanged.
     pub fn set_skip(&mut self, skip: bool) {
         self.skipping.is_on = skip;
+    }
+
+    /// Sets where frames have barriers. Tests omit some, to prove that validation would notice.
+    pub fn set_barriers(&mut self, barriers: Barriers) {
+        self.barriers = barriers;
     }
 
     /// Makes the next frames run every pass whose input can change during a run.

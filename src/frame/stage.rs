@@ -10,7 +10,7 @@ use super::renderer::Renderer;
 use super::times::OnFrame;
 use super::{parallel, serial};
 use crate::error::{Error, Result};
-use crate::gpu::{Compiler, Device, DeviceInfo, Instance, Sources};
+use crate::gpu::{Compiler, Device, DeviceInfo, DeviceOptions, Instance, Sources};
 use crate::model::scene::{Scene, Threading};
 use crate::passes;
 
@@ -23,8 +23,8 @@ pub struct DeviceChoice {
     pub shaders: Option<PathBuf>,
     /// Vulkan's validation layer is on.
     pub validation: bool,
-    /// New buffers are filled with NaN.
-    pub poison: bool,
+    /// Lowered limits, reports on pipelines, guard bands, the limit of a submission.
+    pub options: DeviceOptions,
 }
 
 impl DeviceChoice {
@@ -75,10 +75,7 @@ impl GpuContext {
         choice: &DeviceChoice,
         sources: Sources,
     ) -> Result<GpuContext> {
-        let device = Device::open(&instance, choice.device.as_deref())?;
-        if choice.poison {
-            device.poison();
-        }
+        let device = Device::with_options(&instance, choice.device.as_deref(), &choice.options)?;
         let compiler = Compiler::new(sources, Compiler::default_cache())?;
         Ok(GpuContext { compiler, device, instance })
     }

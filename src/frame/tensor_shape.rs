@@ -102,7 +102,7 @@ impl Shape {
         let (first, second) =
             (bytes_of(self.n_first()), self.n_second().map_or(u64::MAX, bytes_of));
         // Both are written as buffers and read float by float.
-        let binding = limits.max_storage_buffer_bytes.min(limits.max_texels.saturating_mul(4));
+        let binding = limits.max_storage_buffer_bytes.min(limits.max_texel_buffer_bytes(4));
         let most = free.saturating_sub(first).min(binding);
         match second <= most && first <= binding {
             true => Tensors::Kept,

@@ -55,7 +55,7 @@ impl LightTensors {
         let (n_bases, spans) = (shape.n_bases, shape.spans(scene));
         let buffers = TensorBuffers::new(device, &shape, spans.len() as u64)?;
         upload(device, commands, &spans, &buffers.spans)?;
-        let variant = gather_variant(scene, false);
+        let variant = gather_variant(scene, device, false);
         let second = || SecondTensor::new(device, compiler, &variant, n_bases);
         let tensors = LightTensors {
             first: FirstTensor::new(device, compiler)?,

@@ -56,13 +56,13 @@ impl Tiling {
         n_pictures: usize,
         (format, has_under): (TargetFormat, bool),
     ) -> Result<Tiling> {
-        let max_texels = device.limits().max_texels;
         // A particle takes three texels, the light of a facet four.
-        let n_texels = (3 * scene.n_particles()).max(4 * scene.n_facets());
-        if n_texels > max_texels {
+        let n_bytes = 16 * (3 * scene.n_particles()).max(4 * scene.n_facets());
+        let most = device.limits().max_texel_buffer_bytes(16);
+        if n_bytes > most {
             return Err(Error::limit(format!(
-                "draw.path = \"tiles\": {n_texels} texels of particles or facets are wanted, this \
-                 device takes {max_texels} at most (maxTexelBufferElements); expected \"sprites\""
+                "draw.path = \"tiles\": {n_bytes} bytes of particles or facets are wanted, this \
+                 device reads {most} at most (maxTexelBufferElements); expected \"sprites\""
             )));
         }
         let division = Division::new(width, height, invocations(device.limits()))?;
@@ -99,7 +99,7 @@ impl Tiling {
             return Ok(());
         }
         tiles.record_splats(rec, buffers, view, count, TILE)?;
-        for i_round in 0..tiles.n_rounds() {
+        for i_round in 0..tiles.n_rounds(view) {
             let (entries, n) = tiles.record_pairs(rec, i_round, count.n, view)?;
             let sorted = sort.record(rec, entries, *n_bits, Count::Counted(n))?;
             tiles.record_compose(rec, i_round, [sorted, picture, buffers.pool], view)?;

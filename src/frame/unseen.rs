@@ -57,7 +57,11 @@ fn shows_something(film: &Film, rgba: &[f32]) -> bool {
 fn reason(scene: &Scene, frame: DrawnFrame, rgba: &[f32]) -> Result<String> {
     let has_solids = scene.n_solids() > 0;
     if scene.n_particles() == 0 && !has_solids {
-        return Ok("the scene has no particles, surfaces or terrain; add a [[cloud]]".to_owned());
+        return Ok(match scene.clouds.len() {
+            0 => "the scene has no particles, surfaces or terrain; add a [[cloud]]".to_owned(),
+            1 => "the scene's cloud has no particles: its file or box is empty".to_owned(),
+            n => format!("none of the scene's {n} clouds has particles: files or boxes are empty"),
+        });
     }
     let densest = rgba.chunks_exact(4).map(|pixel| pixel[3]).fold(0.0, f32::max);
     if densest > 0.0 {

@@ -9,14 +9,21 @@ use super::image::Image;
 use super::interface::{Access, Interface};
 use super::reflect::BindingKind;
 
-/// Whether the recorder places barriers. Tests omit them to prove that validation would notice.
+/// Where the recorder places barriers. Tests omit some to prove that validation would notice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Barriers {
-    /// Places a barrier where a use depends on an earlier one.
+    /// Wherever a use depends on an earlier one.
     Placed,
-    /// Places none.
-    Omitted,
+    /// Not before uses of buffers in scopes of this name ("" for those outside of all scopes).
+    OmittedIn(&'static str),
 }
+
+/// The stages in which shaders run.
+const SHADERS: Stages = Stages::from_raw(
+    Stages::COMPUTE_SHADER.as_raw()
+        | Stages::VERTEX_SHADER.as_raw()
+        | Stages::FRAGMENT_SHADER.as_raw(),
+);
 
 /// Pipeline stages, and the memory accesses that they make.
 #[derive(Debug, Clone, Copy, Default)]
@@ -41,19 +48,8 @@ impl Scope {
 
     /// Returns all stages and accesses by which nimbus uses buffers.
     pub fn any() -> Scope {
-        Scope::new(
-            Stages::COMPUTE_SHADER
-                | Stages::VERTEX_SHADER
-                | Stages::FRAGMENT_SHADER
-                | Stages::DRAW_INDIRECT
-                | Stages::ALL_TRANSFER,
-            Accesses::SHADER_STORAGE_READ
-                | Accesses::SHADER_STORAGE_WRITE
-                | Accesses::SHADER_SAMPLED_READ
-                | Accesses::INDIRECT_COMMAND_READ
-                | Accesses::TRANSFER_READ
-                | Accesses::TRANSFER_WRITE,
-        )
+        let stages = SHADERS | Stages::DRAW_INDIRECT | Stages::ALL_TRANSFER;
+        Scope::new(stages, Accesses::NONE).widened()
     }
 
     /// Returns the scope in which the shaders of a pipeline access one of its bindings.
@@ -96,34 +92,108 @@ impl Scope {
         self.accesses & (Accesses::SHADER_STORAGE_WRITE | Accesses::TRANSFER_WRITE)
     }
 
-    fn must_wait_for(self, before: Scope) -> bool {
-        let writes = |scope: Scope| scope.writes() != Accesses::NONE;
-        writes(before) && self.accesses != Accesses::NONE
-            || before.accesses != Accesses::NONE && writes(self)
+    /// Whether the scope has all stages and accesses of `other`.
+    fn covers(self, other: Scope) -> bool {
+        self.stages.contains(other.stages) && self.accesses.contains(other.accesses)
     }
 
     fn and(self, other: Scope) -> Scope {
         Scope::new(self.stages | other.stages, self.accesses | other.accesses)
     }
+
+    /// Returns the scope with all accesses that nimbus makes in its stages. A barrier that shows
+    /// a write to all of them costs no more, and later uses in the same stages need none.
+    fn widened(self) -> Scope {
+        let in_stages = |stages, accesses| match self.stages.intersects(stages) {
+            true => accesses,
+            false => Accesses::NONE,
+        };
+        let accesses = in_stages(
+            SHADERS,
+            Accesses::SHADER_STORAGE_READ
+                | Accesses::SHADER_STORAGE_WRITE
+                | Accesses::SHADER_SAMPLED_READ,
+        ) | in_stages(Stages::DRAW_INDIRECT, Accesses::INDIRECT_COMMAND_READ)
+            | in_stages(Stages::ALL_TRANSFER, Accesses::TRANSFER_READ | Accesses::TRANSFER_WRITE);
+        Scope::new(self.stages, accesses)
+    }
 }
 
-/// The uses of buffers since the last barrier.
+/// The uses of one buffer that later ones may depend on.
 #[derive(Default)]
-pub(super) struct Uses(HashMap<vk::Buffer, Scope>);
+struct Used {
+    /// The last write.
+    write: Scope,
+    /// Where barriers have shown it.
+    shown: Scope,
+    /// The reads since.
+    reads: Scope,
+    /// The stages that barriers have made wait for those reads.
+    waiting: Stages,
+}
+
+impl Used {
+    /// Whether a use in `scope` that depends on the write would see it.
+    fn shows_write(&self, scope: Scope) -> bool {
+        self.write.stages.is_empty() || self.shown.covers(scope)
+    }
+
+    /// Whether a write in `scope` would wait for the reads.
+    fn orders_reads(&self, scope: Scope) -> bool {
+        self.reads.stages.is_empty() || self.waiting.contains(scope.stages)
+    }
+
+    fn allows(&self, scope: Scope) -> bool {
+        self.shows_write(scope) && (scope.writes() == Accesses::NONE || self.orders_reads(scope))
+    }
+
+    fn add(&mut self, scope: Scope) {
+        match scope.writes() {
+            Accesses::NONE => self.reads = self.reads.and(scope),
+            // Whatever waits for this write has waited for what came before it, too.
+            _ => *self = Used { write: scope, ..Used::default() },
+        }
+    }
+}
+
+/// The uses of buffers so far, and what barriers have ordered.
+#[derive(Default)]
+pub(super) struct Uses(HashMap<vk::Buffer, Used>);
 
 impl Uses {
-    /// Adds the uses to come. Returns the scope that they must wait for, where they depend on an
-    /// earlier use; a barrier after that scope orders all earlier uses, which are then forgotten.
-    pub fn add(&mut self, coming: &[Use]) -> Option<Scope> {
-        let depends = coming
-            .iter()
-            .any(|(buffer, scope)| self.0.get(buffer).is_some_and(|b| scope.must_wait_for(*b)));
-        let before = depends.then(|| self.0.drain().fold(Scope::NONE, |all, (_, s)| all.and(s)));
-        for (buffer, scope) in coming {
-            let all = self.0.entry(*buffer).or_default();
-            *all = all.and(*scope);
+    /// Adds the uses to come. Returns the two sides of the barrier that they need, if any: it
+    /// orders all earlier uses that the stages to come might depend on.
+    pub fn add(&mut self, coming: &[Use]) -> Option<[Scope; 2]> {
+        let is_allowed = |(buffer, scope): &Use| {
+            scope.accesses == Accesses::NONE
+                || self.0.get(buffer).is_none_or(|used| used.allows(*scope))
+        };
+        let barrier = (!coming.iter().all(is_allowed)).then(|| {
+            let after = coming.iter().fold(Scope::NONE, |all, (_, s)| all.and(*s)).widened();
+            let mut before = Scope::NONE;
+            for used in self.0.values_mut() {
+                if !used.shows_write(after) {
+                    before = before.and(used.write);
+                    used.shown = used.shown.and(after);
+                }
+                if !used.orders_reads(after) {
+                    before = before.and(used.reads);
+                    used.waiting |= after.stages;
+                }
+            }
+            [before, after]
+        });
+        for (i, (buffer, _)) in coming.iter().enumerate() {
+            // Uses of one buffer by several bindings count as one.
+            let of_buffer = |(other, _): &&Use| other == buffer;
+            let all = coming.iter().filter(of_buffer);
+            let scope = all.fold(Scope::NONE, |all, (_, scope)| all.and(*scope));
+            let is_first = !coming[..i].iter().any(|of| of_buffer(&of));
+            if is_first && scope.accesses != Accesses::NONE {
+                self.0.entry(*buffer).or_default().add(scope);
+            }
         }
-        before
+        barrier
     }
 }
 

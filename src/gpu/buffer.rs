@@ -6,7 +6,8 @@ use gpu_allocator::MemoryLocation;
 
 use super::call::Call;
 use super::device::{Device, Owned};
-use super::device_info::Limits;
+use super::guard::BAND_BYTES;
+use super::limits::Limits;
 use super::memory::Memory;
 use super::reflect::BindingKind;
 use crate::error::{Error, Result};
@@ -41,62 +42,69 @@ pub struct Buffer {
     handle: Owned<vk::Buffer>,
     memory: Memory,
     bytes: u64,
+    /// The bytes that shaders see: whole texels, and the guard band on a device that has them.
+    shader_bytes: u64,
     max_texels: u64,
     name: String,
 }
 
 impl Buffer {
     /// Allocates a buffer of `n` records of type `T`; at least one record, since Vulkan has no
-    /// empty buffers. On a device that poisons, the buffer is full of NaN.
+    /// empty buffers. On a device with guard bands the buffer is full of NaN, and a band follows.
     ///
     /// # Errors
     /// The size breaks a limit of the device, or its memory is used up.
     pub fn new<T: Pod>(device: &Device, name: &str, n: u64, usage: MemoryUsage) -> Result<Buffer> {
         let bytes = storage_bytes(device.limits(), name, n, size_of::<T>() as u64)?;
-        let shared = device.shared();
-        let info = vk::BufferCreateInfo::default()
-            // Whole texels, so that texel reads reach the last words too.
-            .size(bytes.next_multiple_of(MAX_TEXEL_BYTES))
-            .usage(
-                vk::BufferUsageFlags::STORAGE_BUFFER
-                    | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
-                    | vk::BufferUsageFlags::TRANSFER_SRC
-                    | vk::BufferUsageFlags::TRANSFER_DST
-                    | vk::BufferUsageFlags::INDIRECT_BUFFER,
-            );
+        let (shared, limits) = (device.shared(), device.limits());
+        // Whole texels, so that texel reads reach the last words too.
+        let mut shader_bytes = bytes.next_multiple_of(MAX_TEXEL_BYTES);
+        if shared.guards.is_some() {
+            let most = limits.max_storage_buffer_bytes.min(shader_bytes + BAND_BYTES);
+            shader_bytes = shader_bytes.max(most - most % MAX_TEXEL_BYTES);
+        }
+        let info = vk::BufferCreateInfo::default().size(shader_bytes).usage(
+            vk::BufferUsageFlags::STORAGE_BUFFER
+                | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+                | vk::BufferUsageFlags::TRANSFER_SRC
+                | vk::BufferUsageFlags::TRANSFER_DST
+                | vk::BufferUsageFlags::INDIRECT_BUFFER,
+        );
         let raw =
             unsafe { shared.raw.create_buffer(&info, None) }.of_call("vkCreateBuffer", name)?;
         let handle = shared.own(raw, name, ash::Device::destroy_buffer);
         let requirements = unsafe { shared.raw.get_buffer_memory_requirements(raw) };
         let location = match usage {
-            // The host fills poisoned buffers, so it must see them all.
-            MemoryUsage::Device if !shared.is_poisoning() => MemoryLocation::GpuOnly,
-            MemoryUsage::Device | MemoryUsage::Upload => MemoryLocation::CpuToGpu,
+            // The host fills all buffers with bands, and reads the bands.
+            _ if shared.guards.is_some() => MemoryLocation::GpuToCpu,
+            MemoryUsage::Device => MemoryLocation::GpuOnly,
+            MemoryUsage::Upload => MemoryLocation::CpuToGpu,
             MemoryUsage::Readback => MemoryLocation::GpuToCpu,
         };
         let mut memory = Memory::new(shared, name, requirements, location, true)?;
         let (block, offset) = memory.place();
         unsafe { shared.raw.bind_buffer_memory(raw, block, offset) }
             .of_call("vkBindBufferMemory", name)?;
-        if shared.is_poisoning()
-            && let Some(bytes) = memory.mapped_mut()
-        {
-            // NaN as floats, and too great as numbers.
-            bytes.fill(u8::MAX);
-        }
-        let max_texels = device.limits().max_texels;
+        let max_texels = if limits.has_texel_buffers() { limits.max_texels } else { 0 };
         let mut views = [None, None];
         for (view, (kind, format)) in views.iter_mut().zip(TEXELS) {
-            let n = bytes.div_ceil(u64::from(kind.texel_bytes()));
-            if n <= max_texels {
-                let range = n * u64::from(kind.texel_bytes());
+            let texel_bytes = u64::from(kind.texel_bytes());
+            if bytes.div_ceil(texel_bytes) <= max_texels {
+                let range = (shader_bytes / texel_bytes).min(max_texels) * texel_bytes;
                 let info = vk::BufferViewCreateInfo::default().buffer(raw).format(format);
                 let raw = unsafe { shared.raw.create_buffer_view(&info.range(range), None) }
                     .of_call("vkCreateBufferView", name)?;
                 *view = Some(shared.own(raw, name, ash::Device::destroy_buffer_view));
             }
         }
-        Ok(Buffer { views, handle, memory, bytes, max_texels, name: name.to_owned() })
+        if let Some(guards) = &shared.guards
+            && let Some(mapped) =
+                memory.mapped_mut().and_then(|m| m.get_mut(..shader_bytes as usize))
+        {
+            guards.watch(raw, name, mapped, bytes as usize);
+        }
+        let name = name.to_owned();
+        Ok(Buffer { views, handle, memory, bytes, shader_bytes, max_texels, name })
     }
 
     pub(super) fn raw(&self) -> vk::Buffer {
@@ -118,6 +126,11 @@ impl Buffer {
                 self.max_texels
             ))
         })
+    }
+
+    /// Returns the bytes that shaders see: whole texels, and the guard band if there is one.
+    pub(super) fn shader_bytes(&self) -> u64 {
+        self.shader_bytes
     }
 
     /// Returns the size in bytes, as it was asked for.
@@ -164,12 +177,22 @@ impl Buffer {
     }
 }
 
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        if let Some(guards) = &self.memory.shared().guards {
+            guards.forget(self.handle.raw);
+        }
+    }
+}
+
 /// Returns the bytes of a storage buffer of `n` records.
 ///
 /// # Errors
 /// The device takes fewer; the message names the limit.
 pub fn storage_bytes(limits: &Limits, name: &str, n: u64, record_bytes: u64) -> Result<u64> {
+    // Shaders see whole texels, which must fit, too.
     let most = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes);
+    let most = most - most % MAX_TEXEL_BYTES;
     match n.max(1).checked_mul(record_bytes) {
         Some(bytes) if bytes <= most => Ok(bytes.next_multiple_of(4)),
         _ => Err(Error::limit(format!(

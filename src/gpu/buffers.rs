@@ -5,7 +5,7 @@ use bytemuck::Pod;
 
 use super::buffer::{Buffer, MemoryUsage, storage_bytes};
 use super::device::Device;
-use super::device_info::Limits;
+use super::limits::Limits;
 use super::reflect::BindingKind;
 use crate::error::{Error, Result};
 
@@ -33,7 +33,7 @@ impl BufferSpec {
         let BufferSpec { name, n, record_bytes, n_copies, texels } = *self;
         let bytes = storage_bytes(limits, name, n, record_bytes)?;
         let texel_bytes = texels.map_or(0, |kind| u64::from(kind.texel_bytes()));
-        if texel_bytes > 0 && n * record_bytes / texel_bytes > limits.max_texels {
+        if texel_bytes > 0 && n * record_bytes > limits.max_texel_buffer_bytes(texel_bytes) {
             return Err(Error::limit(format!(
                 "{name}: {} texels of {texel_bytes} bytes are wanted, this device takes {} at most \
                  (maxTexelBufferElements)",

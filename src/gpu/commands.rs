@@ -5,9 +5,11 @@ use std::sync::Arc;
 use ash::vk;
 use tracing::info_span;
 
+use super::barriers::{Scope, stage_barrier};
 use super::call::Call;
 use super::descriptors::DescriptorPools;
 use super::device::{Device, Owned, SharedDevice};
+use super::rate::Pace;
 use super::timer::{ScopeTime, Timer};
 use crate::error::Result;
 
@@ -16,13 +18,21 @@ use crate::error::Result;
 const TIMEOUT_NS: u64 = 3_600_000_000_000;
 const MAX_SCOPES: u32 = 32;
 
-/// A command buffer with all that its submissions need: descriptors, timestamps, a timeline
+/// Command buffers with all that their submissions need: descriptors, timestamps, a timeline
 /// semaphore.
 ///
-/// Dropping it waits for the last submission.
+/// A recording is one command buffer, or several parts that are submitted one after another.
+/// Dropping waits for the last submission.
 pub struct Commands {
-    pub(super) pool: Owned<vk::CommandPool>,
-    pub(super) buffer: vk::CommandBuffer,
+    pool: Owned<vk::CommandPool>,
+    /// The parts of the recording, and those of earlier recordings that had more.
+    buffers: Vec<vk::CommandBuffer>,
+    /// The part that is being recorded; the ones before it have ended.
+    i_buffer: usize,
+    n_submitted: usize,
+    /// Whether a recording may be submitted in parts.
+    pub(super) is_divisible: bool,
+    pub(super) pace: Pace,
     pub(super) descriptors: DescriptorPools,
     pub(super) timer: Timer,
     /// The value that the semaphore has after the last submission.
@@ -50,8 +60,14 @@ impl Submission {
         let _zone = info_span!("wait").entered();
         let (semaphores, values) = ([self.semaphore.raw], [self.value]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
-        unsafe { self.shared.raw.wait_semaphores(&info, TIMEOUT_NS) }
-            .of_call("vkWaitSemaphores", &self.name)
+        let waited = match self.shared.is_abandoned() {
+            true => Err(vk::Result::TIMEOUT),
+            false => unsafe { self.shared.raw.wait_semaphores(&info, TIMEOUT_NS) },
+        };
+        if let Err(failure) = waited {
+            self.shared.settle(failure);
+        }
+        waited.of_call("vkWaitSemaphores", &self.name)
     }
 
     /// Whether the device has finished already.
@@ -74,15 +90,91 @@ impl Commands {
         let shared = device.shared();
         let timer = Timer::new(device, name, MAX_SCOPES)?;
         let pool = shared.command_pool(name)?;
-        let info =
-            vk::CommandBufferAllocateInfo::default().command_pool(pool.raw).command_buffer_count(1);
-        let buffer = unsafe { shared.raw.allocate_command_buffers(&info) }
-            .of_call("vkAllocateCommandBuffers", name)?[0];
-        shared.name(buffer, name);
         let semaphore = Arc::new(shared.semaphore(name, vk::SemaphoreType::TIMELINE)?);
         let descriptors = DescriptorPools::new(shared);
         let (name, shared) = (name.to_owned(), shared.clone());
-        Ok(Commands { pool, buffer, descriptors, timer, value: 0, semaphore, name, shared })
+        Ok(Commands {
+            pool,
+            buffers: vec![],
+            i_buffer: 0,
+            n_submitted: 0,
+            is_divisible: true,
+            pace: Pace::default(),
+            descriptors,
+            timer,
+            value: 0,
+            semaphore,
+            name,
+            shared,
+        })
+    }
+
+    /// Makes an empty command buffer whose recordings are submitted whole.
+    ///
+    /// # Errors
+    /// The driver is out of memory.
+    #[cfg(feature = "window")]
+    pub(super) fn whole(device: &Device, name: &str) -> Result<Commands> {
+        let mut commands = Commands::new(device, name)?;
+        commands.is_divisible = false;
+        Ok(commands)
+    }
+
+    /// Returns the command buffer that is being recorded.
+    pub(super) fn buffer(&self) -> vk::CommandBuffer {
+        self.buffers.get(self.i_buffer).copied().unwrap_or_default()
+    }
+
+    /// Begins an empty recording in place of the last one.
+    pub(super) fn begin(&mut self) -> Result<()> {
+        self.descriptors.reset()?;
+        let flags = vk::CommandPoolResetFlags::empty();
+        unsafe { self.shared.raw.reset_command_pool(self.pool.raw, flags) }
+            .of_call("vkResetCommandPool", "")?;
+        (self.i_buffer, self.n_submitted) = (0, 0);
+        self.pace = Pace::default();
+        self.begin_buffer()
+    }
+
+    fn begin_buffer(&mut self) -> Result<()> {
+        if self.i_buffer == self.buffers.len() {
+            let info = vk::CommandBufferAllocateInfo::default()
+                .command_pool(self.pool.raw)
+                .command_buffer_count(1);
+            let buffer = unsafe { self.shared.raw.allocate_command_buffers(&info) }
+                .of_call("vkAllocateCommandBuffers", &self.name)?[0];
+            self.shared.name(buffer, &self.name);
+            self.buffers.push(buffer);
+        }
+        let info = vk::CommandBufferBeginInfo::default()
+            .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        unsafe { self.shared.raw.begin_command_buffer(self.buffer(), &info) }
+            .of_call("vkBeginCommandBuffer", "")
+    }
+
+    /// Ends the command buffer that is being recorded, after which the host may read what the
+    /// device has written.
+    pub(super) fn end(&mut self) -> Result<()> {
+        stage_barrier(&self.shared.raw, self.buffer(), Scope::any(), Scope::HOST_READ);
+        unsafe { self.shared.raw.end_command_buffer(self.buffer()) }
+            .of_call("vkEndCommandBuffer", "")?;
+        self.i_buffer += 1;
+        Ok(())
+    }
+
+    /// Begins a part of the recording, which is submitted apart from what was recorded before.
+    pub(super) fn begin_part(&mut self) -> Result<()> {
+        self.pace.pending_ns = 0.0;
+        self.end()?;
+        self.begin_buffer()
+    }
+
+    /// Submits what is recorded so far, waits for it, and begins a part.
+    pub(super) fn finish_part(&mut self) -> Result<()> {
+        self.pace.pending_ns = 0.0;
+        self.end()?;
+        self.submit()?.wait()?;
+        self.begin_buffer()
     }
 
     /// Starts the recorded commands and returns at once.
@@ -96,29 +188,34 @@ impl Commands {
     /// Starts the recorded commands. Drawing waits for `ready`; `drawn` is signalled at the end.
     pub(super) fn submit_between(
         &mut self,
-        ready: Option<vk::Semaphore>,
+        mut ready: Option<vk::Semaphore>,
         drawn: Option<vk::Semaphore>,
     ) -> Result<Submission> {
         let _zone = info_span!("submit").entered();
-        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.buffer)];
         let at = |semaphore, stages| {
             vk::SemaphoreSubmitInfo::default().semaphore(semaphore).stage_mask(stages)
         };
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
         let color = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
-        let waits: Vec<_> = ready.into_iter().map(|semaphore| at(semaphore, color)).collect();
-        let value = self.value + 1;
-        let mut signals = vec![at(self.semaphore.raw, all).value(value)];
-        signals.extend(drawn.map(|semaphore| at(semaphore, all)));
-        let info = [vk::SubmitInfo2::default()
-            .wait_semaphore_infos(&waits)
-            .command_buffer_infos(&buffers)
-            .signal_semaphore_infos(&signals)];
-        unsafe {
-            self.shared.raw.queue_submit2(*self.shared.lock_queue(), &info, vk::Fence::null())
+        while self.n_submitted < self.i_buffer {
+            let buffer = self.buffers[self.n_submitted];
+            let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(buffer)];
+            let waits: Vec<_> = ready.take().into_iter().map(|s| at(s, color)).collect();
+            let value = self.value + 1;
+            let mut signals = vec![at(self.semaphore.raw, all).value(value)];
+            if self.n_submitted + 1 == self.i_buffer {
+                signals.extend(drawn.map(|semaphore| at(semaphore, all)));
+            }
+            let info = [vk::SubmitInfo2::default()
+                .wait_semaphore_infos(&waits)
+                .command_buffer_infos(&buffers)
+                .signal_semaphore_infos(&signals)];
+            unsafe {
+                self.shared.raw.queue_submit2(*self.shared.lock_queue(), &info, vk::Fence::null())
+            }
+            .of_call("vkQueueSubmit2", &self.name)?;
+            (self.n_submitted, self.value) = (self.n_submitted + 1, value);
         }
-        .of_call("vkQueueSubmit2", &self.name)?;
-        self.value = value;
         Ok(self.last_submission())
     }
 
@@ -131,13 +228,23 @@ impl Commands {
         }
     }
 
+    /// Returns the number of parts in which the last recording was submitted.
+    pub fn n_parts(&self) -> usize {
+        self.n_submitted
+    }
+
     /// Waits for the last submission and returns the times of its scopes.
     ///
     /// # Errors
-    /// The device is lost, or an hour has passed.
+    /// The device is lost, an hour has passed, or a guard band is broken.
     pub fn wait(&mut self) -> Result<Vec<ScopeTime>> {
         self.last_submission().wait()?;
-        self.timer.read()
+        if let Some(guards) = &self.shared.guards {
+            guards.check(&self.name)?;
+        }
+        let times = self.timer.read()?;
+        self.pace.correct(&times);
+        Ok(times)
     }
 }
 

@@ -9,9 +9,31 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::call::Call;
-use super::device_info::{DeviceInfo, Limits};
+use super::device_info::DeviceInfo;
+use super::guard::Guards;
 use super::instance::Instance;
+use super::limits::Limits;
+use super::lowered::LoweredLimits;
+use super::statistics::{PipelineReport, Reports};
 use crate::error::{Error, Result};
+
+/// The way in which a device is opened.
+#[derive(Debug, Clone, Default)]
+pub struct DeviceOptions {
+    /// Limits of another device that the device is lowered to.
+    pub limits: Option<LoweredLimits>,
+    /// The device keeps a report on every pipeline that it makes.
+    pub reports_pipelines: bool,
+    /// Buffers are filled with NaN and have guard bands, which are checked after each pass.
+    pub guard: bool,
+    /// Most milliseconds that a submission is predicted to take; without, 500 on a device that is
+    /// no CPU, and any time on a CPU.
+    pub max_submit_ms: Option<f64>,
+}
+
+/// Most milliseconds of a submission to a GPU. Windows resets a GPU that does not answer for two
+/// seconds, other systems wait longer; a prediction may be off by a factor of four.
+const MAX_SUBMIT_MS: f64 = 500.0;
 
 /// An open device.
 ///
@@ -29,8 +51,14 @@ pub(super) struct SharedDevice {
     pub limits: Limits,
     pub allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     debug: Option<ext::debug_utils::Device>,
-    /// Whether new buffers are filled with NaN.
-    poisons: AtomicBool,
+    /// The guard bands of buffers, where they are wanted.
+    pub guards: Option<Guards>,
+    /// Most nanoseconds that a submission is predicted to take, if there is a limit.
+    pub max_submit_ns: Option<f64>,
+    /// Whether the device may be at work for ever, so that nothing that it may use can be freed.
+    is_abandoned: AtomicBool,
+    /// Reports on new pipelines, where they are wanted.
+    pub reports: Option<Reports>,
     pub instance: Arc<Instance>,
 }
 
@@ -40,8 +68,25 @@ impl Device {
     /// # Errors
     /// No device matches, or the driver fails to open it.
     pub fn open(instance: &Arc<Instance>, choice: Option<&str>) -> Result<Device> {
+        Device::with_options(instance, choice, &DeviceOptions::default())
+    }
+
+    /// Opens a device with options.
+    ///
+    /// # Errors
+    /// Fails as [`Device::open`] does.
+    pub fn with_options(
+        instance: &Arc<Instance>,
+        choice: Option<&str>,
+        options: &DeviceOptions,
+    ) -> Result<Device> {
         let info = DeviceInfo::choose(DeviceInfo::list(instance)?, choice)?;
-        let raw = create(instance, &info)?;
+        let info = match &options.limits {
+            Some(limits) => info.lowered(limits),
+            None => info,
+        };
+        let has_statistics = options.reports_pipelines && info.has_pipeline_statistics;
+        let raw = create(instance, &info, has_statistics)?;
         let queue = unsafe { raw.get_device_queue(info.queue_family, 0) };
         let mut debug_settings = gpu_allocator::AllocatorDebugSettings::default();
         // Device::drop reports leaks itself, into the messages that tests read.
@@ -62,8 +107,12 @@ impl Device {
             .vulkan
             .has_debug_utils
             .then(|| ext::debug_utils::Device::new(&instance.vulkan.raw, &raw));
+        let statistics = has_statistics
+            .then(|| khr::pipeline_executable_properties::Device::new(&instance.vulkan.raw, &raw));
         instance.messages().claim(raw.handle());
         instance.messages().claim(queue);
+        let of_kind = (info.kind != "cpu").then_some(MAX_SUBMIT_MS);
+        let max_submit_ms = options.max_submit_ms.or(of_kind);
         let shared = Arc::new(SharedDevice {
             raw,
             queue: Mutex::new(queue),
@@ -71,7 +120,10 @@ impl Device {
             limits: info.limits,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             debug,
-            poisons: AtomicBool::new(false),
+            guards: options.guard.then(Guards::default),
+            max_submit_ns: max_submit_ms.map(|ms| 1e6 * ms),
+            is_abandoned: AtomicBool::new(false),
+            reports: options.reports_pipelines.then(|| Reports::new(statistics)),
             instance: instance.clone(),
         });
         Ok(Device { shared, info })
@@ -87,9 +139,10 @@ impl Device {
         &self.info.limits
     }
 
-    /// Fills every buffer made from now on with NaN, so that a read before the first write shows.
-    pub fn poison(&self) {
-        self.shared.poisons.store(true, Ordering::Relaxed);
+    /// Takes the reports on pipelines that were made since the last call; none without
+    /// [`DeviceOptions::reports_pipelines`].
+    pub fn take_pipeline_reports(&self) -> Vec<PipelineReport> {
+        self.shared.reports.as_ref().map_or(vec![], Reports::take)
     }
 
     /// Returns the bytes allocated on the device at present.
@@ -115,6 +168,9 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
+        if self.shared.is_abandoned() {
+            return;
+        }
         // An error here is a lost device, which the call that lost it has reported.
         let _ = unsafe { self.shared.raw.device_wait_idle() };
         let report = self.shared.lock_allocator().generate_report();
@@ -135,9 +191,46 @@ impl SharedDevice {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether new buffers are filled with NaN.
-    pub fn is_poisoning(&self) -> bool {
-        self.poisons.load(Ordering::Relaxed)
+    /// Returns the flags with which pipelines are made on this device.
+    pub fn pipeline_flags(&self) -> vk::PipelineCreateFlags {
+        self.reports.as_ref().map_or(vk::PipelineCreateFlags::empty(), Reports::flags)
+    }
+
+    /// Returns the flags with which compute pipelines are made. Where submissions have a limit,
+    /// their workgroups can be dispatched in parts.
+    pub fn kernel_flags(&self) -> vk::PipelineCreateFlags {
+        let parts = match self.max_submit_ns {
+            Some(_) => vk::PipelineCreateFlags::DISPATCH_BASE,
+            None => vk::PipelineCreateFlags::empty(),
+        };
+        self.pipeline_flags() | parts
+    }
+
+    /// Keeps a report on a new pipeline, if the device was opened for reports.
+    pub fn report(&self, raw: vk::Pipeline, name: &str, variant: &[(&str, u32)]) -> Result<()> {
+        self.reports.as_ref().map_or(Ok(()), |reports| reports.add(raw, name, variant))
+    }
+
+    /// Makes it safe to drop the buffers of a submission after the wait for it has failed. Waits
+    /// for the whole device, or abandons the device if that wait may never end or fails, too.
+    pub fn settle(&self, failure: vk::Result) {
+        let is_idle = match failure {
+            vk::Result::ERROR_DEVICE_LOST => true,
+            vk::Result::TIMEOUT => false,
+            _ => {
+                let _queue = self.lock_queue();
+                let waited = unsafe { self.raw.device_wait_idle() };
+                matches!(waited, Ok(()) | Err(vk::Result::ERROR_DEVICE_LOST))
+            }
+        };
+        if !is_idle {
+            self.is_abandoned.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Whether the device was given up. It and its objects then live until the process exits.
+    pub fn is_abandoned(&self) -> bool {
+        self.is_abandoned.load(Ordering::Relaxed)
     }
 
     /// Names a handle for frame debuggers, and claims validation messages about it.
@@ -188,6 +281,9 @@ impl SharedDevice {
 
 impl Drop for SharedDevice {
     fn drop(&mut self) {
+        if self.is_abandoned() {
+            return;
+        }
         // SAFETY: the last owner; every resource held an Arc of this and is destroyed. The
         // allocator frees its blocks through the device and so goes first.
         unsafe {
@@ -211,12 +307,14 @@ pub(super) struct Owned<H: vk::Handle + Copy> {
 
 impl<H: vk::Handle + Copy> Drop for Owned<H> {
     fn drop(&mut self) {
-        // SAFETY: the handle was made by this device and nobody else destroys it.
-        unsafe { (self.destroy)(&self.shared.raw, self.raw, None) };
+        if !self.shared.is_abandoned() {
+            // SAFETY: the handle was made by this device and nobody else destroys it.
+            unsafe { (self.destroy)(&self.shared.raw, self.raw, None) };
+        }
     }
 }
 
-fn create(instance: &Instance, info: &DeviceInfo) -> Result<ash::Device> {
+fn create(instance: &Instance, info: &DeviceInfo, has_statistics: bool) -> Result<ash::Device> {
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(info.queue_family)
@@ -231,17 +329,25 @@ fn create(instance: &Instance, info: &DeviceInfo) -> Result<ash::Device> {
         .compute_full_subgroups(true);
     let presents = !instance.vulkan.surface_extensions.is_empty() && info.has_swapchain;
     let swapchain = presents.then_some(khr::swapchain::NAME);
-    let extensions: Vec<_> =
-        info.calibrated_timestamps.into_iter().chain(swapchain).map(CStr::as_ptr).collect();
+    let statistics = has_statistics.then_some(khr::pipeline_executable_properties::NAME);
+    // A device that has it demands that it is enabled.
+    let portable = info.is_portable.then_some(khr::portability_subset::NAME);
+    let optional = [info.calibrated_timestamps, swapchain, statistics, portable];
+    let extensions: Vec<_> = optional.into_iter().flatten().map(CStr::as_ptr).collect();
+    let mut executables = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default()
+        .pipeline_executable_info(true);
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(info.limits.has_int64)
         .shader_float64(info.limits.has_float64);
-    let create = vk::DeviceCreateInfo::default()
+    let mut create = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)
         .enabled_features(&features)
         .push_next(&mut v12)
         .push_next(&mut v13);
+    if has_statistics {
+        create = create.push_next(&mut executables);
+    }
     unsafe { instance.vulkan.raw.create_device(info.physical, &create, None) }
         .of_call("vkCreateDevice", "")
 }

@@ -7,6 +7,7 @@ use ash::{ext, khr, vk};
 use super::advice::no_driver;
 use super::call::Call;
 use super::instance::Instance;
+use super::limits::{LLVMPIPE_ITERATIONS, Limits};
 use crate::error::{Error, Result};
 
 /// Properties of a device that need no opening.
@@ -33,76 +34,27 @@ pub struct DeviceInfo {
     /// The extension that reads the device's clock and the host's at one moment, where the device
     /// has one.
     pub calibrated_timestamps: Option<&'static CStr>,
+    /// Whether the device is one over another API (VK_KHR_portability_subset), such as MoltenVK's.
+    /// nimbus uses nothing that such a device may lack.
+    pub is_portable: bool,
+    /// Whether the driver describes the pipelines that it makes.
+    pub has_pipeline_statistics: bool,
     pub(super) physical: vk::PhysicalDevice,
     pub(super) queue_family: u32,
 }
 
-/// Limits and optional features of a device.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Limits {
-    /// Bytes of one storage buffer that a shader can address.
-    pub max_storage_buffer_bytes: u64,
-    /// Texels of one texel buffer.
-    pub max_texels: u64,
-    /// Workgroups along x of one dispatch.
-    pub max_workgroups_x: u32,
-    /// Invocations of one workgroup.
-    pub max_workgroup_invocations: u32,
-    /// Bytes of memory that a workgroup shares.
-    pub max_shared_memory_bytes: u32,
-    /// Bytes of push constants.
-    pub max_push_constant_bytes: u32,
-    /// Pixels along a side of an image that is drawn into.
-    pub max_image_extent: u32,
-    /// Bytes of the largest device-local heap.
-    pub device_memory_bytes: u64,
-    /// Invocations of a subgroup, unless a kernel asks for another size.
-    pub subgroup_size: u32,
-    /// Whether compute shaders can sum and compare over a subgroup.
-    pub has_subgroup_arithmetic: bool,
-    /// Whether compute shaders can vote, ballot and shuffle over a subgroup.
-    pub has_subgroup_shuffle: bool,
-    /// Whether all subgroups have the same size.
-    pub is_subgroup_size_fixed: bool,
-    /// Whether a compute kernel can ask for a subgroup size.
-    pub can_choose_subgroup_size: bool,
-    /// Whether shaders can use 64-bit integers.
-    pub has_int64: bool,
-    /// Whether shaders can use 64-bit floats.
-    pub has_float64: bool,
-    /// Bits of a timestamp that count; 0 where the queue has no timestamps.
-    pub timestamp_valid_bits: u32,
-    /// Nanoseconds per timestamp tick.
-    pub timestamp_period_ns: f64,
-}
-
-impl Limits {
-    /// Whether a workgroup of `n_invocations` is certainly one subgroup that can vote and shuffle.
-    pub fn is_one_subgroup(&self, n_invocations: u32) -> bool {
-        self.has_subgroup_shuffle
-            && self.subgroup_size == n_invocations
-            && (self.is_subgroup_size_fixed || self.can_choose_subgroup_size)
-    }
-
-    /// Returns the nanoseconds from the device's own zero to a timestamp of its queue.
-    pub(super) fn ticks_ns(&self, ticks: u64) -> f64 {
-        (ticks & self.tick_mask()) as f64 * self.timestamp_period_ns
-    }
-
-    /// Returns a mask of the timestamp bits that count.
-    pub(super) fn tick_mask(&self) -> u64 {
-        u64::MAX.checked_shr(64 - self.timestamp_valid_bits).unwrap_or(0)
-    }
-}
-
 impl DeviceInfo {
-    /// Lists every Vulkan device, usable or not, in the loader's order.
+    /// Lists every Vulkan device, usable or not, in the loader's order. The list is empty where no
+    /// driver has a device.
     ///
     /// # Errors
     /// The driver fails to enumerate its devices.
     pub fn list(instance: &Instance) -> Result<Vec<DeviceInfo>> {
-        let physical = unsafe { instance.vulkan.raw.enumerate_physical_devices() }
-            .of_call("vkEnumeratePhysicalDevices", "")?;
+        let physical = match unsafe { instance.vulkan.raw.enumerate_physical_devices() } {
+            // The loader's answer where no driver has a device.
+            Err(vk::Result::ERROR_INITIALIZATION_FAILED) => vec![],
+            listed => listed.of_call("vkEnumeratePhysicalDevices", "")?,
+        };
         let describe = |(index, physical)| DeviceInfo::describe(instance, index, physical);
         Ok(physical.into_iter().enumerate().map(describe).collect())
     }
@@ -202,6 +154,9 @@ impl DeviceInfo {
             unusable: unusable(vulkan, physical, version, family),
             limits: Limits {
                 max_storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
+                max_storage_buffers: limits
+                    .max_per_stage_descriptor_storage_buffers
+                    .min(limits.max_descriptor_set_storage_buffers),
                 max_texels: u64::from(limits.max_texel_buffer_elements),
                 max_workgroups_x: limits.max_compute_work_group_count[0],
                 max_workgroup_invocations: limits.max_compute_work_group_invocations,
@@ -221,13 +176,42 @@ impl DeviceInfo {
                 can_choose_subgroup_size: in_compute(sizes.required_subgroup_size_stages),
                 has_int64: features.shader_int64 == vk::TRUE,
                 has_float64: features.shader_float64 == vk::TRUE,
+                max_loop_iterations: match driver.driver_id {
+                    vk::DriverId::MESA_LLVMPIPE => LLVMPIPE_ITERATIONS,
+                    _ => u32::MAX,
+                },
                 timestamp_valid_bits: family.map_or(0, |i| families[i].timestamp_valid_bits),
                 timestamp_period_ns: f64::from(limits.timestamp_period),
             },
             has_swapchain: has_extension(vulkan, physical, khr::swapchain::NAME),
             calibrated_timestamps: calibrated_timestamps(instance, physical),
+            is_portable: has_extension(vulkan, physical, khr::portability_subset::NAME),
+            has_pipeline_statistics: has_pipeline_statistics(vulkan, physical),
             physical,
             queue_family: family.unwrap_or(0) as u32,
+        }
+    }
+}
+
+#[cfg(test)]
+impl DeviceInfo {
+    /// Returns a device that does not exist.
+    pub(super) fn of_limits(name: &str, kind: &'static str, limits: Limits) -> DeviceInfo {
+        DeviceInfo {
+            index: 0,
+            name: name.to_owned(),
+            driver: String::new(),
+            api_version: (1, 3, 0),
+            kind,
+            uuid: String::new(),
+            unusable: None,
+            limits,
+            has_swapchain: false,
+            calibrated_timestamps: None,
+            is_portable: false,
+            has_pipeline_statistics: false,
+            physical: vk::PhysicalDevice::null(),
+            queue_family: 0,
         }
     }
 }
@@ -306,6 +290,16 @@ fn calibrated_timestamps(
     needs.iter().all(|d| domains.contains(d)).then_some(name)
 }
 
+/// Whether a device describes its pipelines.
+fn has_pipeline_statistics(instance: &ash::Instance, physical: vk::PhysicalDevice) -> bool {
+    let mut feature = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut feature);
+    if has_extension(instance, physical, khr::pipeline_executable_properties::NAME) {
+        unsafe { instance.get_physical_device_features2(physical, &mut all) };
+    }
+    feature.pipeline_executable_info == vk::TRUE
+}
+
 /// Whether a device lists an extension; false where the list cannot be read.
 fn has_extension(instance: &ash::Instance, physical: vk::PhysicalDevice, name: &CStr) -> bool {
     let extensions = unsafe { instance.enumerate_device_extension_properties(physical) };
@@ -324,20 +318,7 @@ mod tests {
     use super::*;
 
     fn device(index: usize, name: &str, kind: &'static str) -> DeviceInfo {
-        DeviceInfo {
-            index,
-            name: name.to_owned(),
-            driver: String::new(),
-            api_version: (1, 3, 0),
-            kind,
-            uuid: String::new(),
-            unusable: None,
-            limits: Limits::default(),
-            has_swapchain: false,
-            calibrated_timestamps: None,
-            physical: vk::PhysicalDevice::null(),
-            queue_family: 0,
-        }
+        DeviceInfo { index, ..DeviceInfo::of_limits(name, kind, Limits::default()) }
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::call::Call;
 use super::device::Device;
 use super::image::{TargetFormat, depth_format};
 use super::interface::{Constants, Field, Interface, Pipeline, Stage};
+use super::rate::Rate;
 use super::shader::Compiler;
 use crate::error::Result;
 
@@ -61,6 +62,9 @@ impl BlendMode {
     }
 }
 
+/// The specialization constant that is 1 for targets of 16-bit floats; the shaders' HALF.
+const HALF: u32 = 7;
+
 impl DrawPipeline {
     /// Makes a pipeline from `name.vert` and `name.frag` for targets of `format`.
     ///
@@ -85,13 +89,16 @@ impl DrawPipeline {
             stage("frag", vk::ShaderStageFlags::FRAGMENT)?,
         ];
         let interface = Interface::new(device, name, &stages, push)?;
-        let constants = Constants::new(constants);
+        let is_half = format == TargetFormat::Rgba16f;
+        let constants = Constants::new(&[constants, &[(HALF, u32::from(is_half))]].concat());
         let specialization = constants.info();
         let infos = stages.each_ref().map(|stage| stage.info(&specialization));
         let raw = create(device, &interface, name, &infos, format, mode)?;
         let handle = device.shared().own(raw, name, ash::Device::destroy_pipeline);
+        device.shared().report(raw, name, &[])?;
         let point = vk::PipelineBindPoint::GRAPHICS;
-        let pipeline = Pipeline { handle, point, interface, name: name.to_owned() };
+        let (name, rate) = (name.to_owned(), Rate::default());
+        let pipeline = Pipeline { handle, point, interface, name, rate };
         Ok(DrawPipeline { pipeline, has_depth: mode.has_depth() })
     }
 }
@@ -127,6 +134,7 @@ fn create(
         rendering = rendering.depth_attachment_format(depth_format(device));
     }
     let info = vk::GraphicsPipelineCreateInfo::default()
+        .flags(device.shared().pipeline_flags())
         .stages(stages)
         .vertex_input_state(&vertex_input)
         .input_assembly_state(&assembly)

@@ -79,25 +79,36 @@ impl Recorder<'_> {
         instances: InstanceCount<'_>,
     ) -> Result<()> {
         target.check(pipeline)?;
-        if let InstanceCount::Indirect(counts, _) = instances {
-            self.depend(&[(counts.raw(), Scope::INDIRECT_READ)]);
-        }
-        self.bind(&pipeline.pipeline, buffers, push)?;
-        self.render(target, load, |device, commands, area| {
-            let (width, height) = (area.extent.width as f32, area.extent.height as f32);
-            let viewport = vk::Viewport { width, height, max_depth: 1.0, ..Default::default() };
-            unsafe {
-                device.cmd_set_viewport(commands, 0, &[viewport]);
-                device.cmd_set_scissor(commands, 0, &[area]);
-                match instances {
-                    InstanceCount::Known(n) => device.cmd_draw(commands, 4, n, 0, 0),
-                    InstanceCount::Indirect(counts, word) => {
-                        let offset = 4 * u64::from(word);
-                        device.cmd_draw_indirect(commands, counts.raw(), offset, 1, 0)
+        let counts = match instances {
+            InstanceCount::Known(_) => None,
+            InstanceCount::Indirect(counts, _) => Some(counts),
+        };
+        let Target { color, mut depth } = target;
+        let n_rows = color.extent.height;
+        self.paced(&pipeline.pipeline, (n_rows, true), |rec, first, n| {
+            rec.bind(&pipeline.pipeline, buffers, push, counts)?;
+            let load = if first == 0 { load } else { LoadOp::Load };
+            let target = Target { color: &mut *color, depth: depth.as_deref_mut() };
+            rec.render(target, load, |device, commands, area| {
+                let (width, height) = (area.extent.width as f32, area.extent.height as f32);
+                let viewport = vk::Viewport { width, height, max_depth: 1.0, ..Default::default() };
+                let rows = vk::Rect2D {
+                    offset: vk::Offset2D { x: 0, y: first as i32 },
+                    extent: vk::Extent2D { width: area.extent.width, height: n },
+                };
+                unsafe {
+                    device.cmd_set_viewport(commands, 0, &[viewport]);
+                    device.cmd_set_scissor(commands, 0, &[rows]);
+                    match instances {
+                        InstanceCount::Known(n) => device.cmd_draw(commands, 4, n, 0, 0),
+                        InstanceCount::Indirect(counts, word) => {
+                            let offset = 4 * u64::from(word);
+                            device.cmd_draw_indirect(commands, counts.raw(), offset, 1, 0)
+                        }
                     }
                 }
-            }
-            Ok(())
+                Ok(())
+            })
         })
     }
 

@@ -7,7 +7,7 @@
 use std::ffi::CStr;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 
 use super::advice::{PACKAGES, no_driver};
 use super::call::Call;
@@ -95,12 +95,19 @@ impl VulkanInstance {
         }
         let has_debug_utils = has_validation || has(ext::debug_utils::NAME);
         let mut extensions: Vec<_> = surface.iter().map(|name| name.as_ptr()).collect();
+        // Drivers over another API, such as MoltenVK on macOS, are listed only if asked for.
+        let is_portable = has(khr::portability_enumeration::NAME);
+        extensions.extend(is_portable.then_some(khr::portability_enumeration::NAME.as_ptr()));
+        let flags = match is_portable {
+            true => vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR,
+            false => vk::InstanceCreateFlags::empty(),
+        };
         extensions.extend(has_debug_utils.then_some(ext::debug_utils::NAME.as_ptr()));
         let application = vk::ApplicationInfo::default()
             .application_name(c"nimbus")
             .engine_name(c"nimbus")
             .api_version(vk::API_VERSION_1_3);
-        let info = vk::InstanceCreateInfo::default().application_info(&application);
+        let info = vk::InstanceCreateInfo::default().application_info(&application).flags(flags);
         let raw = match has_validation {
             true => validation::create_instance(&entry, info, extensions)?,
             false => {

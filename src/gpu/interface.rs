@@ -6,6 +6,8 @@ use ash::vk;
 
 use super::call::Call;
 use super::device::{Device, Owned, SharedDevice};
+use super::limits::Limits;
+use super::rate::Rate;
 use super::reflect::{Binding, BindingKind, Reflection, reflect};
 use super::shader::{Compiler, Optimize};
 use crate::error::{Error, Result};
@@ -47,7 +49,9 @@ impl Stage {
         flags: vk::ShaderStageFlags,
         macros: &[(&str, u32)],
     ) -> Result<Stage> {
-        let words = compiler.compile(&file, Optimize::Yes, macros)?;
+        let no_texels = (!device.limits().has_texel_buffers()).then_some(("TEXEL_BUFFERS", 0));
+        let macros: Vec<_> = macros.iter().copied().chain(no_texels).collect();
+        let words = compiler.compile(&file, Optimize::Yes, &macros)?;
         let reflection = reflect(&file, &words)?;
         let shared = device.shared();
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
@@ -125,9 +129,10 @@ impl Interface {
             Access { kind, reads: any(|b| b.reads), writes: any(|b| b.writes) }
         };
         let access: Vec<Access> = (0..n).map(merge).collect();
-        let set_layout = set_layout(shared, name, &access, flags)?;
         let push_bytes =
             push.last().map_or(0, |(_, offset, bytes)| offset + bytes).next_multiple_of(4);
+        check_limits(device.limits(), name, &access, push_bytes)?;
+        let set_layout = set_layout(shared, name, &access, flags)?;
         let ranges = [vk::PushConstantRange::default().stage_flags(flags).size(push_bytes as u32)];
         let set_layouts = [set_layout.raw];
         let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts);
@@ -139,6 +144,24 @@ impl Interface {
         let layout = shared.own(layout, name, ash::Device::destroy_pipeline_layout);
         Ok(Interface { layout, set_layout, access, push_bytes, stages: flags })
     }
+}
+
+fn check_limits(limits: &Limits, name: &str, access: &[Access], push_bytes: usize) -> Result<()> {
+    let fail = |n: usize, what, most: u32, limit| {
+        let what = format!("{name}: {n} {what}, this device takes {most} ({limit})");
+        Err(Error::limit(what))
+    };
+    let n = access.iter().filter(|a| a.kind == BindingKind::Storage).count();
+    if n > limits.max_storage_buffers as usize {
+        let limit = "maxPerStageDescriptorStorageBuffers";
+        return fail(n, "storage buffers", limits.max_storage_buffers, limit);
+    }
+    if push_bytes > limits.max_push_constant_bytes as usize {
+        let limit = "maxPushConstantsSize";
+        let what = "bytes of push constants";
+        return fail(push_bytes, what, limits.max_push_constant_bytes, limit);
+    }
+    Ok(())
 }
 
 fn set_layout(
@@ -168,6 +191,8 @@ pub(super) struct Pipeline {
     pub point: vk::PipelineBindPoint,
     pub interface: Interface,
     pub name: String,
+    /// The time that its work takes.
+    pub rate: Rate,
 }
 
 /// Map entries and data of 32-bit specialization constants, by id.

@@ -5,6 +5,7 @@ use ash::vk;
 use super::call::Call;
 use super::device::Device;
 use super::interface::{Constants, Field, Interface, Pipeline, Stage};
+use super::rate::Rate;
 use super::reflect::Reflection;
 use super::shader::Compiler;
 use crate::error::{Error, Result};
@@ -60,13 +61,18 @@ impl Kernel {
                 .push_next(&mut size);
         }
         let layout = interface.layout.raw;
-        let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
         let (shared, cache) = (device.shared(), vk::PipelineCache::null());
+        let info = [vk::ComputePipelineCreateInfo::default()
+            .stage(stage)
+            .layout(layout)
+            .flags(shared.kernel_flags())];
         let made = unsafe { shared.raw.create_compute_pipelines(cache, &info, None) };
         let raw = made.map_err(|(_, e)| e).of_call("vkCreateComputePipelines", name)?[0];
         let handle = shared.own(raw, name, ash::Device::destroy_pipeline);
+        shared.report(raw, name, macros)?;
         let point = vk::PipelineBindPoint::COMPUTE;
-        let pipeline = Pipeline { handle, point, interface, name: name.to_owned() };
+        let (name, rate) = (name.to_owned(), Rate::default());
+        let pipeline = Pipeline { handle, point, interface, name, rate };
         Ok(Kernel { pipeline, local_size_x })
     }
 

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use ash::vk;
-use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::{AllocationError, MemoryLocation};
 
 use super::device::SharedDevice;
 use crate::error::{Error, Result};
@@ -20,7 +20,7 @@ impl Memory {
     /// Allocates memory; `is_linear` for buffers, false for images.
     ///
     /// # Errors
-    /// The device has too little memory left.
+    /// The device has too little memory left, or the driver fails.
     pub fn new(
         shared: &Arc<SharedDevice>,
         name: &str,
@@ -36,7 +36,14 @@ impl Memory {
             allocation_scheme: AllocationScheme::GpuAllocatorManaged,
         };
         let allocation = shared.lock_allocator().allocate(&desc).map_err(|e| {
-            Error::limit(format!("{name}: {} bytes of device memory: {e}", requirements.size))
+            let bytes = format!("{} bytes of device memory", requirements.size);
+            match e {
+                AllocationError::OutOfMemory => Error::limit(format!("{name}: {bytes}: {e}")),
+                AllocationError::Internal(why) => {
+                    Error::vulkan(format!("allocating {name}"), format!("{bytes}: {why}"))
+                }
+                e => Error::vulkan(format!("allocating {name}"), format!("{bytes}: {e}")),
+            }
         })?;
         Ok(Memory { allocation: Some(allocation), shared: shared.clone() })
     }
@@ -46,6 +53,11 @@ impl Memory {
         let null = (vk::DeviceMemory::null(), 0);
         // SAFETY: the block lives as long as the allocation.
         self.allocation.as_ref().map_or(null, |a| (unsafe { a.memory() }, a.offset()))
+    }
+
+    /// Returns the device that it was allocated on.
+    pub fn shared(&self) -> &SharedDevice {
+        &self.shared
     }
 
     /// Returns the bytes as the host sees them; none in memory that the host cannot map.
@@ -61,7 +73,9 @@ impl Memory {
 
 impl Drop for Memory {
     fn drop(&mut self) {
-        if let Some(allocation) = self.allocation.take() {
+        if let Some(allocation) = self.allocation.take()
+            && !self.shared.is_abandoned()
+        {
             // Freeing fails only for an allocation of another allocator, which this is not.
             let _ = self.shared.lock_allocator().free(allocation);
         }

@@ -17,18 +17,24 @@ mod device;
 mod device_info;
 mod draw_pipeline;
 mod draws;
+mod guard;
 mod image;
 mod instance;
 mod interface;
 mod kernel;
+mod limits;
+mod lowered;
 mod memory;
 #[cfg(feature = "window")]
 mod overlay;
+mod pacing;
 #[cfg(feature = "window")]
 mod presenter;
+mod rate;
 mod recorder;
 mod reflect;
 mod shader;
+mod statistics;
 #[cfg(feature = "window")]
 mod surface;
 #[cfg(feature = "window")]
@@ -42,19 +48,22 @@ pub use buffer::{Buffer, MemoryUsage, storage_bytes};
 pub use buffers::{BufferSpec, DeclaredBuffer, buffers};
 pub use clocks::{ClockFit, ClockSample};
 pub use commands::{Commands, Submission};
-pub use device::Device;
-pub use device_info::{DeviceInfo, Limits};
+pub use device::{Device, DeviceOptions};
+pub use device_info::DeviceInfo;
 pub use draw_pipeline::{BlendMode, DrawPipeline};
 pub use draws::{InstanceCount, LoadOp, Target};
 pub use image::{DEPTH_BYTES_PER_PIXEL, Image, TargetFormat, has_depth24};
 pub use instance::Instance;
 pub use interface::Field;
 pub use kernel::Kernel;
+pub use limits::Limits;
+pub use lowered::LoweredLimits;
 #[cfg(feature = "window")]
 pub use overlay::{Backdrop, Overlay, Widgets};
 pub use recorder::{DeviceCount, RecordCount, Recorder};
 pub use reflect::{Binding, BindingKind, Member, Reflection, Struct, reflect};
 pub use shader::{Compiler, Optimize, Sources, cache_folder, hex};
+pub use statistics::{PipelineReport, Program};
 #[cfg(feature = "window")]
 pub use surface::{PresentMode, Surface};
 #[cfg(feature = "window")]

@@ -216,6 +216,9 @@ fn fill(device: &ash::Device, commands: vk::CommandBuffer, area: vk::Rect2D, col
 
 impl Drop for Overlay {
     fn drop(&mut self) {
+        if self.shared.is_abandoned() {
+            return;
+        }
         // The renderer's buffers may be in use; a lost device has ended that.
         let _ = unsafe { self.shared.raw.queue_wait_idle(*self.shared.lock_queue()) };
     }

@@ -9,7 +9,6 @@ use tracing::info_span;
 
 use super::barriers::{Barriers, Scope, Use, Uses, image_barrier, stage_barrier};
 use super::buffer::Buffer;
-use super::call::Call;
 use super::commands::Commands;
 use super::image::Image;
 use super::interface::Pipeline;
@@ -43,6 +42,9 @@ pub struct Recorder<'a> {
     pub(super) commands: &'a mut Commands,
     uses: Uses,
     barriers: Barriers,
+    /// The scope that is open, "" for none, and its place among the times.
+    scope: &'static str,
+    pub(super) i_scope: Option<u32>,
 }
 
 impl Commands {
@@ -57,23 +59,16 @@ impl Commands {
         f: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
     ) -> Result<()> {
         let _zone = info_span!("record").entered();
-        let (raw, buffer) = (self.shared.raw.clone(), self.buffer);
-        self.descriptors.reset()?;
-        let flags = vk::CommandPoolResetFlags::empty();
-        unsafe { raw.reset_command_pool(self.pool.raw, flags) }
-            .of_call("vkResetCommandPool", "")?;
-        let begin = vk::CommandBufferBeginInfo::default()
-            .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        unsafe { raw.begin_command_buffer(buffer, &begin) }.of_call("vkBeginCommandBuffer", "")?;
-        self.timer.reset(buffer);
+        self.begin()?;
+        self.timer.reset(self.buffer());
         // Orders this submission after the earlier ones, which may still be under way.
         // Synchronization validation of 1.3.239 does not look across submissions, so no test would
         // notice if this line were missing.
-        stage_barrier(&raw, buffer, Scope::any(), Scope::any());
-        f(&mut Recorder { commands: self, uses: Uses::default(), barriers })?;
-        self.timer.copy(buffer);
-        stage_barrier(&raw, buffer, Scope::any(), Scope::HOST_READ);
-        unsafe { raw.end_command_buffer(buffer) }.of_call("vkEndCommandBuffer", "")
+        stage_barrier(&self.shared.raw, self.buffer(), Scope::any(), Scope::any());
+        let (uses, scope, i_scope) = (Uses::default(), "", None);
+        f(&mut Recorder { commands: self, uses, barriers, scope, i_scope })?;
+        self.timer.copy(self.buffer());
+        self.end()
     }
 
     /// Records, submits and waits; returns the times of the scopes.
@@ -94,17 +89,29 @@ impl Recorder<'_> {
     /// Runs `f` between two timestamps under `name`.
     ///
     /// # Errors
-    /// `f` fails.
+    /// `f` fails, or a guard band is broken.
     pub fn scope(
         &mut self,
         name: &'static str,
         f: impl FnOnce(&mut Self) -> Result<()>,
     ) -> Result<()> {
         let _zone = info_span!("record", name).entered();
-        let i = self.commands.timer.begin(self.commands.buffer, name);
+        let commands = &mut self.commands;
+        let i = commands.timer.begin(commands.buffer(), name);
+        let outer = (self.scope, self.i_scope);
+        (self.scope, self.i_scope) = (name, i);
         let done = f(self);
-        self.commands.timer.end(self.commands.buffer, i);
-        done
+        (self.scope, self.i_scope) = outer;
+        self.commands.timer.end(self.commands.buffer(), i);
+        done?;
+        let Commands { is_divisible, shared, .. } = &*self.commands;
+        match shared.clone().guards.as_ref().filter(|_| *is_divisible) {
+            Some(guards) => {
+                self.commands.finish_part()?;
+                guards.check(name)
+            }
+            None => Ok(()),
+        }
     }
 
     /// Dispatches `kernel` with one invocation a record (each.glsl). Workgroups lie in rows where
@@ -122,7 +129,31 @@ impl Recorder<'_> {
         let n_groups = n_records.div_ceil(kernel.local_size_x());
         // Every device takes 65 535 along y, too: more than any number of records needs.
         let n_rows = n_groups.div_ceil(self.commands.shared.limits.max_workgroups_x);
-        self.dispatch_rows(kernel, buffers, push, [n_groups.div_ceil(n_rows.max(1)), n_rows])
+        let groups = [n_groups.div_ceil(n_rows.max(1)), n_rows];
+        self.dispatch_rows(kernel, buffers, push, groups, true)
+    }
+
+    /// Dispatches `kernel` in `n_groups` workgroups, of which each does its own part of the work.
+    ///
+    /// # Errors
+    /// Buffers or push constants differ from the shader's, or there are more workgroups than the
+    /// device takes.
+    pub fn dispatch_blocks<P: Pod>(
+        &mut self,
+        kernel: &Kernel,
+        buffers: &[&Buffer],
+        push: &P,
+        n_groups: u32,
+    ) -> Result<()> {
+        let most = self.commands.shared.limits.max_workgroups_x;
+        if n_groups > most {
+            let name = &kernel.pipeline.name;
+            return Err(Error::limit(format!(
+                "{name}: {n_groups} workgroups are wanted, this device takes {most} \
+                 (maxComputeWorkGroupCount)"
+            )));
+        }
+        self.dispatch_rows(kernel, buffers, push, [n_groups, 1], true)
     }
 
     /// Dispatches `kernel` in `n_groups` workgroups, or in as many as the device takes: the kernel
@@ -138,22 +169,36 @@ impl Recorder<'_> {
         n_groups: u32,
     ) -> Result<()> {
         let n_groups = n_groups.min(self.commands.shared.limits.max_workgroups_x);
-        self.dispatch_rows(kernel, buffers, push, [n_groups, 1])
+        self.dispatch_rows(kernel, buffers, push, [n_groups, 1], false)
     }
 
+    /// Dispatches rows of workgroups; `is_divisible`: workgroups can be dispatched apart.
     fn dispatch_rows<P: Pod>(
         &mut self,
         kernel: &Kernel,
         buffers: &[&Buffer],
         push: &P,
         [x, y]: [u32; 2],
+        is_divisible: bool,
     ) -> Result<()> {
-        if x > 0 {
-            self.bind(&kernel.pipeline, buffers, push)?;
-            let (device, commands) = self.raw();
-            unsafe { device.cmd_dispatch(commands, x, y, 1) };
+        if x == 0 {
+            return Ok(());
         }
-        Ok(())
+        // Shaders number workgroups by the length of a row, so that only whole rows are apart.
+        let units = if y > 1 { y } else { x };
+        let work = (units, is_divisible);
+        self.paced(&kernel.pipeline, work, |rec, first, n| {
+            rec.bind(&kernel.pipeline, buffers, push, None)?;
+            let (device, commands) = rec.raw();
+            let ([x0, y0], [nx, ny]) =
+                if y > 1 { ([0, first], [x, n]) } else { ([first, 0], [n, 1]) };
+            // Only pipelines of devices with a limit take a base other than 0.
+            match first {
+                0 => unsafe { device.cmd_dispatch(commands, nx, ny, 1) },
+                _ => unsafe { device.cmd_dispatch_base(commands, x0, y0, 0, nx, ny, 1) },
+            }
+            Ok(())
+        })
     }
 
     /// Dispatches `kernel` in as many workgroups as the three words from word `i` of `counts` say.
@@ -167,19 +212,21 @@ impl Recorder<'_> {
         push: &P,
         (counts, i): (&Buffer, u32),
     ) -> Result<()> {
-        self.depend(&[(counts.raw(), Scope::INDIRECT_READ)]);
-        self.bind(&kernel.pipeline, buffers, push)?;
-        let (device, commands) = self.raw();
-        let offset = u64::from(i) * size_of::<u32>() as u64;
-        unsafe { device.cmd_dispatch_indirect(commands, counts.raw(), offset) };
-        Ok(())
+        self.paced(&kernel.pipeline, (1, false), |rec, _, _| {
+            rec.bind(&kernel.pipeline, buffers, push, Some(counts))?;
+            let (device, commands) = rec.raw();
+            let offset = u64::from(i) * size_of::<u32>() as u64;
+            unsafe { device.cmd_dispatch_indirect(commands, counts.raw(), offset) };
+            Ok(())
+        })
     }
 
     /// Sets every 32-bit word of `buffer`.
     pub fn fill(&mut self, buffer: &Buffer, word: u32) {
         self.depend(&[(buffer.raw(), Scope::TRANSFER_WRITE)]);
         let (device, commands) = self.raw();
-        unsafe { device.cmd_fill_buffer(commands, buffer.raw(), 0, vk::WHOLE_SIZE, word) };
+        let n_bytes = buffer.bytes();
+        unsafe { device.cmd_fill_buffer(commands, buffer.raw(), 0, n_bytes, word) };
     }
 
     /// Writes `record`, of 65 536 bytes at most, to the start of `buffer`.
@@ -209,12 +256,14 @@ impl Recorder<'_> {
         unsafe { device.cmd_copy_buffer(commands, from.raw(), to.raw(), &regions) };
     }
 
-    /// Binds a pipeline with its buffers and push constants, after the barrier that they need.
+    /// Binds a pipeline with its buffers and push constants, after the barrier that they and
+    /// `counts`, the buffer of an indirect call, need.
     pub(super) fn bind<P: Pod>(
         &mut self,
         pipeline: &Pipeline,
         buffers: &[&Buffer],
         push: &P,
+        counts: Option<&Buffer>,
     ) -> Result<()> {
         let Pipeline { interface, point, .. } = pipeline;
         let bytes = bytemuck::bytes_of(push);
@@ -231,6 +280,7 @@ impl Recorder<'_> {
         let bindings = || buffers.iter().zip(&interface.access);
         let uses: Vec<Use> = bindings()
             .map(|(buffer, access)| (buffer.raw(), Scope::of_binding(interface, access)))
+            .chain(counts.map(|counts| (counts.raw(), Scope::INDIRECT_READ)))
             .collect();
         self.depend(&uses);
         let views = bindings()
@@ -238,7 +288,10 @@ impl Recorder<'_> {
             .collect::<Result<Vec<_>>>()?;
         let infos: Vec<_> = buffers
             .iter()
-            .map(|b| [vk::DescriptorBufferInfo { buffer: b.raw(), offset: 0, range: b.bytes() }])
+            .map(|b| {
+                let (buffer, range) = (b.raw(), b.shader_bytes());
+                [vk::DescriptorBufferInfo { buffer, offset: 0, range }]
+            })
             .collect();
         let set = self.commands.descriptors.allocate(interface.set_layout.raw)?;
         let writes: Vec<_> = (0..)
@@ -269,15 +322,16 @@ impl Recorder<'_> {
 
     /// Returns the functions of the device, and the command buffer that they record into.
     pub(super) fn raw(&self) -> (&ash::Device, vk::CommandBuffer) {
-        (&self.commands.shared.raw, self.commands.buffer)
+        (&self.commands.shared.raw, self.commands.buffer())
     }
 
     /// Makes the coming uses of buffers wait for the earlier ones that they depend on.
     pub(super) fn depend(&mut self, coming: &[Use]) {
-        let before = self.uses.add(coming);
-        if let Some(before) = before.filter(|_| self.barriers == Barriers::Placed) {
+        let barrier = self.uses.add(coming);
+        let is_placed = self.barriers != Barriers::OmittedIn(self.scope);
+        if let Some([before, after]) = barrier.filter(|_| is_placed) {
             let (device, commands) = self.raw();
-            stage_barrier(device, commands, before, Scope::any());
+            stage_barrier(device, commands, before, after);
         }
     }
 

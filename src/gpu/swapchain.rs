@@ -129,7 +129,7 @@ impl Swapchain {
             self.drawn.push(shared.semaphore("window.drawn", kind)?);
         }
         for _ in 0..FRAMES_IN_FLIGHT {
-            self.commands.push(Commands::new(device, "window.show")?);
+            self.commands.push(Commands::whole(device, "window.show")?);
             self.ready.push(shared.semaphore("window.ready", kind)?);
         }
         self.presenter = Some(Presenter::start(PresentQueue {
@@ -235,6 +235,9 @@ impl Drop for Swapchain {
         if let Some(mut presenter) = self.presenter.take() {
             presenter.end();
             self.take_back(&presenter);
+        }
+        if self.shared.is_abandoned() {
+            return;
         }
         // SAFETY: all submissions and presents end before the objects that they use; a lost device
         // has ended them.

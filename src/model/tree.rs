@@ -28,6 +28,17 @@ impl Tree {
         root
     }
 
+    /// Returns the number of nodes of a tree over `n` facets.
+    pub fn n_nodes_over(n: u64) -> u64 {
+        if n < 2 {
+            return n;
+        }
+        let run = run_of(n);
+        // A full run is a whole tree: 1 + FAN + FAN² + … nodes.
+        let full = (u64::from(FAN) * run - 1) / u64::from(FAN - 1);
+        1 + n / run * full + Tree::n_nodes_over(n % run)
+    }
+
     /// Adds the next `n` facets without clusters and returns the first one's node.
     pub fn push_flat(&mut self, n: u32) -> u32 {
         let root = self.n_nodes.len() as u32;
@@ -44,12 +55,7 @@ impl Tree {
             self.leaves.push(i as u32);
             return 0;
         }
-        // All children but the last are full: runs of a power of FAN facets, which the quadrants of
-        // a power of two fit.
-        let mut run = 1;
-        while run < n.div_ceil(FAN) {
-            run *= FAN;
-        }
+        let run = run_of(n.into()) as u32;
         let mut height = 0;
         for first in (0..n).step_by(run as usize) {
             height = height.max(self.push_node(run.min(n - first)));
@@ -61,6 +67,16 @@ impl Tree {
         self.merges[height].push(i as u32);
         height + 1
     }
+}
+
+/// Returns the facets of a child of a node of `n`. All children but the last are full: runs of a
+/// power of FAN facets, which the quadrants of a power of two fit.
+fn run_of(n: u64) -> u64 {
+    let mut run = 1;
+    while run < n.div_ceil(FAN.into()) {
+        run *= u64::from(FAN);
+    }
+    run
 }
 
 #[cfg(test)]
@@ -98,6 +114,17 @@ mod tests {
             assert!(done.iter().all(|d| *d) && tree.n_nodes[0] as usize == done.len());
             // Clusters are a third of the facets, plus one partial run at each height.
             assert!(done.len() as u32 <= n + n / 3 + 12, "{n}: {}", done.len());
+        }
+    }
+
+    #[test]
+    fn nodes_are_counted_without_the_tree() {
+        // 6 facets: the root, a run of 4 with its cluster, and one of 2 with its own.
+        assert_eq!([0, 1, 2, 4, 5, 6].map(Tree::n_nodes_over), [0, 1, 3, 5, 7, 9]);
+        for n in (0..300).chain([4096, 4097, 65_535, 90_000, 100_001]) {
+            let mut tree = Tree::default();
+            tree.push(n);
+            assert_eq!(Tree::n_nodes_over(n.into()), tree.n_nodes.len() as u64, "{n}");
         }
     }
 }

@@ -1,6 +1,8 @@
 //! The arguments that `sprites`, `chunks`, `tiles`, `cull` and `sort` share: buffers, variant, view
 //! and depths of the blobs that they draw, select or sort.
 
+use glam::DVec3;
+
 use crate::gpu::RecordCount;
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
@@ -55,6 +57,21 @@ impl BlobVariant {
     }
 }
 
+/// The region of space that a group's particles are in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Center of the particles' positions, relative to the lighting origin.
+    pub center: DVec3,
+    /// The positions are within ± half of the center.
+    pub half: DVec3,
+    /// Greatest σ along any axis.
+    pub sigma_max: f64,
+    /// Mean σ along the shortest axis.
+    pub sigma_mean: f64,
+    /// Number of particles.
+    pub n_particles: u32,
+}
+
 /// The camera of a picture of blobs, and the bounds below which parts of it are left out.
 #[derive(Debug, Clone, Copy)]
 pub struct BlobView<'a> {
@@ -66,6 +83,8 @@ pub struct BlobView<'a> {
     pub threshold: f64,
     /// Transmittance below which a pixel hides everything behind it.
     pub saturated: f64,
+    /// Where the blobs' centres are, relative to the lighting origin; `None` where this is unknown.
+    pub extents: Option<&'a [Extent]>,
 }
 
 impl BlobView<'_> {

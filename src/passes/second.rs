@@ -171,6 +171,8 @@ pub struct GatherVariant {
     pub has_tree: bool,
     /// Some region has a specular lobe.
     pub is_glossy: bool,
+    /// Few registers are used, at the cost of more loads: for devices that are no CPU.
+    pub is_wide: bool,
     /// Bound of a dispatch.
     pub budget: IterationBudget,
 }
@@ -191,6 +193,7 @@ impl Gather {
             let shared = [
                 ("WORKGROUP", block_len(device)),
                 ("MARCH", u32::from(variant.has_clouds)),
+                ("WIDE", u32::from(variant.is_wide)),
                 ("GLOSSY", glossy),
                 ("SPLIT_ITERATIONS", budget.quarter),
                 ("BATCH_ITERATIONS", budget.batch),
@@ -215,7 +218,7 @@ impl Gather {
     ) -> Result<()> {
         let (kernel, all) = (&self.0[receivers as usize], buffers.by_binding());
         match push.i_round {
-            0 => rec.dispatch_groups(kernel, &all, push, n_blocks),
+            0 => rec.dispatch_blocks(kernel, &all, push, n_blocks),
             i => rec.dispatch_indirect(kernel, &all, push, (buffers.rounds, 3 * i)),
         }
     }

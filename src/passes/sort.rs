@@ -32,13 +32,25 @@ pub const TILE: u32 = 1024;
 const DIGIT_BITS: u32 = 8;
 const MAX_DIGIT_BITS: u32 = 9;
 
+/// Counts of a block of the table; the shaders' COUNTS_OF_BLOCK.
+const COUNTS_OF_BLOCK: u64 = 2048;
+/// Entries from which on the table is scanned by blocks: one workgroup takes longer then.
+const LEAST_BY_BLOCKS: u32 = 1 << 18;
+
+/// Returns the counts of the table.
+fn n_counts(n_max: u64, digit_bits: u32) -> u64 {
+    n_max.div_ceil(u64::from(TILE)) << digit_bits
+}
+
 buffers! {
     /// Scratch of the pass for a number of entries and bits of a digit.
     pub struct Scratch(n_max: u64, digit_bits: u32) {
         /// Number of entries by digit and tile.
-        table: Buffer => u32, n_max.div_ceil(u64::from(TILE)) << digit_bits, "sort.table";
+        table: Buffer => u32, n_counts(n_max, digit_bits), "sort.table";
         /// Entries on their way between passes.
         swapped: Buffer => [u32; 2], n_max, "sort.swapped";
+        /// Sums of the table's blocks.
+        sums: Buffer => u32, n_counts(n_max, digit_bits).div_ceil(COUNTS_OF_BLOCK), "sort.sums";
     }
 }
 
@@ -58,14 +70,49 @@ pub enum Count<'a> {
     Counted(DeviceCount<'a>),
 }
 
+/// How a device sorts. Both forms give the same order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Form {
+    /// Invocations of a subgroup find equal digits by ballots.
+    pub ballots: bool,
+    /// The table is scanned by blocks, in parallel over the device.
+    pub blocks: bool,
+}
+
+impl Form {
+    /// Returns the form that suits a device and a number of entries. A CPU runs few workgroups at
+    /// once, and looks at memory faster than it votes.
+    fn of(device: &Device, n_max: u32) -> Form {
+        let is_wide = device.info().kind != "cpu";
+        let limits = device.limits();
+        Form {
+            ballots: is_wide && limits.is_one_subgroup(ballot_invocations(device)),
+            blocks: is_wide && n_max >= LEAST_BY_BLOCKS,
+        }
+    }
+}
+
+/// Returns the invocations of a workgroup that sorts by ballots.
+fn ballot_invocations(device: &Device) -> u32 {
+    device.limits().subgroup_size.clamp(8, 64)
+}
+
 /// The pipelines and scratch buffers of the pass.
 pub struct Sort {
     key: Kernel,
     count: Kernel,
-    scan: Kernel,
+    scan: Scan,
     scatter: Kernel,
     scratch: Scratch,
     digit_bits: u32,
+}
+
+/// The kernels that scan the table.
+enum Scan {
+    /// In one workgroup.
+    Alone(Kernel),
+    /// Sums of blocks, their scan, and a scan of each block.
+    Blocks(Box<[Kernel; 3]>),
 }
 
 impl Sort {
@@ -74,7 +121,7 @@ impl Sort {
     /// # Errors
     /// Fails if a shader does not compile or the device cannot hold the scratch buffers.
     pub fn new(device: &Device, compiler: &Compiler, n_max: u32) -> Result<Sort> {
-        Sort::with_digits(device, compiler, n_max, DIGIT_BITS)
+        Sort::with_form(device, compiler, n_max, DIGIT_BITS, Form::of(device, n_max))
     }
 
     /// Creates a sort of at most `n_max` entries with keys of `n_bits`, in as few passes as
@@ -83,37 +130,59 @@ impl Sort {
     /// # Errors
     /// Fails if a shader does not compile or the device cannot hold the scratch buffers.
     pub fn for_bits(device: &Device, compiler: &Compiler, n_max: u32, n_bits: u32) -> Result<Sort> {
-        let limits = device.limits();
-        // Every invocation has the counters of a tile, two a word, and a digit to itself.
-        let words = (1 << MAX_DIGIT_BITS) / 2 * limits.subgroup_size.clamp(8, 32);
+        let (limits, form) = (device.limits(), Form::of(device, n_max));
+        // By ballots a digit has a word. Otherwise every invocation has the counters of a tile, two
+        // a word. Each invocation of a scan has a digit.
+        let words = match form.ballots {
+            true => 1 << MAX_DIGIT_BITS,
+            false => (1 << MAX_DIGIT_BITS) / 2 * limits.subgroup_size.clamp(8, 32),
+        };
         let fits = 4 * words <= limits.max_shared_memory_bytes
             && 1 << MAX_DIGIT_BITS <= limits.max_workgroup_invocations;
         let n_passes = n_bits.div_ceil(if fits { MAX_DIGIT_BITS } else { DIGIT_BITS });
-        Sort::with_digits(device, compiler, n_max, n_bits.div_ceil(n_passes.max(1)).max(1))
+        let digit_bits = n_bits.div_ceil(n_passes.max(1)).max(1);
+        Sort::with_form(device, compiler, n_max, digit_bits, form)
     }
 
-    fn with_digits(
+    /// Creates a sort of a given form, by digits of `digit_bits`.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or the device cannot hold the scratch buffers.
+    pub fn with_form(
         device: &Device,
         compiler: &Compiler,
         n_max: u32,
         digit_bits: u32,
+        form: Form,
     ) -> Result<Sort> {
-        // A tile is one subgroup, so that shared memory holds the counters.
-        let invocations = device.limits().subgroup_size.clamp(8, 32);
+        // A tile is one subgroup. Without ballots shared memory holds the counters of 32 at most.
+        let invocations = match form.ballots {
+            true => ballot_invocations(device),
+            false => device.limits().subgroup_size.clamp(8, 32),
+        };
         let is_one_subgroup = u32::from(device.limits().is_one_subgroup(invocations));
         let macros = [
             ("TILE_INVOCATIONS", invocations),
             ("ONE_SUBGROUP", is_one_subgroup),
             ("DIGIT_BITS", digit_bits),
+            ("BALLOT", u32::from(form.ballots)),
         ];
         let kernel = |name, macros: &[_]| {
             Kernel::with_macros(device, compiler, name, DigitPush::FIELDS, &[], macros)
         };
+        // A scan has an invocation a digit or eight counts, in whatever subgroups that makes.
+        let of_scan = &macros[2..3];
         Ok(Sort {
             key: Kernel::new(device, compiler, "sort.key", KeyPush::FIELDS)?,
-            count: kernel("sort.count", &macros)?,
-            // The scan has an invocation a digit, in whatever subgroups that makes.
-            scan: kernel("sort.scan", &macros[2..])?,
+            count: kernel("sort.count", &macros[..3])?,
+            scan: match form.blocks {
+                false => Scan::Alone(kernel("sort.scan", of_scan)?),
+                true => Scan::Blocks(Box::new([
+                    kernel("sort.sums", of_scan)?,
+                    kernel("sort.bases", of_scan)?,
+                    kernel("sort.spread", of_scan)?,
+                ])),
+            },
             scatter: kernel("sort.scatter", &macros)?,
             scratch: Scratch::new(device, n_max.into(), digit_bits)?,
             digit_bits,
@@ -150,7 +219,7 @@ impl Sort {
         n_bits: u32,
         n: Count<'_>,
     ) -> Result<&'a Buffer> {
-        let Scratch { table, swapped } = &self.scratch;
+        let Scratch { table, swapped, .. } = &self.scratch;
         let (mut from, mut to) = (entries, swapped);
         for shift in (0..n_bits).step_by(self.digit_bits as usize) {
             match n {
@@ -158,19 +227,46 @@ impl Sort {
                     let push = DigitPush { n_entries, i_count: NO_COUNT, shift };
                     let n = n_entries.div_ceil(TILE);
                     rec.dispatch_groups(&self.count, &[from, from, table], &push, n)?;
-                    rec.dispatch_groups(&self.scan, &[from, table], &push, n.min(1))?;
+                    self.record_scan(rec, from, &push, |rec, kernel, buffers| {
+                        rec.dispatch_groups(kernel, buffers, &push, n)
+                    })?;
                     rec.dispatch_groups(&self.scatter, &[from, from, table, to], &push, n)?;
                 }
                 Count::Counted(DeviceCount { buffer, i_count, i_groups }) => {
                     let push = DigitPush { n_entries: 0, i_count, shift };
                     let n = (buffer, i_groups);
                     rec.dispatch_indirect(&self.count, &[buffer, from, table], &push, n)?;
-                    rec.dispatch_groups(&self.scan, &[buffer, table], &push, 1)?;
+                    self.record_scan(rec, buffer, &push, |rec, kernel, buffers| {
+                        rec.dispatch_indirect(kernel, buffers, &push, n)
+                    })?;
                     rec.dispatch_indirect(&self.scatter, &[buffer, from, table, to], &push, n)?;
                 }
             }
             std::mem::swap(&mut from, &mut to);
         }
         Ok(from)
+    }
+
+    /// Scans the table to an exclusive prefix sum. `counted` holds the number of entries, and
+    /// `by_tiles` dispatches a kernel with a workgroup a tile of entries. Blocks need fewer.
+    fn record_scan<'a>(
+        &'a self,
+        rec: &mut Recorder<'_>,
+        counted: &'a Buffer,
+        push: &DigitPush,
+        by_tiles: impl Fn(&mut Recorder<'_>, &Kernel, &[&'a Buffer]) -> Result<()>,
+    ) -> Result<()> {
+        let Scratch { table, sums, .. } = &self.scratch;
+        // Of a known number of 0 no workgroup runs.
+        let n = if push.i_count == NO_COUNT { push.n_entries.min(1) } else { 1 };
+        match &self.scan {
+            Scan::Alone(scan) => rec.dispatch_groups(scan, &[counted, table], push, n),
+            Scan::Blocks(kernels) => {
+                let [of_blocks, bases, spread] = &**kernels;
+                by_tiles(rec, of_blocks, &[counted, table, sums])?;
+                rec.dispatch_groups(bases, &[counted, sums], push, n)?;
+                by_tiles(rec, spread, &[counted, table, sums])
+            }
+        }
     }
 }

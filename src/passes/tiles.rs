@@ -22,7 +22,7 @@ use crate::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 pub use division::{Division, RUN, TILES_ACROSS, invocations};
 pub use push::{ClearPush, PairsPush, Push, RangesPush, RoundsPush, SplatPush};
 pub use rounds::BLOCK;
-use rounds::{MAX_BLOCKS, Rounds};
+use rounds::Rounds;
 
 /// The greatest optical depth of a blob that the kernels for thin scenes handle.
 pub const THIN: f64 = 0.125;
@@ -99,8 +99,7 @@ pub struct Tiles {
     compose: Option<Kernel>,
     division: Division,
     n_compose_bindings: usize,
-    capacity: u32,
-    n_rounds: u32,
+    rounds_spec: Rounds,
     max_groups: u32,
     max_tiles: u32,
     scratch: Scratch,
@@ -126,11 +125,11 @@ impl Tiles {
     ) -> Result<Tiles> {
         let Variant { blobs, format, has_under, tau_max, portable, .. } = *variant;
         let limits = device.limits();
-        let rounds = Rounds::new(n_max, &division, limits, variant.max_pairs)?;
+        let is_one_subgroup = !portable && limits.is_one_subgroup(division.invocations);
+        let rounds = Rounds::new(n_max, &division, limits, (variant.max_pairs, is_one_subgroup))?;
         let constants = blobs.constants();
         let pixel_words = pixel_words(format) as u32;
         let together = 4 / pixel_words;
-        let is_one_subgroup = !portable && limits.is_one_subgroup(division.invocations);
         let macros = [
             ("INVOCATIONS", division.invocations),
             ("ROWS", division.tile[1]),
@@ -153,7 +152,7 @@ impl Tiles {
         };
         Ok(Tiles {
             splat: kernel("tiles.splat", SplatPush::FIELDS, &constants, &macros[..3])?,
-            rounds: kernel("tiles.rounds", RoundsPush::FIELDS, &[], &[])?,
+            rounds: kernel("tiles.rounds", RoundsPush::FIELDS, &[], &macros[..3])?,
             clear: kernel("tiles.clear", ClearPush::FIELDS, &[], &[])?,
             pairs: kernel("tiles.pairs", PairsPush::FIELDS, &constants, &[])?,
             ranges: kernel("tiles.ranges", RangesPush::FIELDS, &[], &[])?,
@@ -166,8 +165,7 @@ impl Tiles {
                 _ if has_under => 8,
                 _ => 6,
             },
-            capacity: rounds.capacity as u32,
-            n_rounds: rounds.n,
+            rounds_spec: rounds,
             max_groups: limits.max_workgroups_x,
             max_tiles: variant.max_tiles.unwrap_or(default_max_tiles(device)),
             scratch: Scratch::new(device, n_max.into(), division, rounds, *variant)?,
@@ -176,12 +174,12 @@ impl Tiles {
 
     /// Returns the most pairs of a round.
     pub fn capacity(&self) -> u32 {
-        self.capacity
+        self.rounds_spec.capacity as u32
     }
 
-    /// Returns the most rounds of a frame.
-    pub fn n_rounds(&self) -> u32 {
-        self.n_rounds
+    /// Returns the most rounds of a frame with this view.
+    pub fn n_rounds(&self, view: &BlobView<'_>) -> u32 {
+        self.rounds_spec.of_frame(&self.division, view)
     }
 
     fn kept<'a>(&'a self, n: RecordCount<'a>) -> &'a Buffer {
@@ -230,14 +228,14 @@ impl Tiles {
         ];
         rec.dispatch_indirect(&self.splat, &all, &push, (kept, KeptRecord::I_SPLAT))?;
         let push = RoundsPush {
-            n_rounds: self.n_rounds,
-            capacity: self.capacity,
-            most_blocks: MAX_BLOCKS,
+            n_rounds: self.rounds_spec.n,
+            capacity: self.capacity(),
+            most_blocks: self.rounds_spec.most_blocks,
             sort_tile,
             bin_groups: n_bins.div_ceil(self.ranges.local_size_x()),
         };
         rec.dispatch_groups(&self.rounds, &[blocks, round, kept], &push, 1)?;
-        if self.n_rounds == 1 {
+        if self.rounds_spec.n == 1 {
             return Ok(());
         }
         let push = ClearPush { n_pixels: self.division.n_pixels() as u32, unused: 0 };

@@ -7,7 +7,8 @@ use bytemuck::Pod;
 use crate::error::{Error, Result};
 use crate::frame::{DeviceChoice, GpuContext, Player};
 use crate::gpu::{
-    Buffer, Commands, Compiler, Device, Field, Kernel, MemoryUsage, Recorder, Sources,
+    Buffer, Commands, Compiler, Device, DeviceOptions, Field, Kernel, MemoryUsage, Recorder,
+    Sources,
 };
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
@@ -106,12 +107,13 @@ impl StressContext {
         StressContext::with_sources(&self.choice, sources)
     }
 
-    /// Opens the device again with buffers that are filled with NaN at allocation.
+    /// Opens the device again with other options.
     ///
     /// # Errors
     /// Fails if the device cannot be opened.
-    pub(super) fn with_poison(&self) -> Result<StressContext> {
-        let choice = DeviceChoice { poison: true, ..self.choice.clone() };
+    pub(super) fn with_options(&self, change: fn(&mut DeviceOptions)) -> Result<StressContext> {
+        let mut choice = self.choice.clone();
+        change(&mut choice.options);
         StressContext::with_sources(&choice, self.sources.clone())
     }
 
@@ -153,7 +155,7 @@ impl StressContext {
 
     /// Evaluates `vec4 probe(vec4 x) { body }` for every input, and returns the inputs with their
     /// values. `body` may use the shader file `include` and, unless `table` is empty, its elements
-    /// as `samplerBuffer table`.
+    /// as `FLOATS table`.
     ///
     /// # Errors
     /// Fails if `body` does not compile, or a Vulkan call fails.
@@ -166,7 +168,7 @@ impl StressContext {
     ) -> Result<impl Iterator<Item = ([f32; 4], [f32; 4])> + use<>> {
         let mut above = format!("#include \"each.glsl\"\n#include \"{include}\"\n");
         if !table.is_empty() {
-            above.insert_str(0, "layout(binding = 2) uniform samplerBuffer table;\n");
+            above.insert_str(0, "#include \"buffers.glsl\"\nFLOATS(2, table)\n");
         }
         let text = PROBE.replace("ABOVE", &above).replace("BODY", body);
         let kernel = self.kernel("probe", &text, ProbePush::FIELDS, &[])?;

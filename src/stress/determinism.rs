@@ -1,7 +1,7 @@
 //! Frames that must have the same bytes however they are computed.
 //!
 //! The variants are: repeated, other workgroup sizes, one or two threads, with and without
-//! skipping, alone or in sequence, poisoned memory.
+//! skipping, alone or in sequence, guarded memory.
 
 use glam::DVec3;
 
@@ -78,12 +78,21 @@ pub const CASES: &[Case] = &[
         },
     },
     Case {
-        name: "determinism/poison",
-        what: "buffers filled with NaN at allocation, and buffers that are not",
+        name: "determinism/guard",
+        what: "buffers full of NaN with guard bands behind them, and buffers without",
         bound: "0: the same bytes",
         check: |ctx, c| {
-            let poisoned = ctx.with_poison()?;
-            same_on(ctx, c, poisoned)
+            let guarded = ctx.with_options(|options| options.guard = true)?;
+            same_on(ctx, c, guarded)
+        },
+    },
+    Case {
+        name: "determinism/parts",
+        what: "work submitted in parts of 0.2 ms, and in one submission a frame",
+        bound: "0: the same bytes",
+        check: |ctx, c| {
+            let parted = ctx.with_options(|options| options.max_submit_ms = Some(0.2))?;
+            same_on(ctx, c, parted)
         },
     },
 ];

@@ -1,14 +1,20 @@
-//! The base of every GPU test: a device with validation and synchronization validation, and the
-//! assertion that there are no messages when the test ends. Without a device or a validation layer
-//! the test fails.
+//! The base of every GPU test: a device with guard bands, validation and synchronization
+//! validation, and the assertion that there are no messages when the test ends. Without a device or
+//! a validation layer the test fails.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, MemoryUsage, Recorder};
+use nimbus::gpu::{
+    Buffer, Commands, Compiler, Device, DeviceOptions, Instance, LoweredLimits, MemoryUsage,
+    Recorder,
+};
 use nimbus::passes;
+
+/// The environment variable that names a file of lower limits for all tests.
+const LIMITS: &str = "NIMBUS_TEST_LIMITS";
 
 /// A device, and what a test needs to run kernels on it.
 pub struct Gpu {
@@ -20,8 +26,17 @@ pub struct Gpu {
 
 impl Gpu {
     pub fn new() -> Gpu {
+        Gpu::with_options(|_| {})
+    }
+
+    /// Opens the device with changed options.
+    pub fn with_options(change: impl FnOnce(&mut DeviceOptions)) -> Gpu {
         let instance = Instance::new(true).expect("an instance with validation");
-        let device = Device::open(&instance, None).expect("a Vulkan 1.3 device");
+        let limits = std::env::var_os(LIMITS);
+        let limits = limits.map(|path| LoweredLimits::read(path.as_ref()).expect("limits"));
+        let mut options = DeviceOptions { limits, guard: true, ..DeviceOptions::default() };
+        change(&mut options);
+        let device = Device::with_options(&instance, None, &options).expect("a Vulkan 1.3 device");
         let compiler =
             Compiler::new(passes::sources(), Compiler::default_cache()).expect("shaderc");
         let commands = Commands::new(&device, "test").expect("commands");

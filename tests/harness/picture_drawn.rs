@@ -232,7 +232,8 @@ impl Picture {
         let i_first_facet = uploaded.n_surface_facets;
         let n = BlobCount { n: RecordCount::Known(uploaded.n_entries), i_first_facet };
         let (cutoff, threshold) = (self.view.cutoff, self.view.threshold);
-        let view = |saturated: f64| BlobView { camera, cutoff, threshold, saturated };
+        let view =
+            |saturated: f64| BlobView { camera, cutoff, threshold, saturated, extents: None };
         let start = if self.scenery.is_some() { LoadOp::Load } else { LoadOp::Clear };
         match made {
             Made::Sprites(sprites) => sprites.record(rec, &from, (target, start), &view(0.0), n),

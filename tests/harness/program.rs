@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
@@ -13,6 +14,18 @@ pub fn nimbus(args: &[&str]) -> Command {
     command.env("NIMBUS_PROGRESS_S", "0");
     command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
+}
+
+/// Returns the scenes that nimbus comes with.
+pub fn scenes() -> Vec<PathBuf> {
+    let entries = std::fs::read_dir("scenes").expect("a folder");
+    let mut all: Vec<PathBuf> = entries
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
+        .collect();
+    all.sort();
+    assert!(all.len() > 10);
+    all
 }
 
 pub fn run(args: &[&str]) -> Output {

@@ -156,8 +156,13 @@ fn given(half: &Triangle, view: &View, ray: DVec3) -> Option<Hit> {
     Some(Hit { depth, s, t: hit.t.clamp(0.0, 1.0 - s), ..hit })
 }
 
-/// Returns the greatest visible depth around a pixel's centre, within the error of vertices;
-/// infinite if nothing is visible.
+/// Returns the greatest depth that a pixel may show, with all vertices moved by their error in any
+/// direction; infinite if it may show nothing.
+///
+/// The moved triangles decide which of them cover the pixel. Each has the depth of its plane on the
+/// ray through the pixel's own centre, and the nearest of these is shown. Behind an edge this depth
+/// can be greater than that of any visible place: SwiftShader, which has the 4 subpixel bits that
+/// Vulkan guarantees, draws pixels there, and lavapipe with its 8 bits seldom does.
 fn farthest<'a>(
     view: &View,
     halves: impl Iterator<Item = &'a Triangle> + Clone,
@@ -169,9 +174,12 @@ fn farthest<'a>(
     let rays = offsets
         .iter()
         .flat_map(|x| offsets.iter().map(move |y| view.ray(i, j) + *x * right + *y * down));
+    let own = view.ray(i, j);
     let nearest = |ray: DVec3| {
-        let depths = halves.clone().filter_map(move |h| h.hit(view, ray)).map(|hit| hit.depth);
-        depths.fold(f64::INFINITY, f64::min)
+        let depth = |half: &Triangle| {
+            half.hit(view, ray).map(|hit| given(half, view, own).unwrap_or(hit).depth)
+        };
+        halves.clone().filter_map(depth).fold(f64::INFINITY, f64::min)
     };
     rays.map(nearest).fold(0.0, f64::max)
 }

@@ -35,7 +35,8 @@ pub struct RenderArgs {
     /// Draw a reference in f64 instead of the device's picture: thin, volume, model, or
     /// reflections=K
     #[arg(long, value_name = "WHICH")]
-    #[arg(conflicts_with_all = ["device", "shaders", "validation", "no_skip"])]
+    #[arg(conflicts_with_all = ["device", "shaders", "validation", "guard", "max_submit_ms"])]
+    #[arg(conflicts_with_all = ["limits", "no_skip"])]
     pub reference: Option<ReferenceKind>,
     /// Samples of every pixel of a reference: the first through its centre, the others spread over
     /// it

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::values::parse_size;
+use super::values::{parse_limits, parse_positive, parse_size};
+use crate::gpu::LoweredLimits;
 
 /// Arguments of every command with a scene.
 #[derive(Debug, Clone, ClapArgs)]
@@ -18,10 +19,18 @@ pub struct SceneArgs {
     /// Run with the validation layers; any message fails the command
     #[arg(long, help_heading = "Device")]
     pub validation: bool,
-    /// Fill every new buffer with NaN, which shows where a pass reads what none has written; the
-    /// pictures are the same
+    /// Fill every new buffer with NaN, and check a pattern behind its end after each pass; a pass
+    /// that writes there fails the command, and the pictures are the same
     #[arg(long, help_heading = "Device")]
-    pub poison: bool,
+    pub guard: bool,
+    /// Submit work in parts that are predicted to take at most MS milliseconds each: the system may
+    /// take a busy GPU for hung [default: 500 on a GPU, no limit on a CPU]
+    #[arg(long, value_name = "MS", value_parser = parse_positive, help_heading = "Device")]
+    pub max_submit_ms: Option<f64>,
+    /// Run as a device of these lower limits would: a TOML file, such as
+    /// tests/data/limits/mali-g78.toml
+    #[arg(long, value_name = "FILE", value_parser = parse_limits, help_heading = "Device")]
+    pub limits: Option<LoweredLimits>,
     /// Seed of the first cloud; each further cloud has the next number
     #[arg(long, value_name = "N", help_heading = "Scene")]
     pub seed: Option<u32>,
@@ -44,10 +53,26 @@ pub struct SceneArgs {
 
 /// Arguments of `nimbus devices`.
 #[derive(Debug, ClapArgs)]
+#[command(after_help = "All devices, and what the driver's compiler makes of two scenes:\n  \
+    nimbus devices\n  nimbus devices --kernels scenes/hello.toml scenes/ground.toml")]
 pub struct DevicesArgs {
     /// The device to mark as used, by index or part of its name
     #[arg(long, value_name = "INDEX|NAME")]
     pub device: Option<String>,
+    /// Make every pipeline of these scenes without running any, and print what the driver's
+    /// compiler says of them: registers, spills, memory, occupancy, code
+    #[arg(long, value_name = "SCENE", num_args = 1.., help_heading = "Kernels")]
+    pub kernels: Vec<PathBuf>,
+    /// Set any key of the scenes (repeatable)
+    #[arg(long, value_name = "KEY=VALUE", requires = "kernels", help_heading = "Kernels")]
+    pub set: Vec<String>,
+    /// Folder with shaders that replace those built in
+    #[arg(long, value_name = "DIR", requires = "kernels", help_heading = "Kernels")]
+    pub shaders: Option<PathBuf>,
+    /// Make them as a device of these lower limits would
+    #[arg(long, value_name = "FILE", value_parser = parse_limits, requires = "kernels")]
+    #[arg(help_heading = "Kernels")]
+    pub limits: Option<LoweredLimits>,
     /// Print JSON instead of the table
     #[arg(long)]
     pub json: bool,

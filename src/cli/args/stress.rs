@@ -4,6 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
+use super::values::{parse_limits, parse_positive};
+use crate::gpu::LoweredLimits;
+
 /// Arguments of `nimbus stress`.
 #[derive(Debug, Clone, ClapArgs)]
 #[command(after_help = "The families of cases, the cases of one, and what one case checks:\n  \
@@ -34,6 +37,18 @@ pub struct StressArgs {
     /// Run with the validation layers; any message fails the command
     #[arg(long)]
     pub validation: bool,
+    /// Fill every new buffer with NaN, and check a pattern behind its end after each pass; a pass
+    /// that writes there breaks its case
+    #[arg(long)]
+    pub guard: bool,
+    /// Submit work in parts that are predicted to take at most MS milliseconds each: the system may
+    /// take a busy GPU for hung [default: 500 on a GPU, no limit on a CPU]
+    #[arg(long, value_name = "MS", value_parser = parse_positive)]
+    pub max_submit_ms: Option<f64>,
+    /// Run as a device of these lower limits would: a TOML file, such as
+    /// tests/data/limits/mali-g78.toml
+    #[arg(long, value_name = "FILE", value_parser = parse_limits)]
+    pub limits: Option<LoweredLimits>,
     /// No progress
     #[arg(short, long)]
     pub quiet: bool,

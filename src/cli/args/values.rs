@@ -1,7 +1,10 @@
 //! Parsers of argument values that several commands share.
 
+use std::path::Path;
+
 use clap::builder::RangedI64ValueParser;
 
+use crate::gpu::LoweredLimits;
 use crate::io::scene_file::MAX_SIDE;
 use crate::reference::picture::MAX_SAMPLES;
 
@@ -22,6 +25,11 @@ pub fn limited(
             format!("expected a number from {least} to {most} ({why}), found \"{text}\"")
         })
     }
+}
+
+/// Reads a file of lowered limits.
+pub fn parse_limits(path: &str) -> Result<LoweredLimits, String> {
+    LoweredLimits::read(Path::new(path)).map_err(|e| e.to_string())
 }
 
 /// Parses the number of timed blocks of a configuration.

@@ -10,6 +10,10 @@ use crate::gpu::PresentMode;
 
 /// Arguments of `nimbus view`.
 #[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Exit codes: 0 the window was closed, also by Ctrl-C; 2 bad input; 3 device \
+    or driver;\n  130 Ctrl-C before the window was open, or twice."
+)]
 pub struct ViewArgs {
     /// Scene file (TOML)
     pub scene: PathBuf,
@@ -35,6 +39,9 @@ pub struct ViewArgs {
 
 /// Arguments of `nimbus edit`.
 #[derive(Debug, ClapArgs)]
+#[command(after_help = "Exit codes: 0 the window was closed, also by Ctrl-C, which keeps unsaved \
+    boxes beside the file;\n  2 bad input; 3 device or driver; 130 Ctrl-C before the window was \
+    open, or twice.")]
 pub struct EditArgs {
     /// Box file, which need not exist yet [default: a new cloud without a file]
     pub file: Option<PathBuf>,

@@ -126,12 +126,12 @@ pub fn toml_name<T: PartialEq>(names: &[(&str, T)], value: T) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::model::sort_bits::SortBits;
 
-    /// A `draw` in which every knob is "auto".
-    const ASKED: Draw = Draw {
+    /// A `draw` in which every knob of the table is "auto".
+    pub const ASKED: Draw = Draw {
         path: DrawPath::Auto,
         impostors: Impostors::Off,
         impostor_error: 0.5,

@@ -8,6 +8,8 @@ mod rule;
 mod trial;
 
 pub use impostors::ImpostorChoice;
+#[cfg(test)]
+pub use knobs::tests::ASKED;
 pub use knobs::toml_name;
 pub use rule::{Candidate, Choice};
 

@@ -1,19 +1,28 @@
 //! The rounds of a frame: how many pairs of bins and splats are held at once.
 
-use super::division::Division;
+use glam::DVec3;
+
+use super::division::{Division, TILES_ACROSS};
 use crate::error::{Error, Result};
 use crate::gpu::Limits;
+use crate::passes::blobs::{BlobView, Extent};
 
 /// Splats of a block; the shaders' BLOCK.
 pub const BLOCK: u32 = 256;
-/// The most blocks of a round. A tile's loops take up to 0.8 iterations a splat, and llvmpipe ends
-/// all loops of an invocation after 65 535 iterations.
-pub(super) const MAX_BLOCKS: u32 = 256;
+/// Iterations of a tile's loops for each block, if its invocations are one subgroup: one for each
+/// splat is more than the 0.8 that they take.
+const ITERATIONS_PER_BLOCK: u32 = BLOCK;
+/// The same without subgroup operations, where an invocation also counts what the others have
+/// found: up to 1.6 for each splat.
+const ITERATIONS_PER_BLOCK_PORTABLE: u32 = 2 * BLOCK;
 /// The most blocks of a frame: workgroups along x that every device has.
 const MAX_BLOCKS_OF_FRAME: u32 = 65_535;
-/// The most pairs held at once: the sort visits its tiles of 1024 twice in an invocation, and
-/// llvmpipe's loops take 65 535 iterations.
-const MAX_PAIRS: u64 = 1 << 24;
+/// The most pairs held at once on any device: 512 MiB, and as much for the sort.
+const MAX_PAIRS: u64 = 1 << 26;
+/// Pairs that an invocation of the sort visits in four iterations: it walks its tiles twice.
+const PAIRS_PER_ITERATION: u64 = SORT_TILE / 4;
+/// Entries of a tile of the sort.
+const SORT_TILE: u64 = 1024;
 /// Bytes of a pixel that a round hands to the next: four floats.
 const STATE_BYTES: u64 = 16;
 
@@ -26,15 +35,18 @@ pub(super) struct Rounds {
     pub capacity: u64,
     /// Number of rounds.
     pub n: u32,
+    /// The most blocks of a round.
+    pub most_blocks: u32,
 }
 
 impl Rounds {
     /// Returns the rounds of `n_max` splats; `max_pairs` may lower the pairs held at once.
+    /// `is_one_subgroup`: a tile's invocations use subgroup operations.
     pub fn new(
         n_max: u32,
         division: &Division,
         limits: &Limits,
-        max_pairs: Option<u64>,
+        (max_pairs, is_one_subgroup): (Option<u64>, bool),
     ) -> Result<Rounds> {
         let n_blocks = n_max.div_ceil(BLOCK);
         if n_blocks > MAX_BLOCKS_OF_FRAME {
@@ -50,11 +62,18 @@ impl Rounds {
         let room = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes / 16) / 8;
         // Without room for the state between rounds, one round must hold all pairs.
         let least = if has_state_room { (all / 4).max(1 << 20) } else { all };
-        let max_pairs = max_pairs.unwrap_or(MAX_PAIRS);
+        let iterations = limits.max_loop_iterations;
+        let by_loops = PAIRS_PER_ITERATION.saturating_mul(u64::from(iterations) + 1);
+        let max_pairs = max_pairs.unwrap_or(MAX_PAIRS.min(by_loops));
+        let a_block_takes = match is_one_subgroup {
+            true => ITERATIONS_PER_BLOCK,
+            false => ITERATIONS_PER_BLOCK_PORTABLE,
+        };
+        let most_blocks = (iterations / a_block_takes).clamp(1, MAX_BLOCKS_OF_FRAME);
         let capacity = least.min(all).min(room).min(max_pairs).max(2 * a_block);
-        // Every round but the last has less room left than a block may need, or MAX_BLOCKS blocks.
+        // Every round but the last has less room left than a block may need, or all blocks.
         let n_by_pairs = all.div_ceil(capacity - a_block) as u32;
-        let n = if all <= capacity { 1 } else { n_by_pairs } + n_blocks.div_ceil(MAX_BLOCKS) - 1;
+        let n = if all <= capacity { 1 } else { n_by_pairs } + n_blocks.div_ceil(most_blocks) - 1;
         if n > 1 && !has_state_room {
             return Err(Error::limit(format!(
                 "draw.path = \"tiles\", the default: a picture of {}×{} is drawn in rounds where \
@@ -63,6 +82,66 @@ impl Rounds {
                 division.width, division.height, limits.max_storage_buffer_bytes
             )));
         }
-        Ok(Rounds { n_blocks, capacity, n })
+        Ok(Rounds { n_blocks, capacity, n, most_blocks })
+    }
+
+    /// Returns the most rounds that a frame needs: all if the places of the blobs are unknown.
+    pub fn of_frame(&self, division: &Division, view: &BlobView<'_>) -> u32 {
+        let Some(extents) = view.extents else { return self.n };
+        let (mut pairs, mut most) = (0, 0);
+        for extent in extents {
+            let bins = most_bins(division, view, extent);
+            pairs += u64::from(extent.n_particles) * bins;
+            most = most.max(bins);
+        }
+        // A round ends before the block that has no room, so that less than a block's pairs of it
+        // may be unused; or after the most blocks.
+        let used = self.capacity.saturating_sub(u64::from(BLOCK) * most).max(1);
+        let by_pairs = if pairs <= self.capacity { 1 } else { pairs.div_ceil(used) };
+        let by_blocks = self.n_blocks.div_ceil(self.most_blocks).max(1) - 1;
+        by_pairs.saturating_add(by_blocks.into()).min(self.n.into()) as u32
     }
 }
+
+/// Relative room for the rounding of slopes, and of a splat's own growth.
+const SLACK: f64 = 1.01;
+
+/// Returns the most bins that a blob of `extent` reaches: those of a ball at the extent's least
+/// depth, wherever it is seen.
+///
+/// A ball has radius R, depth z and distance x from the axis. Its slopes from the axis are
+/// (x z ± R √(x² + z² − R²)) / (z² − R²). It is in the picture if x < t z + R √(1 + t²); t is the
+/// slope at the picture's edge. The difference of its slopes grows with x and falls with z.
+fn most_bins(division: &Division, view: &BlobView<'_>, extent: &Extent) -> u64 {
+    let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    let forward = vector(view.camera.forward);
+    let middle = (extent.center - vector(view.camera.eye)).dot(forward);
+    let reach = extent.half.dot(forward.abs());
+    let radius = SLACK * view.cutoff * extent.sigma_max;
+    let near = f64::from(view.camera.near);
+    if SLACK * (middle + reach) < near {
+        return 0;
+    }
+    let z = (middle - reach).max(near) / SLACK;
+    let all = u64::from(division.n_bins);
+    // Near the ball its slopes are unbounded.
+    if z <= SLACK * radius || !z.is_finite() {
+        return all;
+    }
+    let Division { width, height, n_bins_x, .. } = *division;
+    let [bin_width, bin_height] = division.tile.map(|n| f64::from(TILES_ACROSS * n));
+    let along = |tangent: f32, pixels: u32, bin: f64, n_bins: u32| {
+        let t = f64::from(tangent);
+        let x = t * z + radius * (1.0 + t * t).sqrt();
+        let square = z * z - radius * radius;
+        let width = 2.0 * radius * (x * x + square).sqrt() / square;
+        // The picture is 2 t wide. A quad is widened by a part of a pixel.
+        let reached = (SLACK * width * f64::from(pixels) / (2.0 * t) + 2.0) / bin;
+        (reached.ceil() as u64 + 1).min(n_bins.into())
+    };
+    let across = along(view.camera.tan_x, width, bin_width, n_bins_x);
+    across * along(view.camera.tan_y, height, bin_height, division.n_bins / n_bins_x)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,445 @@
+//! nimbus on drivers that fail: no device, devices that it cannot use, and every Vulkan call that
+//! can fail, failing.
+//!
+//! `fake_driver/icd.c` is a Vulkan driver that passes all calls on to lavapipe, but for the faults
+//! that environment variables ask for. It also counts the objects that are never destroyed.
+
+#[path = "harness/fixtures.rs"]
+mod fixtures;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use fixtures::Fixtures;
+use rayon::prelude::*;
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Folders in which the loader looks for the manifests of drivers.
+const MANIFEST_FOLDERS: [&str; 3] =
+    ["/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/usr/share/vulkan/icd.d"];
+/// Variables that name manifests, the newer one first.
+const MANIFEST_VARIABLES: [&str; 2] = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"];
+/// A run takes a fraction of a second. One that takes longer than this hangs.
+const MOST_S: u64 = 120;
+/// Distinct calls that the runs below make and that can fail, without `ASKED_BY_TIME`. Fewer are a
+/// sign that the driver no longer counts a call that nimbus makes.
+const N_CALLS: usize = 30;
+/// The call whose number differs from run to run.
+const ASKED_BY_TIME: &str = "vkGetSemaphoreCounterValue";
+/// Exit codes of a device that fails, and of a limit.
+const DEVICE: i32 = 3;
+const LIMIT: i32 = 2;
+
+/// The fake driver, compiled, and a folder with a small scene.
+struct FakeDriver {
+    scene: Fixtures,
+    folder: TempDir,
+    /// Library of the driver that does the work.
+    real: String,
+}
+
+/// A run of nimbus that has ended.
+struct Ended {
+    status: ExitStatus,
+    stdout: String,
+    stderr: String,
+    /// Lines that the fake driver has logged.
+    log: String,
+    /// Folder in which the run writes.
+    out: TempDir,
+}
+
+/// A command that writes its results into the folder `{}`.
+#[derive(Clone, Copy)]
+struct Job {
+    line: &'static str,
+}
+
+const RENDER: Job = Job { line: "render s.toml -q -o {}/a.png" };
+const BENCH: Job = Job { line: "bench s.toml -q --frames 3 --warmup 0 --out {}/run" };
+
+/// One fault in one run.
+struct Fault {
+    job: Job,
+    call: String,
+    /// Number of the call that fails, from 1.
+    n: u64,
+    result: &'static str,
+}
+
+/// The place of a call among all calls of its kind.
+#[derive(Clone, Copy)]
+enum Place {
+    First,
+    Second,
+    Middle,
+    Last,
+}
+
+impl FakeDriver {
+    fn new() -> FakeDriver {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, define) in [("first", "-DFIRST"), ("second", "-DSECOND")] {
+            let library = folder.path().join(format!("lib{name}.so"));
+            compile(&library, define);
+            let manifest = serde_json::json!({
+                "file_format_version": "1.0.0",
+                "ICD": { "library_path": library, "api_version": "1.3.0" },
+            });
+            let path = folder.path().join(format!("{name}.json"));
+            fs::write(path, manifest.to_string()).expect("room");
+        }
+        FakeDriver { scene: Fixtures::new(), folder, real: lavapipe() }
+    }
+
+    /// Returns the manifests of drivers of these names, as the loader's variables list them.
+    fn manifests(&self, names: &[&str]) -> String {
+        let path =
+            |name: &&str| self.folder.path().join(format!("{name}.json")).display().to_string();
+        names.iter().map(path).collect::<Vec<_>>().join(":")
+    }
+
+    /// Runs a command line on the first driver, with variables of the fake driver or the loader.
+    fn run(&self, line: &str, variables: &[(&str, &str)]) -> Ended {
+        self.run_in(tempfile::tempdir_in(self.scene.dir.path()).expect("a folder"), line, variables)
+    }
+
+    /// Runs a command line that writes into the folder `out`.
+    fn run_in(&self, out: TempDir, line: &str, variables: &[(&str, &str)]) -> Ended {
+        let notes = tempfile::tempdir_in(self.folder.path()).expect("a folder");
+        let [stdout, stderr, log] = ["stdout", "stderr", "log"].map(|n| notes.path().join(n));
+        let line = line.replace("{}", &out.path().display().to_string());
+        let mut command = self.scene.command(line.split(' '));
+        let manifests = self.manifests(&["first"]);
+        command.envs(MANIFEST_VARIABLES.map(|name| (name, &manifests)));
+        command.env("NIMBUS_FAKE_REAL", &self.real).env("NIMBUS_FAKE_LOG", &log);
+        command.envs(variables.iter().copied());
+        // Files, and not pipes, which a program that hangs would leave open.
+        command.stdin(Stdio::null());
+        command.stdout(fs::File::create(&stdout).expect("room"));
+        command.stderr(fs::File::create(&stderr).expect("room"));
+        let status = end(&mut command, &format!("{line} {variables:?}"));
+        let [stdout, stderr, log] = [stdout, stderr, log]
+            .map(|path| String::from_utf8_lossy(&fs::read(path).unwrap_or_default()).into_owned());
+        Ended { status, stdout, stderr, log, out }
+    }
+
+    /// Returns how often a job makes each call that can fail.
+    fn counts(&self, job: Job) -> BTreeMap<String, u64> {
+        let path = self.folder.path().join("counts");
+        let _ = fs::remove_file(&path);
+        let ended = self.run(job.line, &[("NIMBUS_FAKE_COUNTS", path.to_str().expect("UTF-8"))]);
+        assert!(ended.status.success() && ended.log.is_empty(), "{}{}", ended.stderr, ended.log);
+        let text = fs::read_to_string(path).expect("the counts");
+        let row = |line: &str| {
+            let (call, n) = line.split_once(' ').expect("two words");
+            (call.to_owned(), n.parse().expect("a number"))
+        };
+        text.lines().map(row).collect()
+    }
+
+    /// Runs a job with a fault and returns what is wrong with its end.
+    fn complaints(&self, fault: &Fault) -> Vec<String> {
+        let Fault { job, call, n, result } = fault;
+        let asked = format!("{call}:{n}:{result}");
+        let injected = format!("fault: {call} {n}\n");
+        let run = || self.run(job.line, &[("NIMBUS_FAKE_FAIL", &asked)]);
+        // The first run with the fault, or the last one.
+        let mut ended = run();
+        for _ in 1..n_tries(call) {
+            if !ended.log.contains(&injected) {
+                ended = run();
+            }
+        }
+        let (code, log, stderr) = (ended.status.code(), &ended.log, ended.stderr.trim_end());
+        let mut found = vec![];
+        if !log.contains(&injected) {
+            found.push(format!("the call was made fewer than {n} times"));
+        }
+        if log.contains("leak:") {
+            found.push("objects outlive the device".to_owned());
+        }
+        // Nothing can be freed that a hung device may still use.
+        if *result != "HANG" && log.contains("alive at exit") {
+            found.push("the device is never destroyed".to_owned());
+        }
+        if log.contains("never returns") || log.matches("waited").count() > 2 {
+            found.push("a device that hangs is waited for again".to_owned());
+        }
+        match (code, *result) {
+            // The results are complete when the program waits for the last time.
+            (Some(0), _) if is_last_wait(call) => found.extend(ended.faults_of_results(false)),
+            (Some(DEVICE), _) | (Some(LIMIT), "OUT_OF_DEVICE_MEMORY" | "OUT_OF_HOST_MEMORY") => {
+                found.extend(faults_of_message(stderr));
+                found.extend(ended.faults_of_results(true));
+            }
+            _ => found.push(format!("unexpected end: {}", ended.status)),
+        }
+        let seen = || format!("{}: {asked}: stderr: {stderr}; log: {log}", job.line);
+        found.into_iter().map(|what| format!("{what}: {}", seen())).collect()
+    }
+}
+
+/// Returns the number of runs in which a call must be made often enough to fail. A loop asks for a
+/// semaphore's value as often as it finds frames in flight, which is a matter of time.
+fn n_tries(call: &str) -> usize {
+    if call == ASKED_BY_TIME { 10 } else { 1 }
+}
+
+/// Whether a call waits for the device at the very end, when no result is left to be written.
+fn is_last_wait(call: &str) -> bool {
+    ["vkDeviceWaitIdle", "vkWaitSemaphores"].contains(&call)
+}
+
+/// Compiles the fake driver.
+fn compile(library: &Path, define: &str) {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fake_driver/icd.c");
+    let options = ["-std=gnu11", "-O1", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"];
+    let mut command = Command::new("cc");
+    command.args(options).args(["-fvisibility=hidden", define, "-o"]).arg(library).arg(source);
+    let output = command.args(["-ldl", "-lpthread"]).output();
+    let output = output.expect("`cc`, a C compiler, which tools/bootstrap installs");
+    assert!(output.status.success(), "cc: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// Returns the library of Mesa's software driver.
+fn lavapipe() -> String {
+    let named = MANIFEST_VARIABLES.iter().filter_map(std::env::var_os);
+    let places = named.flat_map(|paths| std::env::split_paths(&paths).collect::<Vec<_>>());
+    let files = |place: PathBuf| match fs::read_dir(&place) {
+        Ok(entries) => entries.flatten().map(|entry| entry.path()).collect(),
+        Err(_) => vec![place],
+    };
+    let is_lavapipe = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("lvp_icd") && name.ends_with(".json") && path.is_file()
+    };
+    let manifest = places
+        .chain(MANIFEST_FOLDERS.map(PathBuf::from))
+        .flat_map(files)
+        .find(is_lavapipe)
+        .expect("lavapipe's manifest lvp_icd.*.json, which tools/bootstrap installs");
+    let text = fs::read_to_string(&manifest).expect("the manifest");
+    let json: Value = serde_json::from_str(&text).expect("JSON");
+    let library = json["ICD"]["library_path"].as_str().expect("a path");
+    // A name without a folder is searched for by the linker, another one from the manifest on.
+    match library.contains('/') {
+        true => manifest.with_file_name(library).display().to_string(),
+        false => library.to_owned(),
+    }
+}
+
+/// Waits for a command to end; kills it if it hangs.
+fn end(command: &mut Command, what: &str) -> ExitStatus {
+    let mut child = command.spawn().expect("it runs");
+    let start = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().expect("a child") {
+            return status;
+        }
+        if start.elapsed() > Duration::from_secs(MOST_S) {
+            child.kill().and_then(|()| child.wait()).expect("a child");
+            panic!("{what}: still running after {MOST_S} s");
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Returns what is wrong with the message of a run that failed.
+fn faults_of_message(stderr: &str) -> Vec<String> {
+    let is_one = stderr.lines().count() == 1 && stderr.starts_with("error: ");
+    let names_source = stderr.contains(".rs") || stderr.contains("panicked");
+    let is_leak = stderr.contains("leak");
+    let faults = [
+        (!is_one, "not one message"),
+        (names_source, "the message is for programmers"),
+        (is_leak, "memory is leaked"),
+    ];
+    faults.iter().filter(|(is_so, _)| *is_so).map(|(_, what)| (*what).to_owned()).collect()
+}
+
+impl Ended {
+    /// Returns the names in the folder that the run has written to.
+    fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.out.path()).expect("the folder");
+        let name = |path: PathBuf| path.file_name().map(|n| n.to_string_lossy().into_owned());
+        let mut all: Vec<String> =
+            entries.filter_map(|entry| name(entry.expect("an entry").path())).collect();
+        all.sort();
+        all
+    }
+
+    /// Returns what is wrong with the files that are left: whole results or nothing.
+    fn faults_of_results(&self, is_cut: bool) -> Vec<String> {
+        let names = self.names();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        match (&names[..], is_cut) {
+            ([], true) => vec![],
+            (["a.png"], false) => match image::open(self.out.path().join("a.png")) {
+                Ok(picture) if (picture.width(), picture.height()) == (32, 24) => vec![],
+                _ => vec!["a.png is no picture".to_owned()],
+            },
+            (["run"], _) => match kept_frames(&self.out.path().join("run"), is_cut) {
+                Ok(_) => vec![],
+                Err(what) => vec![what],
+            },
+            _ => vec![format!("unexpected files: {names:?}")],
+        }
+    }
+}
+
+/// Returns the number of frames in results, whose files must be whole and which must say whether
+/// they were cut short.
+fn kept_frames(folder: &Path, is_cut: bool) -> Result<usize, String> {
+    let mut check = Command::new("sha256sum");
+    check.args(["--quiet", "--strict", "-c", "run.sha256"]).current_dir(folder);
+    let check = check.output().expect("sha256sum runs");
+    if !check.status.success() {
+        return Err(format!("damaged results: {}", String::from_utf8_lossy(&check.stderr)));
+    }
+    let read = |name| fs::read_to_string(folder.join(name)).map_err(|e| format!("{name}: {e}"));
+    let run: Value = serde_json::from_str(&read("run.json")?).map_err(|e| e.to_string())?;
+    if run["interrupted"] != is_cut {
+        return Err(format!("interrupted is {}", run["interrupted"]));
+    }
+    match read("frames.csv")?.lines().skip(1).count() {
+        0 => Err("no frame is kept".to_owned()),
+        n => Ok(n),
+    }
+}
+
+/// Returns the faults of a job: each call with each pair of a place and a result.
+fn faults(driver: &FakeDriver, job: Job, picks: &[(Place, &'static str)]) -> Vec<Fault> {
+    let fault = |call: &str, n, result| Fault { job, call: call.to_owned(), n, result };
+    let mut all = vec![];
+    let counts = driver.counts(job);
+    all.extend(
+        [1, 2, counts["vkWaitSemaphores"] / 2].map(|n| fault("vkWaitSemaphores", n, "HANG")),
+    );
+    for (call, n_calls) in counts {
+        for (place, result) in picks {
+            let n = match place {
+                Place::First => 1,
+                Place::Second => 2,
+                Place::Middle => n_calls.div_ceil(2),
+                Place::Last if call == ASKED_BY_TIME => 1,
+                Place::Last => n_calls,
+            };
+            if n <= n_calls {
+                all.push(fault(&call, n, *result));
+            }
+        }
+    }
+    let openings = ["vkCreateInstance", "vkEnumeratePhysicalDevices", "vkCreateDevice"];
+    all.extend(openings.map(|call| fault(call, 1, "INITIALIZATION_FAILED")));
+    // Places coincide where a call is made a few times.
+    all.sort_by(|a, b| (&a.call, a.n, a.result).cmp(&(&b.call, b.n, b.result)));
+    all.dedup_by(|a, b| (&a.call, a.n, a.result) == (&b.call, b.n, b.result));
+    all
+}
+
+#[test]
+fn every_failing_call_ends_the_program_with_one_message() {
+    let driver = FakeDriver::new();
+    // Together the two jobs have every call fail early, in the middle and late.
+    let render = [
+        (Place::First, "DEVICE_LOST"),
+        (Place::Middle, "DEVICE_LOST"),
+        (Place::First, "OUT_OF_DEVICE_MEMORY"),
+        (Place::Second, "OUT_OF_HOST_MEMORY"),
+    ];
+    let bench = [
+        (Place::Second, "DEVICE_LOST"),
+        (Place::Middle, "DEVICE_LOST"),
+        (Place::Last, "DEVICE_LOST"),
+        (Place::Middle, "OUT_OF_DEVICE_MEMORY"),
+        (Place::First, "OUT_OF_HOST_MEMORY"),
+    ];
+    let mut all = faults(&driver, RENDER, &render);
+    all.extend(faults(&driver, BENCH, &bench));
+    let mut calls: Vec<&str> = all.iter().map(|fault| &fault.call[..]).collect();
+    calls.retain(|call| *call != ASKED_BY_TIME);
+    calls.sort_unstable();
+    calls.dedup();
+    assert!(calls.len() >= N_CALLS, "{} calls: {calls:?}", calls.len());
+    let found: Vec<String> =
+        all.par_iter().flat_map_iter(|fault| driver.complaints(fault)).collect();
+    let n = all.len();
+    assert!(found.is_empty(), "{} faults in {n} runs:\n{}", found.len(), found.join("\n"));
+}
+
+#[test]
+fn frames_before_a_loss_are_kept() {
+    let driver = FakeDriver::new();
+    let n_submits = driver.counts(BENCH)["vkQueueSubmit2"];
+    let late = format!("vkQueueSubmit2:{}:DEVICE_LOST", n_submits - 2);
+    let lost = [("NIMBUS_FAKE_FAIL", &late[..])];
+    let first = driver.run(BENCH.line, &lost);
+    assert_eq!(first.status.code(), Some(DEVICE), "{}", first.stderr);
+    // Two rounds of three loops of three frames, of which the last may be missing.
+    let n_kept = kept_frames(&first.out.path().join("run"), true).unwrap_or_else(|e| panic!("{e}"));
+    assert!((15..=18).contains(&n_kept), "{n_kept} frames");
+
+    // Earlier results stay where they are.
+    let whole = driver.run(BENCH.line, &[]);
+    assert!(whole.status.success(), "{}", whole.stderr);
+    let second = driver.run_in(whole.out, &format!("{} --force", BENCH.line), &lost);
+    assert_eq!(second.status.code(), Some(DEVICE), "{}", second.stderr);
+    assert_eq!(second.names(), ["run", "run.partial"]);
+    let kept = |name, is_cut| {
+        kept_frames(&second.out.path().join(name), is_cut).unwrap_or_else(|e| panic!("{e}"))
+    };
+    assert_eq!((kept("run", false), kept("run.partial", true)), (18, n_kept));
+}
+
+#[test]
+fn the_list_of_devices_is_clear_on_every_machine() {
+    let driver = FakeDriver::new();
+    let devices = |variables: &[(&str, &str)], code: i32| {
+        let ended = driver.run("devices", variables);
+        let what = format!("{variables:?}: {}{}", ended.stdout, ended.stderr);
+        assert_eq!(ended.status.code(), Some(code), "{what}");
+        if code == 0 {
+            assert_eq!(ended.stderr, "", "{what}");
+        } else {
+            assert_eq!(faults_of_message(ended.stderr.trim_end()), [""; 0], "{what}");
+        }
+        (ended.stdout, ended.stderr)
+    };
+    let one = devices(&[], 0).0;
+    assert!(one.starts_with("0: llvmpipe") && one.matches("<- used").count() == 1, "{one}");
+
+    let names = driver.manifests(&["first", "second"]);
+    let two = devices(&MANIFEST_VARIABLES.map(|name| (name, &names[..])), 0).0;
+    assert!(two.contains(": second (discrete)  <- used") && two.contains(": llvmpipe"), "{two}");
+
+    let missing = driver.manifests(&["missing"]);
+    let (_, error) = devices(&MANIFEST_VARIABLES.map(|name| (name, &missing[..])), DEVICE);
+    assert!(error.contains("there is no Vulkan driver; "), "{error}");
+
+    let (list, error) = devices(&[("NIMBUS_FAKE_DEVICES", "0")], DEVICE);
+    assert!(!list.contains("<- used"), "{list}");
+    assert!(error.contains("no usable Vulkan 1.3 device (found: none); "), "{error}");
+
+    for (variable, value, why) in [
+        ("NIMBUS_FAKE_API", "1.2", "Vulkan 1.3 is needed"),
+        ("NIMBUS_FAKE_NO_GRAPHICS", "1", "no queue for both graphics and compute"),
+    ] {
+        let (list, error) = devices(&[(variable, value)], DEVICE);
+        assert!(list.contains(&format!("   not usable: {why}\n")), "{list}");
+        assert!(!list.contains("<- used"), "{list}");
+        assert!(error.contains("no usable Vulkan 1.3 device (found: 0: llvmpipe"), "{error}");
+    }
+
+    // A list opens no device, so that one that is lost is listed, and reported when it is used.
+    let lost = [("NIMBUS_FAKE_FAIL", "vkCreateDevice:1:DEVICE_LOST")];
+    devices(&lost, 0);
+    let ended = driver.run(RENDER.line, &lost);
+    assert_eq!(ended.status.code(), Some(DEVICE), "{}", ended.stderr);
+    assert!(ended.stderr.starts_with("error: Vulkan: vkCreateDevice: "), "{}", ended.stderr);
+    assert_eq!(ended.names(), [""; 0]);
+}

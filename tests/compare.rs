@@ -5,6 +5,8 @@
 mod results;
 #[path = "compare/results_of_bench.rs"]
 mod results_of_bench;
+#[path = "compare/still.rs"]
+mod still;
 
 use std::fs;
 use std::path::Path;

@@ -318,8 +318,17 @@ fn a_saved_file_that_was_not_edited_keeps_its_bytes() {
     let text = std::fs::read_to_string(&path).expect("text");
     let line = written.lines().nth(3).expect("the first box");
     assert_eq!(text, format!("13\n2\n{line}\n9, 1, 1, 1, 0, 0, -5, 2\n"));
+    // Without panels the picture's background reaches the window's last corner.
     window.key("h");
+    let has_sky = || {
+        let (width, height, rgb) = display.pixels(&window.id);
+        let at = 3 * ((height - 4) * width + width - 4) as usize;
+        let [red, _, blue] = [rgb[at], rgb[at + 1], rgb[at + 2]];
+        blue > 100 && blue > red
+    };
+    wait_for("a picture of the whole window", has_sky);
     window.key("h");
+    wait_for("panels", || !has_sky());
     window.key("ctrl+q");
     assert_eq!(window.end(), "");
 }

@@ -1,4 +1,5 @@
 //! Kills `nimbus edit` while it saves: the box file is then the old one or the new one, whole.
+//! Interrupts `nimbus view` and `nimbus edit`, which close their windows.
 
 #![cfg(feature = "window")]
 
@@ -10,7 +11,7 @@ mod program;
 use std::fs;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use display::{Display, wait_for};
@@ -73,4 +74,32 @@ fn a_killed_editor_leaves_the_old_or_the_new_file() {
     assert!(!is_old(&file, &old));
     child.kill().expect("it ends");
     child.wait().expect("it ends");
+}
+
+#[test]
+fn ctrl_c_closes_a_window_and_says_so() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let display = Display::open();
+    let file = dir.path().join("new.dat");
+    for (args, says) in [
+        (["view", "scenes/hello.toml"], "interrupted: closes the window; once more ends at once"),
+        (
+            ["edit", &file.to_string_lossy()],
+            "interrupted: keeps unsaved changes in a file and closes the window; once more",
+        ),
+    ] {
+        let mut command = nimbus(&[&args[..], &["--size", "320x240"]].concat());
+        command.env("DISPLAY", display.name()).env("XDG_CONFIG_HOME", dir.path());
+        let child = command.spawn().expect("it starts");
+        let window = display.window_of(child.id());
+        wait_for("title", || !display.title(&window).is_empty());
+        let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        assert!(killed.expect("kill").success());
+        let output = child.wait_with_output().expect("it ends");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(stderr.contains(says), "{args:?}: {stderr}");
+        // A busy machine may need longer than the patience of the signal's thread.
+        let code = output.status.code();
+        assert!(code == Some(0) || code == Some(130) && args[0] == "view", "{args:?}: {code:?}");
+    }
 }

@@ -225,7 +225,9 @@ fn a_saved_document_is_loaded_bitwise() {
     let path = folder.path().join("b.dat");
     check(100, (actions::boxes(), vec(actions::action(), 0..30)), |(boxes, actions)| {
         let document = after(&after_all(&Editor::new(boxes), &actions), &END).shared_document();
-        let saved = perform(&Request::Save { path: path.clone(), document: document.clone() });
+        let (to, opened) = (path.clone(), path.clone());
+        let request = Request::Save { path: to, opened, document: document.clone() };
+        let saved = perform(&request);
         prop_assert_eq!(
             saved,
             Some(SessionEvent::Saved { path: path.clone(), document: document.clone() })

@@ -138,7 +138,7 @@ fn arguments_that_the_plan_determines_are_refused() {
         (&["--set", "draw.cutoff=2"], "stand before it"),
         (&["--device", "0"], "--device"),
         (&["--knob", "draw.cutoff=-1"], "draw.cutoff"),
-        (&["--knob", "light.0.direction=1"], "what is asked for"),
+        (&["--knob", "light.0.direction=1"], "is no knob"),
         (&["--nonsense"], "--nonsense"),
     ] {
         let begin = ["farm", "plan", SCENE, "-o", path_text(&folder), "--error", "--"];

@@ -193,7 +193,8 @@ fn overrides_that_do_not_fit_are_named() {
             "unknown key `film.widht`; did you mean `width`? known here: `width`, `height`, \
              `format`, `background`, `exposure`, `tone_map`",
         ),
-        ("cloud.1.seed=3", "`cloud`: expected a number from 0 to 0, or *, found `1`"),
+        ("cloud.1.seed=3", "`cloud.1` does not exist: `cloud` has 1 item, numbered from 0"),
+        ("light.-1.kind=sky", "`light`: expected a number from 0 to 1, or *, found `-1`"),
         ("material.0.kd=[1,1,2]", "`material.0.kd.2`: expected a number from 0 to 1, found 2.0"),
         ("cloud.0.seed.x=3", "`cloud.0.seed` is no table: integer 4"),
         ("surface.0.u=3", "the scene has no `surface`"),

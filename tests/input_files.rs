@@ -12,7 +12,11 @@ use scene_text::{CLOUD, assert_message, folder, message};
 #[test]
 fn missing_files_are_refused_at_the_key_that_names_them() {
     let named = |file: &str| format!("[[cloud]]\nfrom = 'boxes'\nfile = '{file}'");
-    assert_message(&named("gone.dat"), "scene.toml:3:8: `cloud.0.file`: gone.dat: no such file");
+    assert_message(
+        &named("gone.dat"),
+        "scene.toml:3:8: `cloud.0.file`: gone.dat: no such file; names are relative to the \
+         scene's folder",
+    );
     assert_message(
         &named(""),
         "scene.toml:3:8: `cloud.0.file`: expected a string that is not empty",
@@ -88,7 +92,7 @@ fn an_empty_or_too_heavy_particle_list_is_refused_by_line() {
     };
     assert_eq!(
         error(""),
-        "p.csv:1:1: the file is empty: expected a header x,y,z,sigma,kappa[,r,g,b]"
+        "p.csv:1:1: the file is empty: expected a header x,y,z,sigma (or radius),kappa[,r,g,b]"
     );
     assert_eq!(
         error("x,y,z,sigma,kappa\n\n0,0,0,1e12,10\n0,0,0,1,1e4\n"),

@@ -147,6 +147,8 @@ fn a_farm_ends_soon_after_ctrl_c() {
                 command.stdout(Stdio::null()).stderr(Stdio::piped());
                 // A pool waits and uses no processor: it is interrupted at once.
                 let after_s = if code == 75 && k < 2 { after_s } else { 0.0 };
+                let records = || n_failed_records(&fixtures.dir.path().join(name));
+                let n_before = records();
                 let (output, _) = interrupt(&mut command, |used_s| used_s >= after_s);
                 let what = format!("{line} interrupted after {after_s:.2} s");
                 check_end(&what, &output);
@@ -155,11 +157,22 @@ fn a_farm_ends_soon_after_ctrl_c() {
                 // Before the plan is read there is nothing to keep.
                 let expected = [Some(code), Some(130), Some(0)];
                 assert!(expected.contains(&ended), "{what}: {ended:?} {errors}");
-                n_tried_again += u64::from(ended == Some(75));
+                if ended == Some(75) {
+                    n_tried_again += 1;
+                    assert!(records() > n_before, "{what}: the end is not recorded");
+                }
             }
         }
         let status = fixtures.run(["farm", "status", "--plan", name]);
         assert!(status.status.success(), "{}", String::from_utf8_lossy(&status.stderr));
     }
     assert!(n_tried_again > 0, "no shard ends with 75");
+}
+
+/// Returns how many runs of a plan's shards are recorded as failed with exit code 75.
+fn n_failed_records(plan: &Path) -> usize {
+    let Ok(entries) = fs::read_dir(plan.join("attempts")) else { return 0 };
+    let texts = entries.map(|e| fs::read_to_string(e.expect("an entry").path()).expect("records"));
+    let is_failed = |line: &&str| line.contains("\"failed\"") && line.contains("\"exit_code\":75");
+    texts.map(|text| text.lines().filter(is_failed).count()).sum()
 }

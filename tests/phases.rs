@@ -160,7 +160,7 @@ fn faults_in_a_phase_are_reported_at_their_place() {
         (
             "set.lighting.mode = \"none\"",
             "set.cloud.3.seed = 1",
-            &["toml:30:", "phase \"unlit and small\"", "from 0 to 0"],
+            &["toml:30:", "phase \"unlit and small\"", "has 1 item"],
         ),
         ("set.\"threads.mode\" = \"serial\"", "set = 3", &["toml:37:", "expected a table of keys"]),
         ("name = \"lit\"", "name = \"alone\"", &["toml:", "another phase's name already"]),

@@ -3,6 +3,8 @@
 
 #[path = "harness/generated.rs"]
 mod generated;
+#[path = "plots/passes.rs"]
+mod passes;
 #[path = "harness/results.rs"]
 mod results;
 #[path = "harness/studies.rs"]
@@ -12,13 +14,12 @@ mod svg;
 #[path = "plots/sweeps.rs"]
 mod sweeps;
 
-use nimbus::report::charts::{Chart, error, frames, ledger, passes};
+use nimbus::report::charts::{Chart, error, frames, ledger};
 use nimbus::studies::error::front::Front;
 use nimbus::studies::error::records::Study;
 use nimbus::studies::figure::Figure;
 use nimbus::studies::ledger::records::Ledger;
 use nimbus::timing::frame_rows::FrameRow;
-use nimbus::timing::records::{Pass, Run};
 use studies::{configuration, row, study, usual_ledger, usual_study};
 use svg::{Axes, PX, draw, elements, log_axes, number, parse, points, tooltips, value};
 
@@ -204,10 +205,10 @@ fn charts_escape_text_of_files() {
     assert!(elements(&doc, "script").next().is_none());
     assert!(tooltips(&doc)[0].1.contains("<script>alert(1)</script>"), "{svg}");
     assert!(!chart.text(80, 20, false).expect("a chart").contains(['\u{1b}', '\u{7}']));
-    let mut run = timed_run();
+    let mut run = passes::timed_run();
     run.cases[0].modes[0].passes[0].name = evil.to_owned();
     run.cases[0].phase = Some(evil.to_owned());
-    let chart = passes::chart(&run).expect("a chart");
+    let chart = passes::chart(&run);
     assert!(!chart.text(80, chart.rows(), false).expect("a chart").contains(['\u{1b}', '\u{7}']));
     parse(&draw(&chart));
 }
@@ -286,60 +287,6 @@ fn frame_chart_draws_every_time_or_counts_it() {
         assert!(!draw(chart).contains("NaN"));
         chart.text(60, 10, true).expect("a chart");
     }
-}
-
-fn pass(name: &str, p50_ms: Option<f64>, n_run: usize, n_skipped: usize) -> Pass {
-    let (name, share, reason, reasons) = (name.to_owned(), None, None, vec![]);
-    Pass { name, p50_ms, share, n_run, n_skipped, reason, reasons, saved_ms: None }
-}
-
-fn timed_run() -> Run {
-    let mut run =
-        results::run(vec![results::mode("serial", 10, 0), results::mode("parallel", 10, 0)]);
-    let all = |by: f64| {
-        vec![
-            pass("grid", Some(2.0 * by), 5, 5),
-            pass("tiles", Some(4.0 * by), 10, 0),
-            pass("never", None, 0, 10),
-        ]
-    };
-    run.cases[0].modes[0].passes = all(1.0);
-    run.cases[0].modes[1].passes = all(0.5);
-    run
-}
-
-#[test]
-fn pass_chart_bars_have_the_passes_times() {
-    let chart = passes::chart(&timed_run()).expect("a chart");
-    let svg = draw(&chart);
-    let doc = parse(&svg);
-    let ticks: Vec<(f64, f64)> = elements(&doc, "text")
-        .filter(|n| n.attribute("text-anchor") == Some("middle"))
-        .filter_map(|n| Some((value(&svg::text(n))?, number(n, "x"))))
-        .collect();
-    let px = |ms: f64| Axes::px([ticks[0], ticks[ticks.len() - 1]], ms);
-    // The grid runs in every other frame: 1 ms of an average frame, then 4 ms of tiles; half of
-    // both in the second bar.
-    let bars: Vec<(f64, f64)> = elements(&doc, "rect")
-        .filter(|n| {
-            n.attribute("opacity") == Some("1")
-                && number(*n, "height") > 12.0
-                && number(*n, "width") < 800.0
-        })
-        .map(|n| (number(n, "x"), number(n, "x") + number(n, "width")))
-        .collect();
-    let expected = [(0.0, 1.0), (1.0, 5.0), (0.0, 0.5), (0.5, 2.5)];
-    assert_eq!(bars.len(), expected.len(), "{svg}");
-    for ((from, to), (a, b)) in bars.iter().zip(expected) {
-        assert!((from - px(a)).abs() <= PX && (to - px(b)).abs() <= PX, "{from} {to} for {a} {b}");
-    }
-    let text = chart.text(60, chart.rows(), false).expect("a chart");
-    assert!(
-        text.contains("g grid  t tiles") && text.contains("ttttt") && !text.contains("never"),
-        "{text}"
-    );
-    // No pass was timed.
-    assert_eq!(passes::chart(&results::run(vec![results::mode("serial", 1, 0)])), None);
 }
 
 #[test]

@@ -8,6 +8,8 @@ mod checks;
 mod program;
 #[path = "harness/results.rs"]
 mod results;
+#[path = "report/still.rs"]
+mod still;
 #[path = "harness/studies.rs"]
 mod studies;
 #[path = "report/sweeps.rs"]
@@ -250,7 +252,7 @@ fn bad_input_gives_one_message_and_no_page() {
     }
     for (output, expected) in [
         ("page.pdf", "expected a file name that ends in .html"),
-        ("gone/page.html", "does not exist"),
+        ("gone/page.html", "does not exist; make it first, or choose another place"),
     ] {
         let output = run(&["report", &study, "-o", &path(&dir, output)]);
         assert_eq!(output.status.code(), Some(2));

@@ -4,7 +4,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use nimbus::io::scene_keys::{Key, tables};
+use nimbus::io::scene_keys::{DEFAULT_LIGHTS, Key, tables};
 use serde_json::Value;
 
 const INTRODUCTION: &str = "\
@@ -15,9 +15,9 @@ Paths of files are relative to the scene's folder. On the command line, `--set k
 sets any key: `--set film.width=640`, `--set cloud.0.seed=7`, `--set 'cloud.*.texture=none'`.
 
 *unit* is the scene's unit of length. Colours, radiance and irradiance are linear RGB. A scene
-without `[[light]]` has a directional light and a sky, and one without `[[material]]` has the
-material \"cloud\".
-
+without `[[material]]` has the material \"cloud\", and one without `[[light]]` has these lights:
+";
+const GENERATED: &str = "\
 This page is generated from the declarations in `src/io/scene_keys` by `tests/scene_keys.rs`.
 ";
 const WIDTH: usize = 100;
@@ -55,7 +55,8 @@ fn wrapped(text: &str) -> String {
 }
 
 fn reference() -> String {
-    let mut text = INTRODUCTION.to_owned();
+    let lights = DEFAULT_LIGHTS.trim();
+    let mut text = format!("{INTRODUCTION}\n```toml\n{lights}\n```\n\n{GENERATED}");
     for table in tables() {
         let name = if table.name.is_empty() { "Before every table" } else { &table.name };
         let name = if table.name.is_empty() { name.to_owned() } else { format!("`{name}`") };

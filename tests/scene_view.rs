@@ -255,7 +255,7 @@ fn nothing_is_written_over_and_nothing_wrong_is_written() {
     for (set, what) in [
         ("film.width", "expected key.path=VALUE"),
         ("film.width=[", "no TOML"),
-        ("cloud.2.seed=1", "`cloud`: expected a number from 0 to 1"),
+        ("cloud.2.seed=1", "`cloud.2` does not exist: `cloud` has 2 items"),
         ("cloud.0.file.x=1", "is no table"),
     ] {
         let error = save(&from, &other, &strings(&[set]), None).unwrap_err().to_string();

@@ -260,6 +260,17 @@ fn a_grid_has_all_combinations() {
     assert_valid(&json, "study.schema.json");
 }
 
+/// A value that the scene has already is found in the table.
+#[test]
+fn the_unchanged_scene_is_named_by_its_own_values() {
+    let tiny = Tiny::new();
+    let knobs = ["--knob", "draw.cutoff=2,3", "--knob", "lighting.grid=8,16"];
+    let printed = tiny.good(&[&SHORT[..], &knobs, &["--budget-ms=1e9"]].concat());
+    let name = "as it stands (draw.cutoff=3, lighting.grid=8)";
+    assert_eq!(printed.matches(name).count(), printed.matches("as it stands").count());
+    assert!(printed.contains(name), "{printed}");
+}
+
 #[test]
 fn a_ledger_sums_up() {
     let more =

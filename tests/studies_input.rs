@@ -42,18 +42,23 @@ fn faulty_arguments_are_refused_before_any_work() {
         (&["draw.path=pen"], "--knob draw.path=pen: `draw.path`: unknown value `pen`; known here:"),
         (
             &["cloud.3.seed=1"],
-            "--knob cloud.3.seed: changes what is asked for, and not how it is computed; a cloud's \
-             knobs are `particles` and `gust_waves`",
+            "--knob cloud.3.seed: is no knob: this key changes what the picture shows, and not how \
+             the picture is computed; a cloud's knobs are `particles` and `gust_waves`",
         ),
         (
             &["cloud.3.gust_waves=1"],
-            "--knob cloud.3.gust_waves=1: `cloud`: expected a number from 0 to 0, or *, found `3`",
+            "--knob cloud.3.gust_waves=1: `cloud.3` does not exist: `cloud` has 1 item",
         ),
         (
             &["surface.0.center=[0,0,0]"],
-            "--knob surface.0.center: changes what is asked for, and not how it is computed",
+            "--knob surface.0.center: is no knob: this key changes what the picture shows, and not",
         ),
-        (&["air.humidity=0.5"], "--knob air.humidity: changes what is asked for"),
+        (
+            &["air.humidity=0.5"],
+            "--knob air.humidity: is no knob: a knob changes how the picture is computed, and this \
+             key changes what the picture shows, or nothing that is compared; `nimbus error SCENE` \
+             without --knob varies all knobs of the scene",
+        ),
         (
             &["size=8x8"],
             "--knob size: pictures of several sizes cannot be compared with one reference",

@@ -156,15 +156,15 @@ fn zones_are_nested_and_passes_lie_in_their_frames() {
     for name in ["game step", "setting", "visibility", "groups", "place particles"] {
         assert_eq!((count(&drawing, name), count("thread game", name)), (n, n), "{name}");
     }
-    // After each loop its last frame is read back, and after the last one facets and light, each
-    // once more recorded, submitted and waited for; then the picture, to see whether it shows
-    // anything, and, to count what is odd, status, facets and light.
+    // After each loop its last frame is read back. After the last loop so are facets, light and
+    // transmittance, then the picture, to see whether it shows anything. Counts read status, facets
+    // and light. Each readback is recorded, submitted and waited for.
     for (name, extra) in [
         ("render step", 0),
         ("plan", 0),
         ("upload", 0),
-        ("record", 9),
-        ("submit", 9),
+        ("record", 10),
+        ("submit", 10),
         ("read back", 4),
     ] {
         let want = if name == "read back" { extra } else { 2 * n + extra };

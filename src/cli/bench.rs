@@ -10,7 +10,7 @@ use super::args::{BenchArgs, SceneArgs};
 use super::bench_cases::{BenchCases, bench_cases, plan};
 use super::bench_record::{Recorder, Runs, print_json};
 use super::interrupt::{self, PATIENCE};
-use super::output::{SharedFolder, claim_file, lock_folder, refuse_existing};
+use super::output::{SharedFolder, check_out, claim_file, lock_folder};
 use super::progress::progress;
 use super::scene::{device_choice, print_sizes};
 use crate::error::{Error, Result};
@@ -49,6 +49,9 @@ pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
         }
     }
     let outs = out_dirs(args)?;
+    if args.out.is_some() {
+        interrupt::note_until_keep("interrupted before the first frame: nothing was written");
+    }
     let _claim = args.trace.as_ref().map(|file| claim_file(file, args.force)).transpose()?;
     // All scenes are loaded before the first is timed, so that a fault in the last one is reported
     // at once and no folder is made for results that will not come.
@@ -73,7 +76,7 @@ pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
 /// its scene is ready to run.
 fn out_dirs(args: &BenchArgs) -> Result<Vec<Option<PathBuf>>> {
     let Some(out) = &args.out else { return Ok(vec![None; args.scenes.len()]) };
-    refuse_existing(out, args.force)?;
+    check_out(out, args.force)?;
     if args.scenes.len() == 1 {
         return Ok(vec![Some(out.clone())]);
     }

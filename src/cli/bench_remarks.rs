@@ -4,7 +4,7 @@ use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::machine::Clocks;
 use crate::timing::overlap::Overlap;
 use crate::timing::records::{Case, Mode, Run, Skipping};
-use crate::timing::still::{StillRemark, empty_frames_text};
+use crate::timing::still::{NO_RATIO, StillRemark, empty_frames_text};
 
 /// Returns a time in ms with three decimals.
 pub fn ms(value: f64) -> String {
@@ -142,32 +142,13 @@ pub fn still_lines(run: &Run) -> String {
 
 /// Returns why a case that stands still has no ratio of its loops.
 pub fn still_line(case: &Case) -> String {
-    case.ratio.map_or(String::new(), |_| {
-        "parallel / serial is not given: both loops draw nothing; --no-skip times them\n".to_owned()
-    })
+    case.ratio.map_or(String::new(), |_| format!("parallel / serial is not given: {NO_RATIO}\n"))
 }
 
 /// Returns how many frames drew nothing, if some did but less than half.
 pub fn empty_line(case: &Case) -> Option<String> {
     let text = empty_frames_text(case).filter(|_| !case.is_still())?;
     Some(format!("{text}: nothing moved in them\n"))
-}
-
-/// Returns a line with the passes whose work skipping left out of some timed frames, if there are
-/// any. The times of the loops that skip lack this work.
-pub fn skipped_line(run: &Run) -> Option<String> {
-    let loops = run.modes().filter(|(case, mode)| mode.skip && !case.is_still());
-    let mut names: Vec<&str> = Vec::new();
-    for pass in loops.flat_map(|(_, mode)| &mode.passes).filter(|pass| pass.lacks_work()) {
-        if !names.contains(&pass.name.as_str()) {
-            names.push(&pass.name);
-        }
-    }
-    let names = (!names.is_empty()).then(|| names.join(", "))?;
-    Some(format!(
-        "skipped in some timed frames or in all: {names}; the loop without skipping times them in \
-         every frame\n"
-    ))
 }
 
 /// Returns a line for each kind of figure that a table shows as "-", with the reason.

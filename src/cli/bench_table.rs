@@ -4,13 +4,14 @@ use std::path::Path;
 
 use super::bench_remarks::{
     clocks_line, drawn_line, empty_line, latency_line, missing_lines, ms, overlap_lines,
-    skipped_line, skipping_line, spread_lines, still_line, still_lines,
+    skipping_line, spread_lines, still_line, still_lines,
 };
 use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
 use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::names::loop_name;
 use crate::timing::records::{Block, Case, Measured, Mode, Ratio, Run};
+use crate::timing::still::skipped_text;
 
 /// Returns the whole text. `same` says for each case whether the last frames of its blocks have the
 /// same bytes; with `verbose` every table of every case is printed.
@@ -35,7 +36,9 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
     );
     out += &still_lines(run);
     if run.cases.len() > 1 {
-        out += &format!("{}\n{}\n", table(&case_rows(run)), table(&pass_by_case_rows(run)));
+        out += &table(&case_rows(run));
+        out += &skipped_text(run).map_or(String::new(), |text| text + "\n");
+        out += &format!("\n{}\n", table(&pass_by_case_rows(run)));
     }
     for (case, same) in run.cases.iter().zip(same) {
         if run.cases.len() == 1 || verbose {
@@ -50,9 +53,6 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
         out += &format!(
             "{n_same} of {n_told} cases gave the same last frame in all their blocks, to the byte\n"
         );
-    }
-    if run.cases.len() > 1 {
-        out += &skipped_line(run).unwrap_or_default();
     }
     out + &missing_lines(run) + &clocks_line(&run.clocks)
 }
@@ -213,11 +213,10 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
     for case in &run.cases {
         let reached = case.overlap.and_then(|o| o.reached);
         let saved = case.skipping.map(|s| s.gpu_no_skip_ms - s.gpu_ms);
-        // In a case that stands still the loops that skip draw nothing.
-        let is_still = case.is_still() && case.figure_mode().is_some();
-        for mode in case.modes.iter().filter(|m| m.frames > 0 && !(is_still && m.skip)) {
-            let is_parallel =
-                mode.threading == "parallel" && case.modes.iter().all(|m| m.skip <= mode.skip);
+        for mode in case.modes.iter().filter(|m| m.frames > 0 && !case.is_left_out(m)) {
+            let is_parallel = mode.threading == "parallel"
+                && !case.draws_nothing(mode)
+                && case.modes.iter().all(|m| m.skip <= mode.skip);
             let mut row = columns(case);
             let p50 = |m: Option<Measured>| or_dash(m, |m| ms(m.of.p50));
             row.extend([
@@ -255,7 +254,7 @@ fn low_rows(case: &Case) -> Vec<Vec<String>> {
         "1 % of the time",
         "sd / mean",
     ]);
-    for mode in figure_first(case) {
+    for mode in case.figure_first() {
         let (Some(frame), Some(lows)) = (&mode.frame_ms, &mode.frame_lows) else { continue };
         let rates = [fps(frame.of.p50), lows.p99_fps, lows.slowest_mean_fps, lows.slowest_time_fps];
         let mut row = vec!["frame".to_owned(), mode.name()];
@@ -264,13 +263,6 @@ fn low_rows(case: &Case) -> Vec<Vec<String>> {
         rows.push(row);
     }
     rows
-}
-
-/// Returns the loops of a case, the one with its figure first.
-fn figure_first(case: &Case) -> impl Iterator<Item = &Mode> {
-    let figure = case.figure_mode();
-    let is_figure = move |m: &&Mode| figure.is_some_and(|figure| std::ptr::eq(figure, *m));
-    figure.into_iter().chain(case.modes.iter().filter(move |m| !is_figure(m)))
 }
 
 /// Returns the median of each time with its 95 % interval, and the spread of the times.
@@ -298,7 +290,7 @@ fn time_rows(case: &Case) -> Vec<Vec<String>> {
                 || what == "gpu"
                 || case.modes.iter().all(|m| !m.skip)
         };
-        for mode in figure_first(case).filter(is_shown) {
+        for mode in case.figure_first().filter(is_shown) {
             let Some(m) = of(mode) else { continue };
             let s = m.of;
             let mut row = vec![what.to_owned(), mode.name(), s.n.to_string(), ms(s.p50)];

@@ -34,7 +34,8 @@ pub fn run(args: &EditArgs, stop: &'static AtomicBool) -> Result<()> {
     let (width, height) = args.options.size.unwrap_or(SIZE);
     let choice = device_choice(&args.options);
     // Unsaved changes are written to a file first.
-    let _keeping = interrupt::keep_by_itself();
+    let does = "keeps unsaved changes in a file and closes the window";
+    let _keeping = interrupt::keep_by_itself(does);
     edit_window::run(Options { session, scene, choice, size: [width, height], stop })
 }
 

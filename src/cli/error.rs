@@ -9,7 +9,7 @@ use super::args::ErrorArgs;
 use super::error_configurations::{axes, design, load_configuration};
 use super::error_table;
 use super::interrupt::{self, PATIENCE, graceful_stop};
-use super::output::{self, SharedFolder, lock_folder, refuse_existing};
+use super::output::{self, SharedFolder, check_out, lock_folder};
 use super::progress::{Progress, ReferenceProgress, progress};
 use super::scene::{
     StudyScene, load_study, open_for_study, pixels, print_sizes, with_texture_hint,
@@ -41,8 +41,9 @@ use crate::timing::names::Setting;
 /// Fails if the arguments or the scene are faulty, the device fails, or Ctrl-C came. Finished
 /// results are kept in `--out`.
 pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
-    if let (Some(out), false) = (&args.out, args.resume) {
-        refuse_existing(out, args.force)?;
+    if let Some(out) = &args.out {
+        check_out(out, args.force || args.resume)?;
+        interrupt::note_until_keep("interrupted before the first round: nothing was written");
     }
     let StudyScene { options, loaded, scene, time_s } =
         load_study(&args.scene, &args.options, args.plain, args.frame)?;

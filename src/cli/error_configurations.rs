@@ -68,8 +68,9 @@ fn refusal(key: &str) -> Option<&'static str> {
         "draw.error",
         "draw",
     ];
-    const IS_CONTENT: &str =
-        "changes what is asked for, or nothing that is compared, and not how it is computed";
+    const IS_CONTENT: &str = "is no knob: a knob changes how the picture is computed, and this \
+        key changes what the picture shows, or nothing that is compared; `nimbus error SCENE` \
+        without --knob varies all knobs of the scene";
     let last = key.rsplit('.').next().unwrap_or_default().trim();
     match key.split('.').next().unwrap_or_default().trim() {
         _ if key == SIZE_KEY => Some(ONE_SIZE),
@@ -78,12 +79,12 @@ fn refusal(key: &str) -> Option<&'static str> {
         }
         "film" | "lighting" | "draw" => CONTENT.contains(&key).then_some(IS_CONTENT),
         "surface" => (last != "subdivide").then_some(
-            "changes what is asked for, and not how it is computed; a surface's knob is \
-             `subdivide`",
+            "is no knob: this key changes what the picture shows, and not how the picture is \
+             computed; a surface's knob is `subdivide`",
         ),
         "cloud" => (!["particles", "gust_waves"].contains(&last)).then_some(
-            "changes what is asked for, and not how it is computed; a cloud's knobs are \
-             `particles` and `gust_waves`",
+            "is no knob: this key changes what the picture shows, and not how the picture is \
+             computed; a cloud's knobs are `particles` and `gust_waves`",
         ),
         "light" | "material" | "air" => Some(IS_CONTENT),
         "title" | "time" | "threads" | "camera" | "phase" => Some(

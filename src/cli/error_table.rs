@@ -29,6 +29,7 @@ pub fn report(study: &Study) -> String {
         out += "  ! the reference's own error is more than a tenth of it";
     }
     out.push('\n');
+    out += &study.base_line().map_or(String::new(), |line| line + "\n");
     out += &missing_lines(study);
     for best in &study.best {
         out += &best_line(study, best);
@@ -89,7 +90,7 @@ fn rows(study: &Study) -> Vec<Vec<String>> {
             Front::Off | Front::Unknown => "",
         };
         if let Some(failure) = &c.failure {
-            rows.push(vec![mark.into(), format!("{}: {failure}", c.name)]);
+            rows.push(vec![mark.into(), format!("{}: {failure}", study.label(c))]);
             continue;
         }
         let [time, time_interval] = cells(c.ms(study.time), ms);
@@ -98,7 +99,7 @@ fn rows(study: &Study) -> Vec<Vec<String>> {
         let rmse = if is_unresolved(c) { format!("!{rmse}") } else { rmse };
         let [max, relmse] =
             [c.error.map(|e| e.max), c.error.map(|e| e.relmse)].map(|v| or_dash(v, scientific));
-        let (mark, name) = (mark.to_owned(), c.name.clone());
+        let (mark, name) = (mark.to_owned(), study.label(c));
         rows.push(vec![
             mark,
             name,
@@ -138,6 +139,6 @@ fn best_line(study: &Study, best: &Best) -> String {
     format!(
         "within {within}, {what}: {}, {time} ms ({time_interval}), {metric} {error} \
          ({error_interval})\n",
-        c.name
+        study.label(c)
     )
 }

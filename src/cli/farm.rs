@@ -1,6 +1,7 @@
 //! `nimbus farm …`: its commands, and those that work on a plan.
 
 use std::path::Path;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use super::args::{FarmArgs, FarmCommand, GcArgs, LocalArgs, MergeArgs, RunArgs, StatusArgs};
@@ -10,7 +11,7 @@ use super::{farm_jobs, farm_plan, output};
 use crate::error::{Error, Result};
 use crate::farm::{
     self, Ended, GcOptions, MergeOptions, Merged, Outcome, Plan, Pool, RunOptions, ShardStatus,
-    State, Status, process,
+    State, Status, UnfinishedRun, process,
 };
 use crate::frame::DeviceChoice;
 
@@ -49,16 +50,31 @@ fn shard(args: &RunArgs) -> Result<()> {
     // Ctrl-C, or the signal with which Slurm takes a node back.
     let stop = graceful_stop();
     // An item takes longer than a node is left to us. The items before it are kept.
-    let _keeping = interrupt::keep(PATIENCE_WITH_CHILDREN, || Error::Transient {
-        what: "interrupted; the items that were finished are kept".to_owned(),
+    let unfinished = Arc::new(OnceLock::<UnfinishedRun>::new());
+    let begun = Arc::clone(&unfinished);
+    let _keeping = interrupt::keep(PATIENCE_WITH_CHILDREN, move || {
+        let what = "interrupted; the items that were finished are kept".to_owned();
+        let error = Error::Transient { what };
+        if let Some(run) = begun.get() {
+            run.record(&error);
+        }
+        error
     });
     let plan = Plan::read(&args.plan)?;
     refuse_device(&plan, args.device.as_ref(), args.validation)?;
+    let run = UnfinishedRun::begin(&args.plan, &plan, args.shard)?;
+    let run = unfinished.get_or_init(|| run);
     let (n, noun) = (plan.shard(args.shard)?.n, plan.work.noun());
     let bar = progress(u64::from(n), noun, args.quiet);
     let (device, validation) = (args.device.clone(), args.validation);
     let choice = DeviceChoice { device, validation, ..DeviceChoice::default() };
-    let options = RunOptions { choice: &choice, stop, on_item: &|| bar.advance() };
+    let on_item = |is_new| {
+        if is_new {
+            run.count_item();
+        }
+        bar.advance();
+    };
+    let options = RunOptions { choice: &choice, stop, on_item: &on_item };
     let outcome = farm::run(&args.plan, args.shard, &options);
     drop(bar);
     let text = match outcome? {

@@ -129,7 +129,7 @@ pub fn calibrated(args: &CalibrateArgs) -> Result<()> {
     let choice = DeviceChoice { device: args.device.clone(), ..DeviceChoice::default() };
     let bar = progress(n_frames(args.scenes.len(), args.frames), "frames", args.quiet);
     let never = AtomicBool::new(false);
-    let options = RunOptions { choice: &choice, stop: &never, on_item: &|| bar.advance() };
+    let options = RunOptions { choice: &choice, stop: &never, on_item: &|_| bar.advance() };
     let found = match &args.farm[..] {
         [] => calibrate(&args.scenes, &args.set, args.frames, &options),
         farms => calibrate_by_farms(farms),

@@ -62,11 +62,12 @@ fn has_out(args: &PlanArgs) -> bool {
 fn refuse(args: &PlanArgs, is_refused: bool, options: &SceneArgs, names: &str) -> Result<()> {
     let has_scene = !options.set.is_empty() || options.seed.is_some() || options.size.is_some();
     let has_device = options.device.is_some() || options.shaders.is_some();
-    let has_checks = options.validation || options.poison || options.quiet || options.verbose;
+    let has_checks = options.validation || options.guard || options.limits.is_some();
+    let has_checks = has_checks || options.quiet || options.verbose;
     if has_out(args) || is_refused || has_scene || has_device || has_checks {
         return Err(Error::usage(format!(
-            "after \"--\": expected no {names}, --validation, --poison, --quiet or --verbose; \
-             --set, --seed, --size, --device and --shaders stand before it"
+            "after \"--\": expected no {names}, --validation, --guard, --limits, --quiet or \
+             --verbose; --set, --seed, --size, --device and --shaders stand before it"
         )));
     }
     Ok(())

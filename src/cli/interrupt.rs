@@ -36,8 +36,26 @@ type Save = Box<dyn FnOnce() -> Error + Send>;
 
 /// A command's finished part.
 struct Kept {
+    /// A phrase that tells the user how the command ends after Ctrl-C.
+    does: &'static str,
     patience: Option<Duration>,
     save: Save,
+}
+
+/// The phrase of a command that keeps finished frames or other steps.
+const KEEPS: &str = "finishes this frame and keeps what is done";
+
+/// A line about what is kept when Ctrl-C ends the command before it keeps anything.
+static NOTE: Mutex<Option<&'static str>> = Mutex::new(None);
+
+/// Sets the line that is printed when Ctrl-C ends the command before its first [`Keeping`].
+pub fn note_until_keep(note: &'static str) {
+    *NOTE.lock().unwrap_or_else(PoisonError::into_inner) = Some(note);
+}
+
+/// Takes the line of [`note_until_keep`].
+fn take_note() -> Option<&'static str> {
+    NOTE.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
 /// Returns the flag that Ctrl-C sets while a [`Keeping`] exists. The command checks it between
@@ -53,14 +71,25 @@ pub struct Keeping(());
 /// command has not ended the [`Keeping`] within `patience` of Ctrl-C; it returns the error that the
 /// process ends with.
 pub fn keep(patience: Duration, save: impl FnOnce() -> Error + Send + 'static) -> Keeping {
-    *lock() = Some(Kept { patience: Some(patience), save: Box::new(save) });
+    *lock() = Some(Kept { does: KEEPS, patience: Some(patience), save: Box::new(save) });
+    take_note();
     Keeping(())
 }
 
-/// Declares that the command, which has a window, ends by itself after Ctrl-C.
+/// Declares that the command shows a window, which it closes after Ctrl-C. The process ends at once
+/// if that takes longer than `patience`.
 #[cfg(feature = "window")]
-pub fn keep_by_itself() -> Keeping {
-    *lock() = Some(Kept { patience: None, save: Box::new(|| Error::Interrupted) });
+pub fn close_window(patience: Duration) -> Keeping {
+    let save = Box::new(|| Error::Interrupted);
+    *lock() = Some(Kept { does: "closes the window", patience: Some(patience), save });
+    Keeping(())
+}
+
+/// Declares that the command, which has a window, ends by itself after Ctrl-C; `does` says what it
+/// does until then.
+#[cfg(feature = "window")]
+pub fn keep_by_itself(does: &'static str) -> Keeping {
+    *lock() = Some(Kept { does, patience: None, save: Box::new(|| Error::Interrupted) });
     Keeping(())
 }
 
@@ -68,7 +97,8 @@ impl Keeping {
     /// Declares that the command now keeps what it has finished, so that the thread of the signal
     /// no longer does.
     pub fn finish(&mut self) {
-        take_over(Some(Kept { patience: None, save: Box::new(|| Error::Interrupted) }));
+        let save = Box::new(|| Error::Interrupted);
+        take_over(Some(Kept { does: KEEPS, patience: None, save }));
     }
 }
 
@@ -99,19 +129,21 @@ fn lock() -> MutexGuard<'static, Option<Kept>> {
 /// Handles Ctrl-C, on a thread of its own.
 pub fn handle() {
     static FIRST: OnceLock<Instant> = OnceLock::new();
-    let patience = lock().as_ref().map(|kept| kept.patience);
-    if let Some(patience) = patience {
+    let kept = lock().as_ref().map(|kept| (kept.does, kept.patience));
+    if let Some((does, patience)) = kept {
         if !STOP.swap(true, Ordering::Relaxed) {
             FIRST.get_or_init(Instant::now);
             if let Some(patience) = patience {
                 wait_and_save(patience);
             }
-            say!("interrupted: finishes this frame and keeps what is done; once more ends at once");
+            say!("interrupted: {does}; once more ends at once");
             return;
         }
         if FIRST.get().is_some_and(|first| first.elapsed() < ONE_SIGNAL) {
             return;
         }
+    } else if let Some(note) = take_note() {
+        say!("{note}");
     }
     end(&Error::Interrupted);
 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use super::args::LedgerArgs;
 use super::interrupt::{self, PATIENCE, graceful_stop};
 use super::output::{
-    self, SharedFolder, header, interval, lock_folder, or_dash, refuse_existing, scientific,
+    self, SharedFolder, check_out, header, interval, lock_folder, or_dash, scientific,
 };
 use super::progress::{ReferenceProgress, about, spinner};
 use super::scene::{StudyScene, load_study, open_for_study, pixels, with_texture_hint};
@@ -34,7 +34,8 @@ const FILES: [&str; 2] = [CHART, Ledger::FILE];
 /// Ctrl-C came.
 pub fn run(args: &LedgerArgs) -> Result<()> {
     if let Some(out) = &args.out {
-        refuse_existing(out, args.force)?;
+        check_out(out, args.force)?;
+        interrupt::note_until_keep("interrupted before the first row: nothing was written");
     }
     let StudyScene { options, loaded, scene, time_s } =
         load_study(&args.scene, &args.options, args.plain, args.frame)?;

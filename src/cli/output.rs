@@ -8,7 +8,7 @@ use clap::ColorChoice;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::io::atomic::{check_place, write_atomic};
+use crate::io::atomic::{check_folder_of, check_place, write_atomic};
 use crate::io::claim::Claim;
 pub use crate::io::claim::{refuse_any, refuse_existing};
 use crate::io::console::{self, say};
@@ -141,6 +141,16 @@ pub fn claim_file(path: &Path, force: bool) -> Result<Option<Claim>> {
     // Another run may have written it meanwhile.
     refuse_any(path, force)?;
     Ok(claim)
+}
+
+/// Checks the place of a results folder before the work of a command, which makes this one folder
+/// and none above it.
+///
+/// # Errors
+/// Fails if the folder above it does not exist, or if it exists and `force` is not set.
+pub fn check_out(out: &Path, force: bool) -> Result<()> {
+    check_folder_of(out)?;
+    refuse_existing(out, force)
 }
 
 /// Says on stderr what a command has written, and where.

@@ -6,6 +6,7 @@ use super::args::SceneArgs;
 use crate::error::{Error, Result};
 use crate::frame::limits::{self, advice};
 use crate::frame::{DeviceChoice, DrawnFrame, GpuContext, Stage, light_notes, unseen};
+use crate::gpu::DeviceOptions;
 use crate::inspect::basis::basis_warnings;
 use crate::io::bounds::{GREATEST, is_carried_place, shortest};
 use crate::io::console::say;
@@ -174,7 +175,12 @@ pub fn device_choice(args: &SceneArgs) -> DeviceChoice {
         device: args.device.clone(),
         shaders: args.shaders.clone(),
         validation: args.validation,
-        poison: args.poison,
+        options: DeviceOptions {
+            limits: args.limits.clone(),
+            guard: args.guard,
+            max_submit_ms: args.max_submit_ms,
+            reports_pipelines: false,
+        },
     }
 }
 

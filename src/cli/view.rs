@@ -9,7 +9,7 @@ use super::args::ViewArgs;
 use super::interrupt::{self, PATIENCE_WITH_CHILDREN};
 use super::output::{self, header};
 use super::scene::{device_choice, load_with_files, typed_overrides};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::measure::stats::Summary;
 use crate::viewer::scene_window::{self, LoopTimes, Options, SceneSource, WindowTimes};
 
@@ -26,7 +26,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         first: Arc::new(loaded.scene),
         files,
     };
-    let _keeping = interrupt::keep(PATIENCE_WITH_CHILDREN, || Error::Interrupted);
+    let _keeping = interrupt::close_window(PATIENCE_WITH_CHILDREN);
     let WindowTimes { loops, panels_ms } = scene_window::run(Options {
         source,
         choice: device_choice(&args.options),

@@ -8,6 +8,7 @@ use super::ranges::ranges;
 use super::store::{ResultState, Store};
 use super::work::{Merge, Merged, ShardResult};
 use crate::error::{Error, Result};
+use crate::io::atomic::check_folder_of;
 use crate::io::claim::refuse_existing;
 use crate::io::result_folder::Existing;
 
@@ -29,6 +30,7 @@ pub struct MergeOptions<'a> {
 /// replaced. Nothing is written then.
 pub fn merge(folder: &Path, plan: &Plan, options: &MergeOptions<'_>) -> Result<Merged> {
     let MergeOptions { out, force, mixed } = *options;
+    check_folder_of(out)?;
     refuse_existing(out, force)?;
     let results = verified(folder, plan)?;
     if plan.work.is_exact() && !mixed {

@@ -45,6 +45,6 @@ pub(crate) use merge::{MergeOptions, merge};
 pub(crate) use plan::{Plan, PlanRequest};
 pub(crate) use pool::{Ended, Pool};
 pub(crate) use ranges::ranges;
-pub(crate) use run::{Outcome, RunOptions, give_up_after, run};
+pub(crate) use run::{Outcome, RunOptions, UnfinishedRun, give_up_after, run};
 pub(crate) use status::{ShardStatus, State, Status};
 pub(crate) use work::{AnyWork, Frames, Merged, Study, Sweep};

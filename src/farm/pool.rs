@@ -1,12 +1,13 @@
 //! A pool of processes that does the shards of a plan on one machine.
 
+use std::io;
 use std::path::Path;
 use std::process::Child;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
-use super::process::{self, EXCLUSIVE, POLL};
+use super::process::{self, EXCLUSIVE, IDLE_LIMIT, POLL};
 use crate::error::{Error, Result};
 
 /// The pause before another try, times the tries so far: a transient cause lasts a while.
@@ -78,14 +79,16 @@ impl Pool<'_> {
     /// Runs a shard until it is done, fails permanently, or has had all its tries. Returns the last
     /// exit code.
     fn try_shard(&self, index: usize, stop: &AtomicBool) -> Result<Option<i32>> {
-        let failed = |cause| Error::io(self.program, cause);
+        let failed = |cause: io::Error| Error::of_io(self.program, &cause);
         let mut n_tries = 1;
         loop {
-            let mut child = self.start(index).map_err(failed)?;
-            let code = process::wait(&mut child, stop).map_err(failed)?.code();
+            let code = self.start(index).map_err(failed).and_then(|mut child| {
+                Ok(process::wait(&mut child, stop, IDLE_LIMIT).map_err(failed)?.code())
+            });
             let is_stopped = || stop.load(Ordering::Relaxed);
-            // A process that was killed gets another try, too.
-            let is_final = !matches!(code, None | Some(75)) || n_tries == self.n_tries;
+            // A process that was killed, or that could not be started, gets another try, too.
+            let may_pass = matches!(code, Ok(None | Some(75)) | Err(Error::Transient { .. }));
+            let is_final = !may_pass || n_tries == self.n_tries;
             let until = Instant::now() + PAUSE * n_tries;
             while !is_final && !is_stopped() && Instant::now() < until {
                 std::thread::sleep(POLL);
@@ -94,13 +97,13 @@ impl Pool<'_> {
                 return Err(Error::Interrupted);
             }
             if is_final {
-                return Ok(code);
+                return code;
             }
             n_tries += 1;
         }
     }
 
-    fn start(&self, index: usize) -> std::io::Result<Child> {
+    fn start(&self, index: usize) -> io::Result<Child> {
         let mut command = process::quiet(self.program);
         command.args(&self.arguments).arg(index.to_string());
         if self.n_processes == 1 {

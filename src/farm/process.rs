@@ -4,7 +4,7 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 
@@ -32,12 +32,23 @@ pub fn quiet(program: &Path) -> Command {
     command
 }
 
-/// Waits until a process ends. On `stop` it is asked to keep what it has and to end.
+/// A process that uses no processor time for this long hangs, as a driver does that waits for a
+/// thread which the system refused to start. No submission to a device takes as long.
+pub const IDLE_LIMIT: Duration = Duration::from_secs(600);
+
+/// Waits until a process ends. On `stop` it is asked to keep what it has and to end. A process that
+/// uses no processor time during `idle_limit` is killed.
 ///
 /// # Errors
 /// When the operating system refuses to tell its state.
-pub fn wait(child: &mut Child, stop: &AtomicBool) -> std::io::Result<ExitStatus> {
+pub fn wait(
+    child: &mut Child,
+    stop: &AtomicBool,
+    idle_limit: Duration,
+) -> std::io::Result<ExitStatus> {
     let mut is_asked = false;
+    let (mut used, mut active) = (None, Instant::now());
+    let (mut looked, between) = (Instant::now(), idle_limit / 8);
     loop {
         if let Some(status) = child.try_wait()? {
             return Ok(status);
@@ -46,8 +57,27 @@ pub fn wait(child: &mut Child, stop: &AtomicBool) -> std::io::Result<ExitStatus>
             is_asked = true;
             interrupt(child);
         }
+        if looked.elapsed() >= between {
+            looked = Instant::now();
+            let now = processor_ticks(child.id());
+            // A system that does not tell the time has no limit.
+            if now.is_none() || now != used {
+                (used, active) = (now, looked);
+            } else if active.elapsed() >= idle_limit {
+                child.kill()?;
+            }
+        }
         std::thread::sleep(POLL);
     }
+}
+
+/// Returns the processor time of all threads of a process, in clock ticks (proc(5), fields utime
+/// and stime).
+fn processor_ticks(pid: u32) -> Option<u64> {
+    let text = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    // The name of the program, in parentheses, may have spaces. The state, field 3, follows it.
+    let mut fields = text.rsplit_once(')')?.1.split_whitespace().skip(14 - 3);
+    Some(fields.next()?.parse::<u64>().ok()? + fields.next()?.parse::<u64>().ok()?)
 }
 
 /// Asks a process to end, as Ctrl-C does.
@@ -55,4 +85,27 @@ fn interrupt(child: &Child) {
     let mut kill = Command::new("kill");
     // A failure means that the process has ended; the caller waits for it in any case.
     let _ = kill.args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::process::ExitStatusExt;
+
+    use super::*;
+
+    #[test]
+    fn a_process_that_does_nothing_is_killed_and_one_that_works_is_not() {
+        let never = AtomicBool::new(false);
+        let run = |script: &str, limit: Duration| {
+            let mut command = quiet(Path::new("sh"));
+            let mut child = command.args(["-c", script]).spawn().expect("a shell");
+            wait(&mut child, &never, limit).expect("an end")
+        };
+        let idle = run("exec sleep 1000", Duration::from_millis(200));
+        assert_eq!(idle.signal(), Some(9));
+        // The loop uses processor time until it has counted, on a busy machine as well.
+        let count = "i=0; while [ $i -lt 300000 ]; do i=$((i+1)); done; exit 7";
+        assert_eq!(run(count, Duration::from_secs(30)).code(), Some(7));
+        assert!(processor_ticks(std::process::id()).is_some());
+    }
 }

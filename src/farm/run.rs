@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use super::attempts::{Event, Log, n_fruitless};
@@ -39,8 +39,50 @@ pub struct RunOptions<'a> {
     pub choice: &'a DeviceChoice,
     /// Set when the run is to keep what is finished and end.
     pub stop: &'a AtomicBool,
-    /// Called after every item.
-    pub on_item: &'a dyn Fn(),
+    /// Called after every item, with whether this run made it.
+    pub on_item: &'a dyn Fn(bool),
+}
+
+/// A run whose process may end in the middle of an item.
+#[derive(Debug)]
+pub struct UnfinishedRun {
+    log: Log,
+    index: usize,
+    key: String,
+    begin: Instant,
+    n_new: AtomicUsize,
+}
+
+impl UnfinishedRun {
+    /// Begins a run of shard `index` of the plan in `folder`.
+    ///
+    /// # Errors
+    /// When the plan has no such shard or the folder of records cannot be made.
+    pub fn begin(folder: &Path, plan: &Plan, index: usize) -> Result<UnfinishedRun> {
+        let key = plan.shard(index)?.key.clone();
+        let (log, begin, n_new) = (Log::open(folder)?, Instant::now(), AtomicUsize::new(0));
+        Ok(UnfinishedRun { log, index, key, begin, n_new })
+    }
+
+    /// Counts an item that this run made.
+    pub fn count_item(&self) {
+        self.n_new.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Records that the run ends with `error`. A failure to record is ignored, as in [`run`].
+    pub fn record(&self, error: &Error) {
+        let event = failed(self.begin, error, self.n_new.load(Ordering::Relaxed));
+        let _ = self.log.append(self.index, &self.key, event);
+    }
+}
+
+fn failed(begin: Instant, error: &Error, n_new: usize) -> Event {
+    Event::Failed {
+        seconds: begin.elapsed().as_secs_f64(),
+        exit_code: error.exit_code(),
+        n_new,
+        what: error.to_string(),
+    }
 }
 
 /// Does shard `index` of the plan in `folder` unless it is done.
@@ -71,12 +113,7 @@ pub fn run(folder: &Path, index: usize, options: &RunOptions<'_>) -> Result<Outc
             Event::Done { seconds: *seconds, n_resumed: *n_resumed }
         }
         Ok(Outcome::Beaten) => Event::Beaten { seconds: begin.elapsed().as_secs_f64() },
-        Err(error) => Event::Failed {
-            seconds: begin.elapsed().as_secs_f64(),
-            exit_code: error.exit_code(),
-            n_new: run.n_new.get(),
-            what: error.to_string(),
-        },
+        Err(error) => failed(begin, error, run.n_new.get()),
     });
     outcome
 }

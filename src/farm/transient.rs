@@ -26,9 +26,9 @@ mod tests {
     #[test]
     fn transient_failures_have_exit_code_75_and_permanent_ones_have_2() {
         let code = |cause: io::Error| io_error(Path::new("a"))(cause).exit_code();
-        // ENOSPC, EDQUOT, ESTALE, EIO; ENOENT, EACCES, EROFS.
+        // ENOSPC, EDQUOT, ESTALE, EIO, EAGAIN, ENOMEM; ENOENT, EACCES, EROFS.
         for (number, expected) in
-            [(28, 75), (122, 75), (116, 75), (5, 75), (2, 2), (13, 2), (30, 2)]
+            [(28, 75), (122, 75), (116, 75), (5, 75), (11, 75), (12, 75), (2, 2), (13, 2), (30, 2)]
         {
             assert_eq!(code(io::Error::from_raw_os_error(number)), expected, "{number}");
         }

@@ -139,14 +139,27 @@ pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
 }
 
-fn beside(path: &Path) -> Result<(Temporary, File)> {
+/// Checks that the folder exists that `path` lies in.
+///
+/// # Errors
+/// When it does not.
+pub fn check_folder_of(path: &Path) -> Result<()> {
     let folder = folder_of(path);
+    if folder.is_dir() {
+        return Ok(());
+    }
+    let what = format!(
+        "the folder {} does not exist; make it first, or choose another place",
+        folder.display()
+    );
+    Err(Error::io(path, what))
+}
+
+fn beside(path: &Path) -> Result<(Temporary, File)> {
     if path.file_name().is_none() {
         return Err(Error::io(path, "expected a file name"));
     }
-    if !folder.is_dir() {
-        return Err(Error::io(path, format!("the folder {} does not exist", folder.display())));
-    }
+    check_folder_of(path)?;
     // Renaming over a device such as /dev/null would replace it.
     if fs::metadata(path).is_ok_and(|about| !about.is_file()) {
         return Err(Error::io(path, "exists and is not a regular file"));
@@ -273,10 +286,10 @@ mod tests {
             write_atomic::<String>(path, |_| panic!("must not be called")).unwrap_err().to_string()
         };
         let missing = dir.path().join("gone");
-        assert!(
-            refuse(&missing.join("a.txt"))
-                .ends_with(&format!("the folder {} does not exist", missing.display()))
-        );
+        assert!(refuse(&missing.join("a.txt")).ends_with(&format!(
+            "the folder {} does not exist; make it first, or choose another place",
+            missing.display()
+        )));
         assert!(refuse(dir.path()).ends_with("exists and is not a regular file"));
         assert!(refuse(Path::new("/")).ends_with("expected a file name"));
         assert_eq!(names(dir.path()).len(), 0);

@@ -93,7 +93,15 @@ fn bits(b: &CloudBox) -> (u32, [u64; 7]) {
 /// # Errors
 /// When the file cannot be written, or [`Error::Limit`] when it would be too large to be read.
 pub fn write(path: &Path, boxes: &[CloudBox]) -> Result<()> {
-    let old = path.is_file().then(|| read_text(path, DATA_LIMIT, FIRST).ok()).flatten();
+    write_like(path, path, boxes)
+}
+
+/// Does what [`write`] does, but keeps the lines of the file at `old`.
+///
+/// # Errors
+/// Fails as [`write`] does.
+pub fn write_like(path: &Path, old: &Path, boxes: &[CloudBox]) -> Result<()> {
+    let old = old.is_file().then(|| read_text(old, DATA_LIMIT, FIRST).ok()).flatten();
     let text = old.map_or_else(|| format(boxes), |old| format_like(&old, boxes));
     if text.len() as u64 > DATA_LIMIT {
         let n_bytes = text.len();
@@ -139,6 +147,13 @@ struct Line<'a> {
 /// Byte offset of a field in its line, and its text.
 type Field<'a> = (usize, &'a str);
 
+const NO_COMMENTS: &str = "; a box file has no comments";
+
+/// Returns whether a word begins a comment in other formats.
+fn is_comment(word: &str) -> bool {
+    ["#", "//", ";", "%", "!"].iter().any(|mark| word.starts_with(mark))
+}
+
 fn header(line: Option<Line>, meaning: &str, text: &str, path: &Path) -> Result<(u64, Place)> {
     let Some(line) = line else {
         let (number, column) = line_column(text, text.trim_end().len());
@@ -150,9 +165,10 @@ fn header(line: Option<Line>, meaning: &str, text: &str, path: &Path) -> Result<
     let (fields, _) = line.fields()?;
     let (offset, word) = fields[0];
     let n = word.parse().map_err(|_| {
-        let hint = match meaning == FIRST && word == "x" {
-            true => "; a list of particles needs from = \"particles\"",
-            false => "",
+        let hint = match (meaning == FIRST && word == "x", is_comment(word)) {
+            (true, _) => "; a list of particles needs from = \"particles\"",
+            (_, true) => NO_COMMENTS,
+            _ => "",
         };
         line.fault(offset, format!("expected {meaning}, found `{}`{hint}", shown(word)))
     })?;
@@ -204,6 +220,10 @@ impl<'a> Line<'a> {
 
     fn cloud_box(&self) -> Result<CloudBox> {
         let (fields, n_fields) = self.fields()?;
+        if let Some((offset, word)) = fields.iter().find(|(_, word)| is_comment(word)) {
+            let what = format!("expected a box, found `{}`{NO_COMMENTS}", shown(word));
+            return Err(self.fault(*offset, what));
+        }
         if n_fields != FIELDS.len() {
             // At the first word too many, or where the first missing one would be.
             let offset =

@@ -20,6 +20,7 @@ mod document;
 pub mod folder;
 pub mod image;
 pub mod input_file;
+mod near_file;
 pub mod particle_file;
 pub mod plain_text;
 pub mod process_info;
@@ -29,3 +30,5 @@ pub mod scene_keys;
 pub mod scene_view;
 pub mod text_file;
 pub mod weather;
+
+pub use document::suggest::suggestion;

@@ -22,7 +22,9 @@ const KAPPA: usize = 6;
 const COLOR: std::ops::Range<usize> = 7..10;
 
 /// Beginning of a particle list, for messages.
-pub const FIRST: &str = "a header x,y,z,sigma,kappa[,r,g,b]";
+pub const FIRST: &str = "a header x,y,z,sigma (or radius),kappa[,r,g,b]";
+/// Hint about rows whose fields are separated by other characters.
+const COMMAS: &str = "; commas separate the columns";
 
 /// Reads particles from text, and the line of each; `path` is the text's name in messages.
 ///
@@ -52,8 +54,9 @@ pub fn parse(text: &str, path: &Path) -> Result<(Vec<Particle>, Vec<usize>)> {
         file.check_quotes(&row)?;
         if row.len() != header.len() {
             let i = row.len().min(header.len());
-            let what =
-                format!("expected {} fields as in the header, found {}", header.len(), row.len());
+            let (n, found) = (header.len(), row.len());
+            let hint = if row.iter().any(is_of_several) { COMMAS } else { "" };
+            let what = format!("expected {n} fields as in the header, found {found}{hint}");
             return Err(Error::scene(file.place(&row, i), what));
         }
         particles.push(columns.particle(&file, &row)?);
@@ -67,6 +70,11 @@ pub fn parse(text: &str, path: &Path) -> Result<(Vec<Particle>, Vec<usize>)> {
 
 fn is_blank(row: &StringRecord) -> bool {
     row.len() == 1 && row[0].trim().is_empty()
+}
+
+/// Returns whether a field looks like several that are separated by other characters than commas.
+fn is_of_several(field: &str) -> bool {
+    field.trim().contains(|c: char| c == ';' || c.is_whitespace())
 }
 
 struct File<'a> {
@@ -122,11 +130,21 @@ impl Columns {
         let fault = |i: usize, what: &str| Err(Error::scene(file.place(header, i), what));
         let names: Vec<&str> = header.iter().map(str::trim).collect();
         if names.iter().all(|name| name.parse::<f64>().is_ok()) {
-            return fault(0, "expected a header x,y,z,sigma,kappa[,r,g,b], found numbers");
+            // A box file has one number on its first line.
+            let hint = match names.len() {
+                1 => "; a box file needs from = \"boxes\"",
+                _ => "",
+            };
+            return fault(0, &format!("expected {FIRST}, found numbers{hint}"));
         }
         for (i, name) in names.iter().enumerate() {
             if !COLUMNS.contains(name) {
-                let (meant, known) = (did_you_mean(name, &COLUMNS), list(&COLUMNS));
+                let meant = match name.starts_with('#') {
+                    true => "; a particle list has no comments".to_owned(),
+                    false if is_of_several(name) => COMMAS.to_owned(),
+                    false => did_you_mean(name, &COLUMNS),
+                };
+                let known = list(&COLUMNS);
                 let name = shown(name);
                 return fault(i, &format!("unknown column `{name}`{meant} (known: {known})"));
             }
@@ -278,8 +296,24 @@ mod tests {
             ),
             (
                 "\n1,2,3,4,5\n".to_owned(),
-                "2:1: expected a header x,y,z,sigma,kappa[,r,g,b], \
-                found numbers"
+                "2:1: expected a header x,y,z,sigma (or radius),kappa[,r,g,b], found numbers"
+                    .to_owned(),
+            ),
+            (
+                "3\n1\n3, 1, 1, 1, 0, 0, 0, 1\n".to_owned(),
+                "1:1: expected a header x,y,z,sigma (or radius),kappa[,r,g,b], found numbers; a \
+                 box file needs from = \"boxes\""
+                    .to_owned(),
+            ),
+            (
+                "x;y;z;sigma;kappa\n0;0;0;1;1".to_owned(),
+                format!(
+                    "1:1: unknown column `x;y;z;sigma;kappa`; commas separate the columns {known}"
+                ),
+            ),
+            (
+                row("0\t0\t0\t1\t1"),
+                "4:10: expected 5 fields as in the header, found 1; commas separate the columns"
                     .to_owned(),
             ),
             (row("0,0,0,1"), "4:8: expected 5 fields as in the header, found 4".to_owned()),

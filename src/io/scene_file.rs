@@ -10,7 +10,8 @@ use super::document::suggest::shown;
 use super::document::tree::Document;
 pub use super::scene_keys::MAX_SIDE;
 use super::scene_keys::{
-    Files, Listed, OnDisk, PhaseSpec, Read, add_defaults, hint, read_phases, read_scene, set_frames,
+    Files, KEY_NAMES, Listed, OnDisk, PhaseSpec, Read, add_defaults, read_phases, read_scene,
+    set_frames,
 };
 use crate::error::{Error, Place, Result};
 use crate::model::scene::Scene;
@@ -121,7 +122,7 @@ fn load_document(
     files: &dyn Files,
 ) -> Result<LoadedScene> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    file.source.hint = hint;
+    file.source.names = KEY_NAMES;
     add_defaults(&mut file);
     let mut document = file.clone();
     document.apply(overrides)?;

@@ -10,7 +10,7 @@ use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 use super::atomic::{folder_of, write_atomic};
 use super::document::overrides::{is_word, parts};
 use super::document::tree::Document;
-use super::scene_keys::{DEFAULT_LIGHTS, DEFAULT_MATERIAL, add_defaults};
+use super::scene_keys::{DEFAULT_LIGHTS, DEFAULT_MATERIAL, KEY_NAMES, add_defaults};
 use super::text_file::{SCENE_LIMIT, read_text};
 use crate::error::{Error, Result};
 
@@ -37,6 +37,7 @@ pub fn text_of(from: &Path, to: &Path, overrides: &[String], seed: Option<u32>) 
     // A fault gives the message that `--set` gives.
     let mut document = Document::parse(text.clone(), from)?;
     add_defaults(&mut document);
+    document.source.names = KEY_NAMES;
     document.apply(overrides)?;
     let fault = |what: String| Error::io(from, format!("cannot be saved otherwise: {what}"));
     let mut edited: DocumentMut =

@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use super::input_file;
+use super::near_file::missing;
 use crate::error::{Error, Place, Result};
 
 /// Largest scene file. Scenes are written by hand; the largest benchmark scene has a few KiB.
@@ -25,7 +26,7 @@ const BYTE_ORDER_MARK: char = '\u{feff}';
 /// [`Error::Io`] when the file cannot be read or is larger than `limit`, and [`Error::Scene`] with
 /// line and column when it is empty or no text.
 pub fn read_text(path: &Path, limit: u64, first: &str) -> Result<String> {
-    let bytes = input_file::read(path, limit).map_err(|e| Error::io(path, plain(&e)))?;
+    let bytes = input_file::read(path, limit).map_err(|e| Error::io(path, plain(&e, path)))?;
     let text = decode(bytes, path)?;
     if text.trim().is_empty() {
         return Err(Error::scene(
@@ -80,9 +81,9 @@ fn decode(bytes: Vec<u8>, path: &Path) -> Result<String> {
 }
 
 /// Returns the message of an error without its number, which tells a user nothing.
-fn plain(e: &std::io::Error) -> String {
+fn plain(e: &std::io::Error, path: &Path) -> String {
     match e.kind() {
-        ErrorKind::NotFound => "no such file".to_owned(),
+        ErrorKind::NotFound => missing(path),
         _ => e.to_string(),
     }
 }

@@ -8,6 +8,9 @@
 //! The interval covers the noise within each run, from frame to frame. It does not cover what
 //! changes from one start of the program to the next, such as memory layout or other processes. The
 //! blocks of one run show some of that: if they differ as much as A and B do, a remark says so.
+//!
+//! Where nothing moves in A or B, the loops that skip draw nothing and are not compared. The loop
+//! without skipping then has the verdict.
 
 use std::collections::BTreeSet;
 
@@ -15,6 +18,7 @@ use serde::Serialize;
 
 use super::difference::{Difference, differences, remarks};
 use super::intervals::{N_FRAMES_NEEDED, ratio_interval, spread_of_blocks};
+use super::records::Mode;
 use super::results::{BenchResults, TimedMode};
 use crate::measure::bootstrap::{Bootstrap, Interval};
 use crate::measure::stats::median;
@@ -99,7 +103,7 @@ impl ModeComparison {
 pub struct Comparison {
     /// The conditions that differ.
     pub differences: Vec<Difference>,
-    /// Every loop that both ran.
+    /// Every loop that both ran, but those that draw nothing.
     pub modes: Vec<ModeComparison>,
     /// Remarks on the runs and their frames.
     pub remarks: Vec<String>,
@@ -108,10 +112,14 @@ pub struct Comparison {
 impl Comparison {
     /// Compares two results.
     pub fn new(a: &BenchResults, b: &BenchResults) -> Comparison {
-        let modes = compare_modes(&a.modes, &b.modes);
+        let left_out = left_out(a, b);
+        let mut pairs = pairs(&a.modes, &b.modes);
+        pairs.retain(|(of_a, _)| !left_out.contains(of_a.name.as_str()));
+        let modes = compare_modes(&pairs);
         let mut remarks = remarks(&a.run, &b.run);
+        remarks.extend(still_remark(a, b, &left_out));
         remarks.extend(frame_remarks(&a.modes, &b.modes));
-        remarks.extend(steadiness_remarks(&a.modes, &b.modes, &modes));
+        remarks.extend(steadiness_remarks(&pairs, &modes));
         Comparison { differences: differences(&a.run, &b.run), modes, remarks }
     }
 }
@@ -151,19 +159,61 @@ fn compare(measure: &str, a: &[f64], b: &[f64]) -> MeasureComparison {
     }
 }
 
-/// Compares every loop that both ran, and every measure that either has, in A's order and then B's.
-fn compare_modes(a: &[TimedMode], b: &[TimedMode]) -> Vec<ModeComparison> {
-    pairs(a, b)
-        .map(|(a, b)| ModeComparison { name: a.name.clone(), measures: compare_measures(a, b) })
-        .collect()
+/// A loop of A and the same loop of B.
+type Pair<'a> = (&'a TimedMode, &'a TimedMode);
+
+/// Compares every measure that either loop of a pair has, in A's order and then B's.
+fn compare_modes(pairs: &[Pair<'_>]) -> Vec<ModeComparison> {
+    let compare = |(a, b): &Pair<'_>| ModeComparison {
+        name: a.name.clone(),
+        measures: compare_measures(a, b),
+    };
+    pairs.iter().map(compare).collect()
 }
 
 /// Returns the loops that both have.
-fn pairs<'a>(
-    a: &'a [TimedMode],
-    b: &'a [TimedMode],
-) -> impl Iterator<Item = (&'a TimedMode, &'a TimedMode)> {
-    a.iter().filter_map(|of_a| Some((of_a, b.iter().find(|of_b| of_b.name == of_a.name)?)))
+fn pairs<'a>(a: &'a [TimedMode], b: &'a [TimedMode]) -> Vec<Pair<'a>> {
+    let of_b = |name: &str| b.iter().find(|of_b| of_b.name == name);
+    a.iter().filter_map(|of_a| Some((of_a, of_b(&of_a.name)?))).collect()
+}
+
+/// Returns the names of the loops that draw nothing in A or B, of cases that also have a loop
+/// without skipping in both. That loop has the figure of the case.
+fn left_out<'a>(a: &'a BenchResults, b: &'a BenchResults) -> BTreeSet<&'a str> {
+    let names_b: BTreeSet<&str> = b.modes.iter().map(|mode| mode.name.as_str()).collect();
+    let with_figure: BTreeSet<String> = a
+        .timed()
+        .filter(|(_, mode, timed)| !mode.skip && names_b.contains(timed.name.as_str()))
+        .map(|(case, ..)| case.name())
+        .collect();
+    [a, b]
+        .into_iter()
+        .flat_map(BenchResults::timed)
+        .filter(|(case, mode, _)| case.draws_nothing(mode) && with_figure.contains(&case.name()))
+        .map(|(.., timed)| timed.name.as_str())
+        .collect()
+}
+
+/// Returns a remark on cases in which nothing moves. The loops `left_out` are not compared.
+fn still_remark(a: &BenchResults, b: &BenchResults, left_out: &BTreeSet<&str>) -> Option<String> {
+    let still = |of: &BenchResults| of.run.cases.iter().filter(|case| case.is_still()).count();
+    let n = still(a).max(still(b));
+    let n_all = a.run.cases.len().max(b.run.cases.len());
+    let figures: BTreeSet<String> = [a, b]
+        .into_iter()
+        .flat_map(|of| &of.run.cases)
+        .filter(|case| case.is_still())
+        .filter_map(|case| case.figure_mode().map(Mode::name))
+        .collect();
+    let figures = figures.into_iter().collect::<Vec<_>>().join(", ");
+    let what = if left_out.is_empty() {
+        "A and B have no loop without skipping in common, so the times are of frames that draw \
+         nothing"
+            .to_owned()
+    } else {
+        format!("loops that draw nothing are left out, and the figure is the loop {figures}")
+    };
+    (n > 0).then(|| format!("nothing moves in {n} of {n_all} cases: {what}"))
 }
 
 fn compare_measures(a: &TimedMode, b: &TimedMode) -> Vec<MeasureComparison> {
@@ -178,13 +228,9 @@ fn compare_measures(a: &TimedMode, b: &TimedMode) -> Vec<MeasureComparison> {
 
 /// Remarks on loops whose headline differs by no more than the blocks of A or B, which ran the same
 /// frames: an unsteady machine may have caused the difference.
-fn steadiness_remarks(
-    a: &[TimedMode],
-    b: &[TimedMode],
-    compared: &[ModeComparison],
-) -> Vec<String> {
+fn steadiness_remarks(pairs: &[Pair<'_>], compared: &[ModeComparison]) -> Vec<String> {
     let mut remarks = Vec::new();
-    for (mode, (a, b)) in compared.iter().zip(pairs(a, b)) {
+    for (mode, (a, b)) in compared.iter().zip(pairs) {
         let found = mode.headline().filter(|h| h.verdict != Verdict::NoDifferenceFound);
         let Some(ratio) = found.and_then(|h| h.b_by_a) else { continue };
         for (name, of) in [("A", a), ("B", b)] {
@@ -213,7 +259,7 @@ fn frame_remarks(a: &[TimedMode], b: &[TimedMode]) -> Vec<String> {
         }
     }
     let numbers = |mode: &TimedMode| mode.frames.iter().copied().collect::<BTreeSet<u32>>();
-    for (mode, _) in pairs(a, b).filter(|(a, b)| numbers(a) != numbers(b)) {
+    for (mode, _) in pairs(a, b).into_iter().filter(|(a, b)| numbers(a) != numbers(b)) {
         let what = "timed different frames of the scene: if the scene changes, so may the median";
         remarks.push(format!("{}: A and B {what}", mode.name));
     }
@@ -221,179 +267,4 @@ fn frame_remarks(a: &[TimedMode], b: &[TimedMode]) -> Vec<String> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::measure::random::{SplitMix64, frame_times};
-    use crate::timing::results::Measure;
-
-    const N_TRIALS: usize = 100;
-    const SEED: u64 = 1;
-    /// Frames of a scene of 120 frames in two blocks, the default.
-    const N_FRAMES: usize = 240;
-    /// Least and greatest noise of a quiet machine, relative to the median.
-    const NOISE: [f64; 2] = [0.015, 0.03];
-    /// Correlation from frame to frame.
-    const RHO: f64 = 0.3;
-
-    /// Returns how often B at `slowdown` times A was called faster, no different, and slower.
-    fn verdicts(slowdown: f64, noise: f64, n_trials: usize, seed: u64) -> (usize, usize, usize) {
-        let mut random = SplitMix64(seed);
-        let mut count = (0, 0, 0);
-        for _ in 0..n_trials {
-            let a = frame_times(&mut random, N_FRAMES, 16.0, noise, RHO);
-            let b = frame_times(&mut random, N_FRAMES, 16.0 * slowdown, noise, RHO);
-            match compare(HEADLINE, &a, &b).verdict {
-                Verdict::Faster => count.0 += 1,
-                Verdict::NoDifferenceFound => count.1 += 1,
-                Verdict::Slower => count.2 += 1,
-                other => panic!("{other:?}"),
-            }
-        }
-        count
-    }
-
-    #[test]
-    fn few_pairs_of_equal_runs_seem_to_differ() {
-        // 95.4 % of 4000 trials at either noise (below): 2.3 % seemed faster, 2.2 % slower. Of 400
-        // that is 382 with a standard deviation of 4.2: 371 is two and a half below.
-        for noise in NOISE {
-            let (faster, none, slower) = verdicts(1.0, noise, 4 * N_TRIALS, SEED);
-            assert!(none >= 371, "{faster} faster, {none} no difference, {slower} slower");
-            assert!(none < 4 * N_TRIALS, "a rule that never finds a difference");
-        }
-    }
-
-    #[test]
-    fn a_difference_of_three_percent_is_found_in_either_direction() {
-        // The standard error of the ratio is at most 1.25 · 3 % · 1.36 /√240 · √2 = 0.47 %: 3 % is
-        // more than six of them.
-        for noise in NOISE {
-            let (faster, none, slower) = verdicts(1.03, noise, N_TRIALS, SEED);
-            assert!(
-                slower >= 99 && faster == 0,
-                "{faster} faster, {none} no difference, {slower} slower"
-            );
-            let (faster, none, slower) = verdicts(1.0 / 1.03, noise, N_TRIALS, SEED);
-            assert!(
-                faster >= 99 && slower == 0,
-                "{faster} faster, {none} no difference, {slower} slower"
-            );
-        }
-    }
-
-    #[test]
-    #[ignore = "minutes: prints the figures of the comments"]
-    fn coverage_of_verdicts_in_thousands_of_trials() {
-        for noise in NOISE {
-            for slowdown in [1.0, 1.005, 1.01, 1.02, 1.03] {
-                let n_trials = if slowdown == 1.0 { 4000 } else { 1000 };
-                let (faster, none, slower) = verdicts(slowdown, noise, n_trials, 23);
-                println!(
-                    "{noise}, B {slowdown} A: {faster} faster, {none} none, {slower} slower \
-                     of {n_trials}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn a_run_does_not_differ_from_itself() {
-        for seed in 0..20 {
-            let a = frame_times(&mut SplitMix64(seed), 60, 16.0, NOISE[1], RHO);
-            let compared = compare(HEADLINE, &a, &a);
-            assert_eq!(compared.verdict, Verdict::NoDifferenceFound);
-            assert_eq!((compared.b_by_a.unwrap().estimate, compared.block_len), (1.0, 8));
-        }
-        assert_eq!(compare("sort", &[0.5; 30], &[0.5; 30]).verdict, Verdict::NoDifferenceFound);
-    }
-
-    #[test]
-    fn a_missing_verdict_says_why() {
-        let thirty = [2.0; N_FRAMES_NEEDED];
-        assert_eq!(compare("x", &thirty, &[3.0; N_FRAMES_NEEDED]).verdict, Verdict::Slower);
-        for (a, b, verdict) in [
-            (&thirty[..29], &thirty[..], Verdict::TooFewFrames),
-            (&thirty[..], &thirty[..29], Verdict::TooFewFrames),
-            (&[], &thirty[..], Verdict::NotMeasuredInA),
-            (&thirty[..], &[], Verdict::NotMeasuredInB),
-            (&[0.0; 30], &thirty[..], Verdict::NoRatio),
-        ] {
-            let compared = compare("x", a, b);
-            assert_eq!((compared.verdict, compared.b_by_a), (verdict, None));
-        }
-        // The medians are reported all the same.
-        assert_eq!(compare("x", &[1.0], &[4.0]).b_ms, Some(4.0));
-    }
-
-    fn mode(name: &str, frames: std::ops::Range<u32>, measures: &[(&str, f64)]) -> TimedMode {
-        let n = frames.len();
-        let measure =
-            |&(name, ms): &(&str, f64)| Measure { name: name.to_owned(), ms: vec![ms; n] };
-        TimedMode {
-            name: name.to_owned(),
-            frames: frames.collect(),
-            blocks: Vec::new(),
-            measures: measures.iter().map(measure).collect(),
-        }
-    }
-
-    #[test]
-    fn measures_are_matched_by_name_in_any_order() {
-        let a = [
-            mode("serial", 0..40, &[("frame", 10.0), ("sort", 1.0), ("grid", 2.0)]),
-            mode("parallel", 0..40, &[]),
-        ];
-        let mut b = [mode(
-            "serial",
-            0..40,
-            &[("frame", 11.0), ("grid", 1.0), ("tree", 3.0), ("first", 0.0)],
-        )];
-        b[0].measures[3].ms.clear();
-        let modes = compare_modes(&a, &b);
-        assert_eq!(modes.len(), 1);
-        let verdicts: Vec<_> =
-            modes[0].measures.iter().map(|m| (m.measure.as_str(), m.verdict)).collect();
-        assert_eq!(
-            verdicts,
-            [
-                ("frame", Verdict::Slower),
-                ("sort", Verdict::NotMeasuredInB),
-                ("grid", Verdict::Faster),
-                ("tree", Verdict::NotMeasuredInA)
-            ]
-        );
-        assert_eq!(modes[0].headline().map(|m| m.verdict), Some(Verdict::Slower));
-        let remarks = frame_remarks(&a, &b);
-        assert!(
-            remarks.len() == 1 && remarks[0].contains("parallel frames are in A alone"),
-            "{remarks:?}"
-        );
-        let later = frame_remarks(&a[..1], &[mode("serial", 5..45, &[])]);
-        assert!(later.len() == 1 && later[0].contains("different frames"), "{later:?}");
-    }
-
-    #[test]
-    fn a_difference_no_greater_than_between_blocks_is_remarked_on() {
-        let with_blocks = |ms: f64, blocks: &[f64]| {
-            let mut mode = mode("serial", 0..40, &[("frame", ms)]);
-            mode.blocks = blocks.iter().map(|ms| vec![*ms; 20]).collect();
-            [mode]
-        };
-        let remarks =
-            |a: &[TimedMode], b: &[TimedMode]| steadiness_remarks(a, b, &compare_modes(a, b));
-        // 10 against 11 ms; blocks of A from 9.5 to 10.5 are 1.105 apart, of B from 10.9 to 11.1
-        // are 1.018.
-        let (a, b) = (with_blocks(10.0, &[9.5, 10.5]), with_blocks(11.0, &[11.1, 10.9]));
-        let found = remarks(&a, &b);
-        assert!(
-            found.len() == 1 && found[0].contains("A's own blocks lie a factor of 1.105 apart"),
-            "{found:?}"
-        );
-        let found = remarks(&b, &a);
-        assert!(found.len() == 1 && found[0].contains("B's own blocks"), "{found:?}");
-        // Steady enough; no difference to doubt; a single block.
-        assert_eq!(remarks(&with_blocks(10.0, &[9.9, 10.1]), &b), [""; 0]);
-        assert_eq!(remarks(&a, &a), [""; 0]);
-        assert_eq!(remarks(&with_blocks(10.0, &[10.0]), &b), [""; 0]);
-    }
-}
+mod tests;

@@ -148,8 +148,8 @@ fn add_leaves(value: &Value, at: &str, leaves: &mut BTreeMap<String, String>) {
     }
 }
 
-/// Lists remarks on two runs that may be compared: unknown sources, interruptions, still scenes and
-/// other commands.
+/// Lists remarks on two runs that may be compared: unknown sources, interruptions and other
+/// commands.
 pub(super) fn remarks(a: &Run, b: &Run) -> Vec<String> {
     let mut remarks = Vec::new();
     if a.revision == b.revision && (a.revision == "unknown" || a.revision.ends_with("-dirty")) {
@@ -164,15 +164,6 @@ pub(super) fn remarks(a: &Run, b: &Run) -> Vec<String> {
                 "{name} was interrupted: its last block is incomplete, and a drift may not cancel"
             ));
         }
-    }
-    let n_still = |run: &Run| run.cases.iter().filter(|case| case.is_still()).count();
-    let n = n_still(a).max(n_still(b));
-    if n > 0 {
-        remarks.push(format!(
-            "nothing moves in {n} of {} cases: the loops that skip timed frames that draw nothing; \
-             their figure is the loop \"no-skip\"",
-            a.cases.len().max(b.cases.len())
-        ));
     }
     let [of_a, of_b] = [a, b].map(|run| relevant_words(&run.command).join(" "));
     if of_a != of_b {

@@ -108,7 +108,8 @@ pub fn cpu() -> Cpu {
     }
 }
 
-/// Returns the environment variables that Mesa, its software rasteriser and the Vulkan loader read.
+/// Returns the environment variables that Vulkan drivers and the loader read: Mesa's for every
+/// vendor, AMD's, NVIDIA's, Intel's and MoltenVK's.
 pub fn environment() -> BTreeMap<String, String> {
     relevant(
         std::env::vars_os()
@@ -117,7 +118,10 @@ pub fn environment() -> BTreeMap<String, String> {
 }
 
 fn relevant(variables: impl Iterator<Item = (String, String)>) -> BTreeMap<String, String> {
-    const PREFIXES: [&str; 4] = ["LP_", "MESA_", "VK_", "GALLIUM_"];
+    const PREFIXES: [&str; 17] = [
+        "LP_", "MESA_", "VK_", "GALLIUM_", "RADV_", "ACO_", "AMD_", "AMDVLK_", "NVK_", "NAK_",
+        "__GL_", "__NV_", "NVIDIA_", "ANV_", "INTEL_", "MVK_", "DRI_",
+    ];
     variables.filter(|(key, _)| PREFIXES.iter().any(|prefix| key.starts_with(prefix))).collect()
 }
 
@@ -167,12 +171,25 @@ mod tests {
 
     #[test]
     fn only_variables_of_drivers_are_kept() {
-        let given =
-            ["LP_NUM_THREADS", "HOME", "VK_DRIVER_FILES", "MESA_VK_DEVICE_SELECT", "SECRET_VK_KEY"];
+        let given = [
+            "LP_NUM_THREADS",
+            "HOME",
+            "VK_DRIVER_FILES",
+            "MESA_VK_DEVICE_SELECT",
+            "SECRET_VK_KEY",
+            "RADV_DEBUG",
+            "__GL_THREADED_OPTIMIZATIONS",
+        ];
         let kept = relevant(given.iter().map(|key| ((*key).to_owned(), "1".to_owned())));
         assert_eq!(
             kept.keys().collect::<Vec<_>>(),
-            ["LP_NUM_THREADS", "MESA_VK_DEVICE_SELECT", "VK_DRIVER_FILES"]
+            [
+                "LP_NUM_THREADS",
+                "MESA_VK_DEVICE_SELECT",
+                "RADV_DEBUG",
+                "VK_DRIVER_FILES",
+                "__GL_THREADED_OPTIMIZATIONS",
+            ]
         );
     }
 }

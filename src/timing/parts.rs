@@ -117,7 +117,8 @@ impl Part {
             ("processor", cpu.class()),
             ("environment", format!("{environment:?}")),
             ("validation", has("--validation")),
-            ("poison", has("--poison")),
+            ("guard bands", has("--guard")),
+            ("limit of a submission", max_submit(command)),
             ("passes", self.table.pass_names.join(", ")),
             ("first case", of_base(&Case::name)),
             ("scene of the first case", of_base(&|c| c.scene_hash.clone())),
@@ -129,6 +130,14 @@ impl Part {
             ("warm-up frames of a block", of_modes(|m| m.warm_up)),
         ]
     }
+}
+
+/// Returns the limit that a command gives in ms, or "default".
+fn max_submit(command: &[String]) -> String {
+    const OPTION: &str = "--max-submit-ms";
+    let after = command.iter().position(|word| word == OPTION).and_then(|i| command.get(i + 1));
+    let joined = || command.iter().find_map(|word| word.strip_prefix(OPTION)?.strip_prefix('='));
+    after.map(String::as_str).or_else(joined).unwrap_or("default").to_owned()
 }
 
 fn is_of_its_block(row: &FrameRow, run: &Run) -> bool {

@@ -126,6 +126,25 @@ impl Case {
         let is_still = self.is_still();
         self.modes.iter().find(|m| m.frames > 0 && !(is_still && m.skip))
     }
+
+    /// Returns the loops, the one with the figure first.
+    pub fn figure_first(&self) -> impl Iterator<Item = &Mode> {
+        let figure = self.figure_mode();
+        let is_figure = move |m: &&Mode| figure.is_some_and(|figure| std::ptr::eq(figure, *m));
+        figure.into_iter().chain(self.modes.iter().filter(move |m| !is_figure(m)))
+    }
+
+    /// Returns whether nothing moves and a loop skips: its times are those of frames that draw
+    /// nothing.
+    pub fn draws_nothing(&self, mode: &Mode) -> bool {
+        mode.skip && self.is_still()
+    }
+
+    /// Returns whether a loop draws nothing while another one has the figure of the case. Charts
+    /// and comparisons leave such loops out.
+    pub fn is_left_out(&self, mode: &Mode) -> bool {
+        self.draws_nothing(mode) && self.figure_mode().is_some()
+    }
 }
 
 /// Mean device time of a frame, in ms, with and without skipping; the difference is saved.
@@ -210,13 +229,16 @@ impl Mode {
         loop_name(&self.threading, self.skip)
     }
 
+    /// Returns the number of timed frames that drew nothing. Results of versions that did not count
+    /// them only tell whether all did.
+    pub fn n_empty(&self) -> usize {
+        let none_ran = || !self.passes.is_empty() && self.passes.iter().all(|p| p.n_run == 0);
+        self.empty_frames.unwrap_or_else(|| if none_ran() { self.frames } else { 0 })
+    }
+
     /// Returns whether at least half of the timed frames drew nothing.
     pub fn is_mostly_empty(&self) -> bool {
-        let none_ran = || !self.passes.is_empty() && self.passes.iter().all(|p| p.n_run == 0);
-        let all_or_none = || if none_ran() { self.frames } else { 0 };
-        self.skip
-            && self.frames > 0
-            && 2 * self.empty_frames.unwrap_or_else(all_or_none) >= self.frames
+        self.skip && self.frames > 0 && 2 * self.n_empty() >= self.frames
     }
 
     /// Returns "case: loop"; the loop alone for a case without a name.

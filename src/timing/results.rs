@@ -10,7 +10,7 @@ use super::attachments::{self, Attachments};
 use super::frame_rows::{FRAMES_FILE, FrameRow, FrameTable, parse_frames, write_frames};
 use super::json::{self, ResultFile};
 use super::names::{case_name, mode_name};
-use super::records::Run;
+use super::records::{Case, Mode, Run};
 use crate::error::{Error, Result};
 use crate::io::result_folder::{Existing, ResultFolder};
 use crate::io::text_file::{TABLE_LIMIT, read_result};
@@ -26,6 +26,14 @@ pub struct BenchResults {
     /// The times of every loop of every case, in the order of `run.cases` and their modes; a loop
     /// without timed frames is missing.
     pub modes: Vec<TimedMode>,
+}
+
+impl BenchResults {
+    /// Returns every loop that has timed frames, with its case and its record, in order.
+    pub fn timed(&self) -> impl Iterator<Item = (&Case, &Mode, &TimedMode)> {
+        let recorded = self.run.modes().filter(|(_, mode)| mode.frames > 0);
+        recorded.zip(&self.modes).map(|((case, mode), timed)| (case, mode, timed))
+    }
 }
 
 /// The timed frames of one loop of one case.

@@ -1,5 +1,6 @@
-//! The remark on a bench in which nothing moves. The loops that skip then draw nothing, and the
-//! figure is the loop without skipping.
+//! Remarks on what the loops that skip did not do. Where nothing moves they draw nothing, and the
+//! figure is the loop without skipping. In other scenes their times lack the passes that they
+//! skipped.
 
 use super::records::{Case, Mode, Run};
 use crate::measure::lows::fps;
@@ -51,6 +52,59 @@ pub fn empty_frames_text(case: &Case) -> Option<String> {
     let of = |m: &Mode| Some((m.empty_frames.unwrap_or(m.frames), m.frames)).filter(|_| m.skip);
     let (n_empty, n) = case.modes.iter().filter_map(of).max()?;
     (n_empty > 0).then(|| format!("{n_empty} of {n} timed frames draw nothing"))
+}
+
+/// Reason for which a case that stands still has neither a ratio of its loops nor a bound of their
+/// overlap.
+pub const NO_RATIO: &str = "the loops that skip draw nothing; --no-skip times them";
+
+/// Returns "case: loop", marked if nothing moves in the case and the loop draws nothing.
+pub fn marked_name(case: &Case, mode: &Mode) -> String {
+    let name = mode.name_in(case);
+    match (mode.n_empty(), mode.frames) {
+        (0, _) => name,
+        _ if !case.draws_nothing(mode) => name,
+        (n, n_all) if n == n_all => format!("{name} (draws nothing)"),
+        (n, n_all) => format!("{name} (draws nothing in {n} of {n_all} frames)"),
+    }
+}
+
+/// Returns the passes whose work skipping left out of some timed frames, in the order of the frame.
+/// The times of the loops that skip lack this work. Cases in which nothing moves have a remark of
+/// their own.
+pub fn skipped_passes(run: &Run) -> Vec<&str> {
+    let loops = run.modes().filter(|(case, mode)| mode.skip && !case.is_still());
+    let lacking: Vec<&str> = loops
+        .flat_map(|(_, mode)| &mode.passes)
+        .filter(|pass| pass.lacks_work())
+        .map(|pass| pass.name.as_str())
+        .collect();
+    let mut names: Vec<&str> = Vec::new();
+    for pass in run.modes().flat_map(|(_, mode)| &mode.passes) {
+        if lacking.contains(&pass.name.as_str()) && !names.contains(&pass.name.as_str()) {
+            names.push(&pass.name);
+        }
+    }
+    names
+}
+
+/// Returns a sentence on the skipped passes and the loop that times them; `None` if there are none.
+pub fn skipped_text(run: &Run) -> Option<String> {
+    let names = skipped_passes(run);
+    let mut loops: Vec<String> = Vec::new();
+    for name in run.modes().filter(|(_, mode)| !mode.skip).map(|(_, mode)| mode.name()) {
+        if !loops.contains(&name) {
+            loops.push(name);
+        }
+    }
+    (!names.is_empty()).then(|| {
+        format!(
+            "skipped in some timed frames or in all: {}; the loop without skipping ({}) times them \
+             in every frame",
+            names.join(", "),
+            loops.join(", ")
+        )
+    })
 }
 
 fn figure_text(mode: &Mode) -> String {

@@ -1,10 +1,10 @@
 //! Numbers as panels and messages show them: with the digits that matter.
 
-/// Number of digits that a number has at least, whatever the resolution.
+/// Smallest number of digits, whatever the resolution, so that a small number is not shown as 0.
 const LEAST_DIGITS: i32 = 3;
-/// Number of digits that f64 has at least.
+/// Largest number of digits after the first one: about the precision of f64.
 const MOST_DIGITS: i32 = 15;
-/// Sizes that are written without an exponent.
+/// Magnitudes that are written without an exponent. Others would need many zeros without meaning.
 const PLAIN: std::ops::Range<f64> = 1e-4..1e9;
 
 /// Writes `v` without the digits below `resolution`, and without trailing zeros.
@@ -23,8 +23,10 @@ pub fn format_to_resolution(v: f64, resolution: f64) -> String {
     };
     // Digits after the first one.
     let n_digits = (by_resolution + exponent).clamp(LEAST_DIGITS - 1, MOST_DIGITS);
-    if !PLAIN.contains(&v.abs()) {
-        let text = format!("{v:.*e}", n_digits as usize);
+    let text = format!("{v:.*e}", n_digits as usize);
+    // The written number decides: 9.999e-5 to three digits is 0.0001.
+    let rounded: f64 = text.parse().unwrap_or(v);
+    if !PLAIN.contains(&rounded.abs()) {
         let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
         return format!("{}e{power}", trimmed(digits));
     }
@@ -66,6 +68,8 @@ mod tests {
             (0.0, 0.1, "0"),
             (-0.0, 0.1, "0"),
             (1e15, 1.0, "1e15"),
+            (9.9999e-5, 1e-5, "0.0001"),
+            (999_999_999.7, 1.0, "1e9"),
             (1.0, 0.0, "1"),
             (8.731_787_123, f64::NAN, "8.73"),
         ] {

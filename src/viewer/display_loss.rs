@@ -3,7 +3,7 @@
 //!
 //! Xlib reports a broken connection through a function that must not return. It may be called on
 //! any thread, in the middle of a call of the window system. winit has a connection of its own, and
-//! panics where that one is the first to break.
+//! panics if that connection breaks first.
 
 use std::ffi::c_int;
 use std::panic::{PanicHookInfo, set_hook, take_hook};
@@ -19,14 +19,14 @@ use crate::io::console::say;
 /// A function that keeps unsaved work.
 type Rescue = Box<dyn FnOnce() + Send>;
 
-/// The hook for panics is set once.
+/// Guards the panic hook, so that repeated calls of [`on_loss`] do not stack hooks.
 static HOOK: Once = Once::new();
-/// Called once when the display is lost.
+/// The function that keeps unsaved work when the display is lost; called at most once.
 static RESCUE: Mutex<Option<Rescue>> = Mutex::new(None);
 
-/// Has `rescue` called when the display is lost. The last call of this function counts.
+/// Makes the loss of the display call `rescue`, in place of the function given before.
 ///
-/// Where the system has no Xlib there is no connection that could break.
+/// A system without Xlib has no such connection, so only winit's panics are handled there.
 pub fn on_loss(rescue: impl FnOnce() + Send + 'static) {
     *lock(&RESCUE) = Some(Box::new(rescue));
     HOOK.call_once(|| {

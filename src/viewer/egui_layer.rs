@@ -50,7 +50,8 @@ pub fn take_widgets(
     Ok(widgets)
 }
 
-/// Shortest interval between two updates of the panels while the user touches them.
+/// Shortest interval between two updates of the panels while the user touches them: about one frame
+/// of a 60 Hz display.
 const ACTIVE_INTERVAL: Duration = Duration::from_millis(16);
 
 /// Side of the largest texture that every Vulkan device supports.
@@ -170,8 +171,8 @@ impl EguiLayer {
 
 /// Sets the zoom that holds from the next pass on.
 ///
-/// `Context::set_zoom_factor` would take effect within that pass, after the size of the window in
-/// points and the places of events were computed by the old zoom.
+/// `Context::set_zoom_factor` would take effect within that pass. By then the window's size in
+/// points and the places of events are computed by the old zoom.
 fn set_zoom(context: &Context, zoom: f32) {
     context.options_mut(|options| options.zoom_factor = zoom);
 }

@@ -55,15 +55,18 @@ pub enum Motion {
     },
 }
 
-/// Smallest angle between the view direction and `up` or its opposite, rad.
+/// Smallest angle between the view direction and `up` or its opposite, rad. At 0 the right axis is
+/// undefined.
 const MIN_ANGLE_FROM_UP: f64 = 0.01;
-/// Part of the distance to the target that one notch covers.
+/// Part of the distance to the target that one notch covers: about seven notches halve it.
 const NOTCH: f64 = 0.1;
-/// Time to fly the distance to the target at the initial speed, s.
+/// Time to fly the distance to the target at the initial speed, s: slow enough to steer, and the
+/// user need not wait long to arrive.
 const CROSSING_S: f64 = 4.0;
-/// Bounds of distance and speed: within f32 and the largest coordinate of a scene.
+/// Bounds of distance, scene units, and speed, scene units a second: within f32 and the largest
+/// coordinate of a scene.
 const LIMITS: (f64, f64) = (1e-6, 1e14);
-/// Largest coordinate of the camera.
+/// Largest coordinate of the camera, scene units: the limit of scene files.
 const MAX_COORDINATE: f64 = 1e15;
 
 impl FlyCamera {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Number of names that are tried, so that the search ends.
+/// Number of names that are tried, so that the search ends: more files than a user saves by hand.
 const MAX_NAMES: u32 = 100_000;
 
 /// Writes a new file under the first of `name(1)`, `name(2)`, … that no file has. `write` gets the

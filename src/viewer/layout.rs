@@ -1,6 +1,7 @@
 //! Sizes of panels and text, from the size of a window and the scale of its display.
 
-/// Size of the smallest window that has all panels at their usual text size, points.
+/// Size of the smallest window that has all panels at their usual text size, points. Tests check
+/// the panels from this size on.
 const LEAST: [f64; 2] = [640.0, 480.0];
 /// Width below which the panels begin hidden, points: a third of it holds no line of theirs.
 const LEAST_FOR_PANELS: f64 = 600.0;

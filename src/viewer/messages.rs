@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Time that a message stays.
+/// Time that a message stays: long enough to read several lines.
 const SHOWN_FOR: Duration = Duration::from_secs(10);
-/// Number of messages that are shown at once.
+/// Number of messages that are shown at once: more would cover too much of the picture.
 const MAX_SHOWN: usize = 4;
 
 /// The last messages, oldest first.

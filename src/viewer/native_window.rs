@@ -13,7 +13,8 @@ use winit::window::Window;
 use crate::error::{Error, Result};
 use crate::gpu::{Instance, Surface};
 
-/// Pixels of a touchpad's scroll that count as one notch of a wheel.
+/// Pixels of a touchpad's scroll that count as one notch of a wheel. A smaller value approaches
+/// faster, a larger one more finely.
 const PIXELS_PER_NOTCH: f64 = 40.0;
 
 /// Opens a window with `size` pixels of content, and its Vulkan surface.

@@ -8,15 +8,18 @@ use egui::{
 
 /// Number of rows of a message: the whole path of a file in the narrowest picture beside panels.
 pub const MESSAGE_ROWS: usize = 8;
-/// Distance of banners from each other and from the picture's edges, points.
+/// Distance of banners from each other and from the picture's edges, points: enough to tell them
+/// apart.
 const GAP: f32 = 8.0;
-/// Distance of a banner's text from its edge, points.
+/// Distance of a banner's text from its edge, points. Lines have space above and below already, so
+/// the second distance is smaller.
 const MARGIN: Vec2 = vec2(8.0, 5.0);
-/// Size of a banner's text, points.
+/// Size of a banner's text, points: legible at one pixel a point, the smallest scale.
 const TEXT: f32 = 13.0;
-/// Number of characters of a banner beyond which its text is cut before it is laid out.
+/// Largest number of characters of a banner that are laid out. A huge message would slow the window
+/// down.
 const MAX_CHARS: usize = 2000;
-/// Smallest share that text of narrow panels shrinks to.
+/// Smallest share that text of narrow panels shrinks to: smaller text is hard to read.
 const LEAST_TEXT: f32 = 0.85;
 /// Width of the list of keys, points: the longest description takes two lines.
 const KEYS_WIDTH: f32 = 480.0;

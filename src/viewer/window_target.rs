@@ -13,7 +13,8 @@ use crate::gpu::{
 use crate::model::film::{Film, ToneMap};
 use crate::passes::present::{self, Compare, Present};
 
-/// Delay before another attempt while the window has no visible area.
+/// Delay before another attempt while the window has no visible area: too short to notice when the
+/// window returns, and long enough not to occupy a core.
 pub const HIDDEN_DELAY: Duration = Duration::from_millis(50);
 
 /// A window that a device draws pictures and widgets into.

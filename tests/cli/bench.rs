@@ -220,4 +220,8 @@ fn a_sweep_names_the_passes_whose_work_was_skipped() {
     let names = line.and_then(|l| l.split_once("; ")).expect(&table).0;
     // Gusts move the particles, but their boxes are filled once.
     assert_eq!((code, names), (0, "generate"), "{table}");
+    // The line names the loop that times them, and follows the table of the loops' times.
+    let after =
+        table.lines().skip_while(|l| !l.contains("serial no-skip")).skip(3).collect::<Vec<_>>();
+    assert!(after[0].contains("the loop without skipping (serial no-skip) times them"), "{table}");
 }

@@ -10,6 +10,7 @@ use nimbus::io::scene_file;
 use nimbus::model::scene::Scene;
 
 use crate::generated;
+use crate::program::run;
 
 fn scene(set: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
@@ -79,4 +80,23 @@ fn every_reason_is_named() {
     assert!(of(&bare, None, &none).contains("no particles"));
     // A number that is not finite is another fault, with a warning of its own.
     assert_eq!(warning(&hello, None, &[f32::NAN, 0.0, 0.0, 0.0]), None);
+}
+
+/// A lamp inside a cloud lights nearly nothing, one outside of it does.
+#[test]
+fn a_lamp_inside_a_cloud_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    std::fs::write(at("b.dat"), "600\n1\n600, 2, 1, 1.5, 0, 0, 0, 0.4\n").expect("boxes");
+    for (y, is_named) in [("0", true), ("4", false)] {
+        let lamp = format!("{{ kind = \"point\", position = [0, {y}, 0], intensity = [9, 9, 9] }}");
+        let cloud = "{ from = \"boxes\", file = \"b.dat\", texture = \"none\" }";
+        let text = format!("light = [{lamp}]\ncloud = [{cloud}]\n");
+        std::fs::write(at("s.toml"), text).expect("a scene");
+        let (scene, picture) = (at("s.toml"), at(&format!("{y}.png")));
+        let output = run(&["render", &scene, "--size", "32x24", "-o", &picture]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{text}");
+        assert_eq!(text.contains("warning: light.0 lights"), is_named, "{text}");
+    }
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::task::{ShardResult, Task};
 use crate::error::{Error, Result};
-use crate::farm::process::{self, EXCLUSIVE};
+use crate::farm::process::{self, EXCLUSIVE, IDLE_LIMIT};
 
 /// Runs `nimbus NAME SCENE ARGUMENTS` for the items of a shard, and returns what `read` finds in
 /// the folder of its results. The shard's files are then taken over from there.
@@ -31,7 +31,7 @@ pub fn run<T>(
     command.args(choice.device.iter().map(|device| format!("--device={device}")));
     command.args(choice.validation.then_some("--validation"));
     let child = command.stderr(Stdio::piped()).spawn();
-    let child = child.map_err(|cause| Error::io(Path::new("nimbus"), cause))?;
+    let child = child.map_err(|cause| Error::of_io(Path::new("nimbus"), &cause))?;
     ended(&format!("nimbus {name}"), child, task.stop)?;
     let found = read(&out)?;
     task.workplace.take(&out)?;
@@ -41,7 +41,7 @@ pub fn run<T>(
 /// Waits until a child ends and returns its failure as an error of this process.
 fn ended(name: &str, mut child: Child, stop: &AtomicBool) -> Result<()> {
     let failed = |cause| Error::io(Path::new(name), cause);
-    process::wait(&mut child, stop).map_err(failed)?;
+    process::wait(&mut child, stop, IDLE_LIMIT).map_err(failed)?;
     let output = child.wait_with_output().map_err(failed)?;
     let what = String::from_utf8_lossy(&output.stderr).trim().to_owned();
     match output.status.code() {

@@ -96,8 +96,8 @@ pub struct Task<'a> {
     pub workplace: &'a mut Workplace,
     /// Set when the run is to keep what is finished and end.
     pub stop: &'a AtomicBool,
-    /// Called after every item.
-    pub on_item: &'a dyn Fn(),
+    /// Called after every item, with whether this run made it.
+    pub on_item: &'a dyn Fn(bool),
 }
 
 impl Task<'_> {
@@ -112,13 +112,14 @@ impl Task<'_> {
     ) -> Result<()> {
         for item in self.items.clone() {
             let name = name(item);
-            if !self.workplace.has(&name) {
+            let is_new = !self.workplace.has(&name);
+            if is_new {
                 if self.stop.load(Ordering::Relaxed) {
                     return Err(Error::Interrupted);
                 }
                 self.workplace.add(&name, &make(item)?)?;
             }
-            (self.on_item)();
+            (self.on_item)(is_new);
         }
         Ok(())
     }

@@ -166,6 +166,10 @@ fn lines_that_were_not_edited_keep_their_text() {
     boxes.pop();
     let ends = |text: String| (text.matches("\r\n").count(), text.matches('\n').count());
     assert_eq!(ends(written(&boxes)), (5, 5));
+    let other = dir.path().join("other.dat");
+    write_like(&other, &path, &boxes).unwrap();
+    let text = |path| std::fs::read_to_string(path).unwrap();
+    assert_eq!(text(&other), text(&path));
     std::fs::write(&path, "no boxes").unwrap();
     assert_eq!(written(&boxes), format(&boxes));
 }

@@ -3,6 +3,7 @@
 //! and writes down what they came to.
 
 mod depth;
+mod other_files;
 pub mod overrides;
 pub mod section;
 pub mod suggest;

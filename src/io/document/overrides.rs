@@ -6,7 +6,9 @@ use toml::de::DeValue;
 
 use super::depth::{MAX_DOTS, too_deep};
 use super::suggest::{did_you_mean, shown};
-use super::tree::{Document, Entry, Node, Origin, TOO_DEEP, TOO_LARGE, Table, Value, convert};
+use super::tree::{
+    Document, Entry, KeyNames, Node, Origin, TOO_DEEP, TOO_LARGE, Table, Value, convert,
+};
 use crate::error::Result;
 
 impl Document {
@@ -32,7 +34,7 @@ impl Document {
         if segments.iter().any(|s| s.is_empty()) {
             return Err("expected key.path=VALUE, found an empty key".to_owned());
         }
-        put(&mut self.root, &segments, 0, parse_value(value, origin)?)
+        put(&mut self.root, &segments, 0, parse_value(value, origin)?, &self.source.names)
     }
 }
 
@@ -63,54 +65,98 @@ pub fn is_word(text: &str) -> bool {
 }
 
 /// Puts `value` at `segments[i..]` below `node`. An error says which segment the tree does not
-/// have.
+/// have; `names` serve its hints.
 pub fn put(
     node: &mut Node,
     segments: &[&str],
     i: usize,
     value: Node,
+    names: &KeyNames,
 ) -> std::result::Result<(), String> {
     let Some(segment) = segments.get(i) else {
         *node = value;
         return Ok(());
     };
+    let is_default = node.origin == Origin::Default;
     let here = || shown(&segments[..i].join("."));
     match &mut node.value {
-        Value::Table(table) => put_in_table(table, segments, i, value),
+        Value::Table(table) => put_in_table(table, segments, i, value, names),
         Value::Array(list) if *segment == "*" && !list.is_empty() => {
-            list.iter_mut().try_for_each(|item| put(item, segments, i + 1, value.clone()))
+            list.iter_mut().try_for_each(|item| put(item, segments, i + 1, value.clone(), names))
         }
         Value::Array(list) => {
             let n = list.len();
+            let meant = match segment.starts_with(|c: char| c.is_alphabetic()) {
+                true => meant(list, segments, i, names),
+                false => String::new(),
+            };
             let item = segment.parse().ok().and_then(|k: usize| list.get_mut(k));
-            let item = item.ok_or_else(|| match n {
-                0 => format!("`{}` is empty", here()),
-                _ => format!(
-                    "`{}`: expected a number from 0 to {}, or *, found `{}`{}",
-                    here(),
-                    n - 1,
-                    shown(segment),
-                    numbered(&segments[..i], segment, &segments[i + 1..])
-                ),
+            let item = item.ok_or_else(|| {
+                let (here, found) = (here(), shown(segment));
+                match n {
+                    0 => format!("`{here}` is empty"),
+                    _ if segment.parse::<usize>().is_ok() => format!(
+                        "`{here}.{found}` does not exist: `{here}` has {n} item{}, numbered from \
+                         0{}",
+                        if n == 1 { "" } else { "s" },
+                        if is_default { defaults_of(&here) } else { String::new() }
+                    ),
+                    _ => format!(
+                        "`{here}`: expected a number from 0 to {}, or *, found `{found}`{meant}",
+                        n - 1
+                    ),
+                }
             })?;
-            put(item, segments, i + 1, value)
+            put(item, segments, i + 1, value, names)
         }
         other => Err(format!("`{}` is no table: {}", here(), other.describe())),
     }
 }
 
-/// Returns the path with the number that is missing before `segment`, or that a coordinate has.
-fn numbered(before: &[&str], segment: &str, after: &[&str]) -> String {
-    if segment.chars().all(|c| c.is_ascii_digit()) {
-        return String::new();
-    }
-    let (i_axis, rest) = match ["x", "y", "z"].iter().position(|axis| axis == &segment) {
-        Some(i) => (i, after.to_vec()),
-        None => (0, [&[segment], after].concat()),
+/// Says where the items of an array come from that the scene does not have.
+fn defaults_of(array: &str) -> String {
+    format!(", which are the defaults of a scene without [[{array}]]")
+}
+
+/// Returns the path that was probably meant by `segments`, whose segment `i` is no number of an
+/// item of `list`. Where no item has such a key, returns where the key is; nothing for an unknown
+/// key.
+fn meant(list: &[Node], segments: &[&str], i: usize, names: &KeyNames) -> String {
+    let before = &segments[..i];
+    let path = |middle: &[String]| {
+        let before = before.iter().map(|segment| (*segment).to_owned());
+        before.chain(middle.iter().cloned()).collect::<Vec<_>>().join(".")
     };
-    let number = i_axis.to_string();
-    let path = [before, &[number.as_str()], &rest].concat().join(".");
-    format!("; write `{}`", shown(&path))
+    let write = |middle: &[String]| format!("; write `{}`", shown(&path(middle)));
+    if list.iter().any(|item| matches!(item.value, Value::Table(_))) {
+        // The number is missing, or a name stands in its place.
+        for rest in [&segments[i..], &segments[i + 1..]] {
+            let Some(key) = rest.first() else { continue };
+            let has_key = |item: &Node| match &item.value {
+                Value::Table(table) => names.can_have(&path(&[]), table, key),
+                _ => false,
+            };
+            if let Some(i_item) = list.iter().position(has_key) {
+                let rest = rest.iter().map(|segment| match axis(segment) {
+                    Some(i_axis) if segment != key => i_axis.to_string(),
+                    _ => (*segment).to_owned(),
+                });
+                return write(&[i_item.to_string()].into_iter().chain(rest).collect::<Vec<_>>());
+            }
+        }
+        let last = segments.iter().rfind(|segment| axis(segment).is_none()).unwrap_or(&"");
+        let hint = (names.hint)(&path(&[(*last).to_owned()]));
+        return hint.map_or(String::new(), |hint| format!("; {hint}"));
+    }
+    match axis(segments[i]).filter(|i_axis| *i_axis < list.len()) {
+        Some(i_axis) => write(&[i_axis.to_string()]),
+        None => String::new(),
+    }
+}
+
+/// Returns the number of a coordinate that is named by its axis.
+fn axis(segment: &str) -> Option<usize> {
+    ["x", "y", "z"].iter().position(|axis| *axis == segment)
 }
 
 fn put_in_table(
@@ -118,6 +164,7 @@ fn put_in_table(
     segments: &[&str],
     i: usize,
     value: Node,
+    names: &KeyNames,
 ) -> std::result::Result<(), String> {
     let origin = value.origin;
     if !table.contains_key(segments[i])
@@ -129,5 +176,6 @@ fn put_in_table(
     }
     let empty =
         || Entry { key_origin: origin, node: Node { origin, value: Value::Table(Table::new()) } };
-    put(&mut table.entry(segments[i].to_owned()).or_insert_with(empty).node, segments, i + 1, value)
+    let entry = table.entry(segments[i].to_owned()).or_insert_with(empty);
+    put(&mut entry.node, segments, i + 1, value, names)
 }

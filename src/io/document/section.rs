@@ -6,7 +6,7 @@ use std::fmt;
 use serde_json::{Map, Value as Json};
 
 use super::suggest::{did_you_mean, list, shown};
-use super::tree::{Document, Node, Origin, Source, Table, Value};
+use super::tree::{Document, Node, Origin, Source, Table, Value, kind_of};
 use crate::error::{Error, Place, Result};
 
 /// A table of a scene, or the absence of one, in which every key has its default.
@@ -31,7 +31,8 @@ impl<'a> Section<'a> {
             None => None,
             Some((Value::Table(table), _)) => Some(table),
             Some((other, origin)) => {
-                let what = format!("`{path}`: expected a table, found {}", other.describe());
+                let (found, right) = (other.describe(), single_table(&path, other));
+                let what = format!("`{path}`: expected a table, found {found}{right}");
                 return Err(source.fault(origin, what));
             }
         };
@@ -50,10 +51,11 @@ impl<'a> Section<'a> {
         });
         if let Some((key, entry)) = first {
             let what = format!(
-                "unknown key `{}`{} known here: {}",
+                "unknown key `{}`{} known here: {}{}",
                 self.name(&shown(key)),
                 self.suggestion(key, &known),
-                list(&known)
+                list(&known),
+                self.way_to_change_kind(key, entry.key_origin)
             );
             return Err(self.source.fault(entry.key_origin, what));
         }
@@ -61,13 +63,47 @@ impl<'a> Section<'a> {
         Ok(())
     }
 
-    /// Returns the nearest known name to an unknown key, or else where such a key is.
+    /// Returns the nearest known name to an unknown key, or else where such a key is. A key of
+    /// tables of another kind is named as such.
     fn suggestion(&self, key: &str, known: &[&str]) -> String {
-        let near = did_you_mean(key, known);
-        if !near.is_empty() {
-            return near;
+        let of_kind = match self.kind_without(key) {
+            Some((kind_key, kind, set)) => {
+                let table = self.path.split('.').next().unwrap_or_default();
+                let by = set.map_or(String::new(), |set| format!(" (set by --set {set})"));
+                format!(": a {table} with {kind_key} = {kind}{by} has no such key")
+            }
+            None => did_you_mean(key, known),
+        };
+        if of_kind.ends_with('?') {
+            return of_kind;
         }
-        (self.source.hint)(&self.name(key)).map_or(";".to_owned(), |hint| format!("; {hint};"))
+        let hint = (self.source.names.hint)(&self.name(key));
+        hint.map_or(format!("{of_kind};"), |hint| format!("{of_kind}; {hint};"))
+    }
+
+    /// Returns the key that sets the kind of this table, its value, and the argument of `--set`
+    /// that has set it, where tables of another kind have the unknown key.
+    fn kind_without(&self, key: &str) -> Option<(&'static str, String, Option<String>)> {
+        let (kind_key, node) = kind_of(self.table?)?;
+        if !self.source.names.has_for_a_kind(&self.path, key) {
+            return None;
+        }
+        let set = match node.origin {
+            Origin::Override(i) => Some(shown(&self.source.overrides[i])),
+            _ => None,
+        };
+        Some((kind_key, shown(&node.value.json().to_string()), set))
+    }
+
+    /// Returns how `--set` changes the kind of a table whose other keys are of the old kind.
+    fn way_to_change_kind(&self, key: &str, origin: Origin) -> String {
+        match self.kind_without(key) {
+            Some((kind_key, kind, Some(_))) if !matches!(origin, Origin::Override(_)) => {
+                let path = &self.path;
+                format!("; set all keys together: --set '{path}={{{kind_key}={kind}, …}}'")
+            }
+            _ => String::new(),
+        }
     }
 
     /// Returns the resolved table.
@@ -153,5 +189,16 @@ impl<'a> Section<'a> {
             Some(other) => format!(", found {}", other.describe()),
         };
         Err(self.fault(key, format!("expected an array of tables{found}")))
+    }
+}
+
+/// Returns the right form of a table that is written as an array of tables.
+fn single_table(path: &str, found: &Value) -> String {
+    let is_table = |item: &Node| matches!(item.value, Value::Table(_));
+    match found {
+        Value::Array(items) if items.iter().any(is_table) => {
+            format!(": write one [{path}], not [[{path}]]")
+        }
+        _ => String::new(),
     }
 }

@@ -6,7 +6,7 @@ use crate::io::plain_text::one_line;
 /// Returns the known name nearest to `typed` (Levenshtein distance, with a swap of neighbours as
 /// one edit), if it is within a third of its length. One edit is always near enough, so that `x1`
 /// still finds `x`.
-fn nearest<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
+pub fn nearest<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
     // A long word is near no known name; its start shows that as well.
     let typed: String = typed.to_lowercase().chars().take(64).collect();
     let scored =

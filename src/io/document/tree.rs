@@ -8,6 +8,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::depth::too_deep;
+use super::other_files;
 use super::suggest::cut;
 use crate::error::{Error, Place, Result};
 use crate::io::text_file::{self, line_column};
@@ -37,12 +38,52 @@ pub struct Source {
     pub text: String,
     /// `--set` arguments as typed.
     pub overrides: Vec<String>,
-    /// Where an unknown key may belong.
-    pub hint: Hint,
+    /// Names of the keys that the reader of the document knows.
+    pub names: KeyNames,
 }
 
-/// Returns a sentence about the keys that may be meant by the unknown key of this path.
-pub type Hint = fn(&str) -> Option<String>;
+/// Keys that set the kind of a table, which its other keys follow from.
+const KIND_KEYS: [&str; 2] = ["kind", "from"];
+
+/// Names of keys, for messages about a key that is unknown at its place.
+#[derive(Clone, Copy)]
+pub struct KeyNames {
+    /// Returns a sentence about the keys that may be meant by the unknown key of this path.
+    pub hint: fn(&str) -> Option<String>,
+    /// Returns whether a table of a kind, or of any kind, has a key. The table's name is its path
+    /// without numbers of items, such as `light`.
+    pub has: fn(&str, Option<&str>, &str) -> bool,
+}
+
+impl KeyNames {
+    /// No names.
+    pub const NONE: KeyNames = KeyNames { hint: |_| None, has: |_, _, _| false };
+
+    /// Returns whether the table at `path` can have the key, as far as its kind allows.
+    pub fn can_have(&self, path: &str, table: &Table, key: &str) -> bool {
+        let kind = kind_of(table).and_then(|(_, node)| match &node.value {
+            Value::String(kind) => Some(kind.as_str()),
+            _ => None,
+        });
+        (self.has)(&without_numbers(path), kind, key)
+    }
+
+    /// Returns whether a table at `path` of some kind has the key.
+    pub fn has_for_a_kind(&self, path: &str, key: &str) -> bool {
+        (self.has)(&without_numbers(path), None, key)
+    }
+}
+
+/// Returns the key that sets the kind of a table, with its value.
+pub fn kind_of(table: &Table) -> Option<(&'static str, &Node)> {
+    KIND_KEYS.iter().find_map(|key| table.get(*key).map(|entry| (*key, &entry.node)))
+}
+
+/// Returns a path without its numbers of items: `light.0` becomes `light`.
+pub fn without_numbers(path: &str) -> String {
+    let is_name = |segment: &&str| segment.parse::<usize>().is_err();
+    path.split('.').filter(is_name).collect::<Vec<_>>().join(".")
+}
 
 /// Origin of a key or a value. Lines and columns are found only for a message, because a tree has
 /// an origin for every value.
@@ -93,7 +134,15 @@ impl Document {
     /// When the file cannot be read or is no TOML.
     pub fn read(path: &Path) -> Result<Document> {
         let first = "a scene's tables, such as [camera] and [[cloud]]";
-        Document::parse(text_file::read_text(path, text_file::SCENE_LIMIT, first)?, path)
+        let mut is_numbers = false;
+        let read = text_file::read_text(path, text_file::SCENE_LIMIT, first).and_then(|text| {
+            is_numbers = other_files::begins_with_number(&text);
+            Document::parse(text, path)
+        });
+        read.map_err(|error| match other_files::remark(path, is_numbers) {
+            Some(remark) if path.is_file() => error.with_note(&remark),
+            _ => error,
+        })
     }
 
     /// Parses the text of a scene file; `path` is its name in messages.
@@ -102,7 +151,7 @@ impl Document {
     /// When the text is no TOML, with the place.
     pub fn parse(text: String, path: &Path) -> Result<Document> {
         let (path, overrides) = (path.to_owned(), Vec::new());
-        let source = Source { path, text, overrides, hint: |_| None };
+        let source = Source { path, text, overrides, names: KeyNames::NONE };
         if let Some(offset) = too_deep(&source.text) {
             return Err(source.fault(Origin::File(offset), TOO_DEEP));
         }

@@ -19,6 +19,7 @@ use super::weather::{WEATHER, ground_of, read_settings};
 use crate::error::{Error, Result};
 use crate::io::bounds::{AMOUNT, COORDINATE, GREATEST, is_carried_place, shortest};
 use crate::io::document::section::Section;
+use crate::io::near_file::MISSING;
 use crate::io::weather::{blobs, moving};
 use crate::io::{box_file, particle_file};
 use crate::model::air::Air;
@@ -61,6 +62,15 @@ struct Reading<'a, 'b> {
     around: &'a Surroundings<'b>,
     found: &'a mut Found,
     i_cloud: usize,
+}
+
+impl Reading<'_, '_> {
+    /// Notes that the file of the cloud gives it no particles.
+    fn note_empty(&mut self, path: &Path, why: &str) {
+        let note =
+            format!("cloud {}: {}: {why}, so the cloud is empty", self.i_cloud, path.display());
+        self.found.notes.push(note);
+    }
 }
 
 /// A kind of cloud: its keys beside those of every cloud, and the reader of its source.
@@ -220,10 +230,13 @@ fn open_file<T>(
     folder: &Path,
     open: impl FnOnce(&Path) -> Result<T>,
 ) -> Result<(T, PathBuf)> {
-    let path = folder.join(file(s)?);
+    let name = file(s)?;
+    let path = folder.join(&name);
     match open(&path) {
         Err(Error::Io { path, what }) => {
-            Err(s.fault("file", format!("{}: {what}", path.display())))
+            let is_lost = what == MISSING && Path::new(&name).is_relative();
+            let remark = if is_lost { "; names are relative to the scene's folder" } else { "" };
+            Err(s.fault("file", format!("{}: {what}{remark}", path.display())))
         }
         opened => Ok((opened?, path)),
     }
@@ -239,13 +252,20 @@ fn read_named(s: &mut Section, reading: &mut Reading, first: &str) -> Result<(St
 
 fn read_boxes(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
     let (text, path) = read_named(s, reading, box_file::FIRST)?;
-    Ok(CloudSource::Boxes { boxes: box_file::parse(&text, &path)?, law: box_law(s)? })
+    let boxes = box_file::parse(&text, &path)?;
+    if boxes.iter().all(|b| b.n_particles == 0) {
+        reading.note_empty(&path, "its boxes have no particles");
+    }
+    Ok(CloudSource::Boxes { boxes, law: box_law(s)? })
 }
 
 fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
     let (text, path) = read_named(s, reading, particle_file::FIRST)?;
     let (particles, lines) = particle_file::parse(&text, &path)?;
     reading.found.lines = lines;
+    if particles.is_empty() {
+        reading.note_empty(&path, "it has a header and no particles");
+    }
     Ok(CloudSource::Particles(particles))
 }
 

@@ -26,7 +26,7 @@ pub(super) use files::{Listed, OnDisk};
 use glam::DVec3;
 pub use key::Key;
 use key::{Keys, keys, read_tables};
-pub(super) use lights::DEFAULT_LIGHTS;
+pub use lights::DEFAULT_LIGHTS;
 pub(super) use materials::DEFAULT_MATERIAL;
 pub(super) use phases::{PhaseSpec, read_phases, set_frames};
 pub use picture::MAX_SIDE;
@@ -34,7 +34,7 @@ pub use spec::About;
 use spec::text;
 
 use super::document::section::Section;
-use super::document::tree::Document;
+use super::document::tree::{Document, KeyNames, without_numbers};
 use crate::error::{Error, Result};
 use crate::model::scene::Scene;
 
@@ -45,6 +45,35 @@ pub struct Table {
     pub name: String,
     /// Keys in the order in which the resolved scene has them.
     pub keys: Vec<&'static Key>,
+}
+
+impl Table {
+    /// Returns the path of the table without numbers of items, as [`KeyNames`] has it, and the kind
+    /// that its keys belong to.
+    fn path_and_kind(&self) -> (String, Option<&str>) {
+        let (table, rest) = self.name.split_once(' ').unwrap_or((&self.name, ""));
+        let table = table.trim_matches(['[', ']']);
+        match rest {
+            "path" => (format!("{table}.path"), None),
+            rest => (table.to_owned(), rest.split('"').nth(1)),
+        }
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.keys.iter().any(|key| key.name == name)
+    }
+}
+
+/// Names of a scene's keys.
+pub(super) const KEY_NAMES: KeyNames = KeyNames { hint, has: has_key };
+
+/// Returns whether a table has a key if it is of this kind, or of any kind where none is given.
+fn has_key(path: &str, kind: Option<&str>, name: &str) -> bool {
+    tables().iter().any(|table| {
+        let (of_path, of_kind) = table.path_and_kind();
+        let is_of_kind = of_kind.is_none() || kind.is_none() || of_kind == kind;
+        of_path == path && is_of_kind && table.has(name)
+    })
 }
 
 keys! {
@@ -84,13 +113,21 @@ pub fn tables() -> Vec<Table> {
     tables
 }
 
-/// Keys that are often looked for under another name, and what to do.
-const OTHER_NAMES: [(&[&str], &str); 9] = [
+/// Keys that are often looked for under another name, and what to do. A name with a dot is that of
+/// a key in one table.
+const OTHER_NAMES: [(&[&str], &str); 13] = [
     (&["count", "n", "n_particles", "number"], "`draw.particles` sets the number of particles"),
     (&["size", "resolution"], "`film.width` and `film.height` set the size, as --size does"),
     (&["fov", "angle"], "`camera.fov_y_deg` sets the field of view"),
     (&["pos", "eye", "from", "origin"], "`position` sets the place"),
+    (
+        &["camera.direction", "camera.forward", "camera.yaw", "camera.pitch", "camera.rotation"],
+        "the camera looks at the point `camera.target`",
+    ),
     (&["look_at", "lookat", "to", "center", "centre"], "`camera.target` sets the direction"),
+    (&["light.irradiance"], "`intensity` sets the strength of a point or a spot"),
+    (&["light.intensity"], "`irradiance` sets the strength of a directional light, a sky or a sun"),
+    (&["light.target"], "`direction` of a light is the way that its light travels"),
     (&["color", "colour", "albedo", "diffuse"], "`kd` of a [[material]] sets its colour"),
     (&["energy", "power", "brightness"], "`irradiance` or `intensity` sets a light's strength"),
     (&["density", "opacity", "kappa", "extinction"], "`optical_depth` sets the density of a cloud"),
@@ -98,20 +135,35 @@ const OTHER_NAMES: [(&[&str], &str); 9] = [
 ];
 
 /// Returns where a key that is unknown at this path may belong.
-pub(super) fn hint(path: &str) -> Option<String> {
-    let name = path.rsplit('.').next()?;
-    let tables = tables();
-    let has = |table: &&Table| table.keys.iter().any(|key| key.name == name);
-    let of_same_name: Vec<&Table> = tables.iter().filter(has).collect();
-    let other = OTHER_NAMES.iter().find(|(names, _)| names.contains(&name)).map(|(_, text)| *text);
-    match (&of_same_name[..], other) {
-        (_, Some(text)) => Some(text.to_owned()),
-        ([], None) => None,
-        ([first, ..], None) => Some(match first.name.as_str() {
-            "" => format!("`{name}` stands before every table"),
-            table => format!("`{name}` is a key of {table}"),
-        }),
+fn hint(path: &str) -> Option<String> {
+    let (table, name) = (path.split('.').next()?, path.rsplit('.').next()?);
+    let in_table = format!("{table}.{name}");
+    let is_other = |other: &&str| *other == name || *other == in_table;
+    let other = OTHER_NAMES.iter().find(|(names, _)| names.iter().any(is_other));
+    if let Some((_, text)) = other {
+        return Some((*text).to_owned());
     }
+    let tables = tables();
+    let of_same_name: Vec<&Table> = tables.iter().filter(|table| table.has(name)).collect();
+    let at = without_numbers(path);
+    let at = at.rsplit_once('.').map_or("", |(table, _)| table);
+    // A table of the same name and another kind is nearer than any other.
+    let is_near = |of: &&&Table| of.path_and_kind().0 == at;
+    let near: Vec<&str> = of_same_name.iter().filter(is_near).map(|of| of.name.as_str()).collect();
+    if !near.is_empty() {
+        return Some(format!("`{name}` is a key of {}", near.join(" and of ")));
+    }
+    let first = of_same_name.first()?;
+    Some(match (first.name.as_str(), first.path_and_kind().0) {
+        ("", _) => format!("`{name}` stands before every table"),
+        (table, path) if table.starts_with("[[") && !path.contains('.') => {
+            format!("`{name}` is a key of {table} (`{path}.0.{name}`)")
+        }
+        (table, path) if !path.contains('.') => {
+            format!("`{name}` is a key of {table} (`{path}.{name}`)")
+        }
+        (table, _) => format!("`{name}` is a key of {table}"),
+    })
 }
 
 /// A scene and its by-products.

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::io::document::overrides::put;
 use crate::io::document::section::Section;
 use crate::io::document::suggest::{list, shown};
-use crate::io::document::tree::{Document, Entry, Node, Origin, Table, Value};
+use crate::io::document::tree::{Document, Entry, KeyNames, Node, Origin, Table, Value};
 
 /// Keys that no phase can set.
 const NOT_IN_A_PHASE: [&str; 3] = ["title", "time", "phase"];
@@ -49,7 +49,8 @@ impl PhaseSpec {
     pub fn apply(&self, document: &mut Document) -> Result<()> {
         for (path, node) in &self.sets {
             let segments: Vec<&str> = path.iter().map(String::as_str).collect();
-            put(&mut document.root, &segments, 0, node.clone()).map_err(|what| {
+            let names = document.source.names;
+            put(&mut document.root, &segments, 0, node.clone(), &names).map_err(|what| {
                 let what = format!("phase \"{}\": {what}", shown(&self.name));
                 document.source.fault(node.origin, what)
             })?;
@@ -115,7 +116,7 @@ pub fn set_frames(document: &mut Document, n_frames: u32) -> Result<()> {
             );
             (given.origin, what)
         }
-        None => match put(&mut document.root, &["time", "frames"], 0, node) {
+        None => match put(&mut document.root, &["time", "frames"], 0, node, &KeyNames::NONE) {
             Ok(()) => return Ok(()),
             Err(what) => (Origin::Default, what),
         },

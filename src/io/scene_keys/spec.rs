@@ -22,6 +22,8 @@ pub struct Spec<T> {
     each: String,
     /// Value of a key that is not given; `None` for a required key.
     default: Option<Value>,
+    /// A value for messages: the default, also where the key is required.
+    example: Value,
     parse: Parser<T>,
 }
 
@@ -57,8 +59,9 @@ impl<T: 'static> Spec<T> {
         default: impl Into<Value>,
         parse: impl Fn(&Value) -> Parsed<T> + 'static,
     ) -> Spec<T> {
-        let (expected, default) = (expected.to_string(), Some(default.into()));
-        Spec { expected, each: String::new(), default, parse: Box::new(parse) }
+        let (expected, example) = (expected.to_string(), default.into());
+        let (each, default) = (String::new(), Some(example.clone()));
+        Spec { expected, each, default, example, parse: Box::new(parse) }
     }
 
     /// Makes the key required.
@@ -68,14 +71,15 @@ impl<T: 'static> Spec<T> {
 
     /// Replaces the default.
     pub fn or(self, default: impl Into<Value>) -> Spec<T> {
-        Spec { default: Some(default.into()), ..self }
+        let example = default.into();
+        Spec { default: Some(example.clone()), example, ..self }
     }
 
     /// Converts the value for the model; the resolved scene has it as it was.
     pub fn map<U>(self, convert: impl Fn(T) -> U + 'static) -> Spec<U> {
-        let Spec { expected, each, default, parse } = self;
+        let Spec { expected, each, default, example, parse } = self;
         let parse = move |value: &Value| parse(value).map(|(v, json)| (convert(v), json));
-        Spec { expected, each, default, parse: Box::new(parse) }
+        Spec { expected, each, default, example, parse: Box::new(parse) }
     }
 
     /// Takes the key's value, or its default, out of a table and records it.
@@ -97,11 +101,14 @@ impl<T: 'static> Spec<T> {
         if let Some(text) = meant.and_then(|other| toml_text(&other)) {
             return format!("; write `{}`", s.assignment(key, &text));
         }
-        let is_of_kind = |default: &Value| {
-            discriminant(default) == discriminant(value)
-                || (default.as_f64().is_some() && value.as_f64().is_some())
+        let is_of_form = |example: &Value| match (example, value) {
+            (Value::Array(example), Value::Array(items)) => example.len() == items.len(),
+            _ => {
+                discriminant(example) == discriminant(value)
+                    || (example.as_f64().is_some() && value.as_f64().is_some())
+            }
         };
-        let example = self.default.as_ref().filter(|d| !is_of_kind(d) && d.is_number_or_list());
+        let example = Some(&self.example).filter(|e| !is_of_form(e) && e.is_number_or_list());
         let example = example.and_then(toml_text);
         example.map_or_else(String::new, |text| {
             format!("; for example `{}`", s.assignment(key, &text))
@@ -204,9 +211,9 @@ pub fn vector(default: [f64; 3], bounds: Bounds) -> Spec<DVec3> {
     several(default, bounds).map(DVec3::from_array)
 }
 
-/// A vector that must be given.
+/// A vector that must be given. The example of a message is a direction and a strength as well.
 pub fn required_vector(bounds: Bounds) -> Spec<DVec3> {
-    vector([0.0; 3], bounds).required()
+    vector([1.0; 3], bounds).required()
 }
 
 /// True or false.

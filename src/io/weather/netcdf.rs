@@ -13,6 +13,7 @@ use netcdf_reader::{
 use super::container::{Attribute, Checked, Dimension, Value, Variable};
 use crate::error::{Error, Place, Result};
 use crate::io::input_file;
+use crate::io::near_file::missing;
 
 /// Most numbers that one part of a variable may have: those of a step of the largest grid.
 const MOST_NUMBERS: u64 = 1 << 25;
@@ -43,7 +44,7 @@ pub struct NetCdf {
 pub fn open(path: &Path) -> Result<NetCdf> {
     // Only the parts that are asked for are read, so that the size has no limit.
     let file = input_file::open(path, u64::MAX).map_err(|e| match e.kind() {
-        ErrorKind::NotFound => Error::io(path, "no such file"),
+        ErrorKind::NotFound => Error::io(path, missing(path)),
         _ => Error::io(path, e),
     })?;
     // Read by ranges and not mapped: a mapped file that is cut off while it is read ends the

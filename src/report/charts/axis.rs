@@ -30,7 +30,8 @@ pub struct Axis {
 
 /// Margin beyond the outermost values, as a share of their span: a marker is about as wide.
 pub const MARGIN: f64 = 0.06;
-/// Smallest margin of a logarithmic axis, in decades. A single value spans nothing.
+/// Smallest margin of a logarithmic axis, in decades: a single value spans nothing, and its axis
+/// then covers a factor of about 1.4.
 const MIN_MARGIN: f64 = 0.08;
 
 impl Axis {
@@ -106,10 +107,11 @@ pub fn row_middle(i: usize, n: usize) -> f64 {
     (n - i) as f64 - 0.5
 }
 
-/// Returns ticks of a logarithmic axis: as many multiples in every decade as there is room for, or
-/// whole decades, or every so many decades.
+/// Returns at most `n_most` ticks of a logarithmic axis, or two if `n_most` is less. Each decade
+/// has as many as fit. On a long axis only every second, third, … decade has one.
 fn log_ticks(range: Range<f64>, n_most: usize) -> Vec<Tick> {
     let n_most = n_most.max(2);
+    /// Multiples of a power of ten that get a tick, the densest choice first.
     const UNITS: [&[f64]; 4] =
         [&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], &[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
     let decades = range.start.floor() as i32..=range.end.floor() as i32;
@@ -121,6 +123,7 @@ fn log_ticks(range: Range<f64>, n_most: usize) -> Vec<Tick> {
     let finest = UNITS.iter().map(|units| of(units, 1)).find(|values| values.len() <= n_most);
     let coarser = || (2..).map(|step| of(UNITS[3], step)).find(|values| values.len() <= n_most);
     let mut values = finest.or_else(coarser).unwrap_or_default();
+    // A short axis may contain hardly any of these multiples; evenly spaced ticks fill it.
     if values.len() < 3 && range.end - range.start < 1.5 {
         values = linear_steps(10f64.powf(range.start), 10f64.powf(range.end), n_most);
         values.retain(|v| *v > 0.0);

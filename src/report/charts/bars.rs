@@ -6,7 +6,7 @@ use super::axis::row_middle;
 use super::medium::CELL;
 use super::plot_area::PlotArea;
 
-/// Thickness of a bar as a share of its row.
+/// Thickness of a bar as a share of its row. The rest is the gap between bars of adjacent rows.
 const THICKNESS: f64 = 0.62;
 
 /// Returns the upper and the lower end of the bar in row `i` of `n`, px.

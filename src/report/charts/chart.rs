@@ -65,14 +65,14 @@ pub trait Chart {
     /// Draws axes and data, and returns the tooltips.
     ///
     /// # Errors
-    /// If the backend fails.
+    /// Fails if the backend fails.
     fn draw<DB: DrawingBackend>(&self, canvas: &Canvas<'_, DB>) -> DrawResult<Vec<Tooltip>, DB>;
 
     /// Returns the chart as an SVG document of the given width and height, px. Text stays text, and
     /// tooltips are focusable elements with titles.
     ///
     /// # Errors
-    /// If plotters cannot draw the chart.
+    /// Fails if plotters cannot draw the chart.
     fn svg(&self, (width, height): (u32, u32)) -> Result<String> {
         let medium = Medium::Picture;
         let (legend, notes) = (self.legend(), self.notes());
@@ -120,7 +120,7 @@ pub trait Chart {
     /// are the size of the chart alone.
     ///
     /// # Errors
-    /// If plotters cannot draw the chart.
+    /// Fails if plotters cannot draw the chart.
     fn text(&self, columns: usize, rows: usize, colored: bool) -> Result<String> {
         let medium = Medium::Terminal;
         let mut characters = TextCanvas::new(columns, rows);
@@ -165,11 +165,11 @@ fn fault(cause: impl Display) -> Error {
     Error::Fault { what: format!("cannot draw a chart: {cause}") }
 }
 
-/// Distance of text from the edges of a picture, px.
+/// Distance of text from the edges of a picture, px: about the height of a letter.
 const MARGIN: i32 = 12;
-/// Gap above the notes, px.
+/// Gap above the notes, px: about half a line, which sets them off from the x axis.
 const NOTES_GAP: i32 = 8;
-/// Side of a legend entry's square, px.
+/// Side of a legend entry's square, px: a little less than the font size, as letters are.
 const SWATCH: i32 = 11;
 
 /// Returns line and left end of every legend entry, with as many entries on a line as fit.

@@ -18,13 +18,16 @@ use crate::studies::error::front::{Front, Metric};
 use crate::studies::error::records::{Configuration, Study};
 use crate::studies::figure::Figure;
 
-/// Number of configurations on the front that are listed below the chart.
+/// Number of configurations on the front that are listed below the chart: the list stays shorter
+/// than the chart, in a picture and in a terminal.
 const N_LISTED: usize = 14;
-/// Characters of a line of that list.
+/// Characters of a line of that list: as many as `Medium::width_of` fits into 900 px less margins.
 const LINE_LENGTH: usize = 112;
-/// Opacity of the intervals of configurations behind the front.
+/// Opacity of the intervals of configurations behind the front: the front stands out, and these
+/// intervals stay legible.
 const FAINT: f64 = 0.55;
-/// An interval extends an axis at most by this factor beyond the outermost values.
+/// An interval extends an axis at most by this factor beyond the outermost values. More would crowd
+/// the points into a small part of the chart.
 const INTERVAL_REACH: f64 = 3.0;
 
 /// The chart of an error study.
@@ -43,7 +46,7 @@ struct Point {
     time: Figure,
     error: Figure,
     front: Front,
-    /// Number on the front, from the fastest.
+    /// Position on the front, counted from 1 at the fastest; `None` for points off the front.
     number: Option<usize>,
     is_base: bool,
 }
@@ -58,7 +61,7 @@ pub fn chart(study: &Study) -> ErrorChart {
             && error.value.is_finite()
             && error.value >= 0.0;
         is_drawable.then(|| Point {
-            name: c.name.clone(),
+            name: study.label(c),
             time,
             error,
             front: c.front,
@@ -134,7 +137,7 @@ impl Point {
 }
 
 impl ErrorChart {
-    /// Returns the front from the fastest.
+    /// Returns the points on the front, the fastest first.
     fn front(&self) -> Vec<&Point> {
         let mut front: Vec<&Point> = self.points.iter().filter(|p| p.number.is_some()).collect();
         front.sort_by_key(|p| p.number);
@@ -218,14 +221,15 @@ impl Chart for ErrorChart {
         // The front is drawn last, above the rest.
         let is_behind = |p: &Point| matches!(p.front, Front::Off | Front::Unknown);
         drawn.sort_by_key(|(p, _)| (!is_behind(p), p.front == Front::On, Reverse(p.number)));
-        // Steps to the right, then down: up to the next one's time no error is smaller.
+        // The front goes right, then down: no configuration faster than the next one has a smaller
+        // error.
         let front: Vec<(f64, f64)> = self.front().into_iter().filter_map(at).collect();
         let step = |pair: &[(f64, f64)]| [pair[0], (pair[1].0, pair[0].1), pair[1]];
         let steps: Vec<_> = front.windows(2).flat_map(step).collect();
         area.line(&steps, series(0).stroke_width(2))?;
         for (point, (px, py)) in &drawn {
             if is_behind(point) && medium.is_terminal() {
-                // The dots would cover the front.
+                // The dots of these intervals would cover the front.
                 continue;
             }
             let style = point.marker().1.mix(if is_behind(point) { FAINT } else { 1.0 });

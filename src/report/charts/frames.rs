@@ -14,11 +14,13 @@ use crate::timing::frame_rows::FrameRow;
 use crate::timing::names::{loop_name, sweep_text};
 use crate::timing::results::BenchResults;
 
-/// If a frame takes longer than this multiple of the 99th percentile, the axis is cut.
+/// If a frame takes longer than this multiple of the 99th percentile, the axis is cut. Below that,
+/// usual frames still fill a third of the height.
 const CUT_ABOVE: f64 = 3.0;
-/// End of a cut axis as a multiple of the 99th percentile. A note counts the frames above it.
+/// End of a cut axis as a multiple of the 99th percentile: usual frames fill two thirds of the
+/// height. A note counts the frames above it.
 const CUT_AT: f64 = 1.5;
-/// Smallest width of a bin in a picture, px.
+/// Smallest width of a bin in a picture, px: a little more than the median's line, which is 2 px.
 const BIN_PX: i32 = 3;
 
 /// The chart of one point of a sweep, or of a whole run without sweep.
@@ -38,21 +40,19 @@ struct Loop {
 }
 
 /// Returns the charts of rows of frames.csv, without warm-up.
-pub fn charts_of_rows(rows: &[FrameRow]) -> Vec<FrameChart> {
+pub fn charts_of_rows<'a>(rows: impl IntoIterator<Item = &'a FrameRow>) -> Vec<FrameChart> {
     let mut charts = Vec::new();
-    for row in rows.iter().filter(|row| !row.warm_up) {
+    for row in rows.into_iter().filter(|row| !row.warm_up) {
         let name = loop_name(&row.threading, row.skip);
         add(&mut charts, [&row.sweep, &row.phase, &name], row.frame, row.frame_ms);
     }
     charts
 }
 
-/// Returns the charts of a bench's results.
+/// Returns the charts of a bench's results, without the loops that draw nothing.
 pub fn charts_of(results: &BenchResults) -> Vec<FrameChart> {
     let mut charts = Vec::new();
-    // `results.modes` holds the loops that have timed frames.
-    let timed = results.run.modes().filter(|(_, mode)| mode.frames > 0);
-    for ((case, mode), times) in timed.zip(&results.modes) {
+    for (case, mode, times) in results.timed().filter(|(case, mode, _)| !case.is_left_out(mode)) {
         let (sweep, name) = (sweep_text(&case.sweep), mode.name());
         let phase = case.phase.as_deref().unwrap_or_default();
         for (frame, ms) in times.frames.iter().zip(times.blocks.iter().flatten()) {
@@ -198,7 +198,7 @@ impl Chart for FrameChart {
         let ends = (f64::from(first) - 0.5, f64::from(last) + 0.5);
         let n_ticks = (width / medium.across(70, 9)) as usize;
         let mut x = Axis::linear("frame of the scene", ends.0, ends.1, n_ticks);
-        // There is no half frame.
+        // A tick between two frames would name a frame that does not exist.
         x.ticks.retain(|tick| tick.at.fract() == 0.0);
         let y = Axis::linear("ms", 0.0, self.top(), (height / medium.down(36, 2)) as usize);
         let area = PlotArea::new(canvas, &x, &y, GridLines::Horizontal)?;

@@ -54,11 +54,12 @@ pub fn series(i: usize) -> RGBColor {
 
 /// Returns the character of data series `i`.
 pub fn glyph(i: usize) -> char {
+    /// Filled and empty shapes alternate, so that neighbouring series differ without colour.
     const GLYPHS: [char; 8] = ['●', '○', '◆', '◇', '▲', '△', '■', '□'];
     GLYPHS[i % GLYPHS.len()]
 }
 
-/// Font size, px.
+/// Font size, px: small, so that labels leave room for data, and still legible at 100 % zoom.
 const FONT_PX: f64 = 13.0;
 /// plotters divides font sizes by this number when it writes SVG.
 const PLOTTERS_FONT: f64 = 1.24;
@@ -98,7 +99,7 @@ impl Medium {
         self.across((f64::from(n) * 0.6 * FONT_PX).ceil() as i32, n)
     }
 
-    /// Returns the distance of two baselines.
+    /// Returns the distance of two baselines: px in a picture, Braille dots in a terminal.
     pub fn line_height(self) -> i32 {
         self.down(18, 1)
     }

@@ -64,7 +64,7 @@ pub enum MarkerFill {
     None,
 }
 
-/// Half the length of the line across the end of an interval, px.
+/// Half the length of the line across the end of an interval, px: less than the radius of markers.
 const CAP_PX: i32 = 3;
 
 impl<'a, DB: DrawingBackend> PlotArea<'a, DB> {

@@ -1,19 +1,22 @@
 //! A measure against a swept key: one line for each value of a second key or each loop, and one
 //! chart for each combination of the others.
 
+mod bench;
+mod study;
+
+pub use bench::charts_of_run;
+pub use study::charts_of_study;
+
 use plotters::prelude::*;
 
 use super::axis::{Axis, MARGIN, Tick};
 use super::chart::{Chart, LegendEntry, Tooltip};
-use super::error::{error_of, metric_name, time_of};
 use super::medium::{SERIES_COLORS, glyph, series};
 use super::number::with_interval;
 use super::plot_area::{Canvas, GridLines, MarkerFill, PlotArea};
 use crate::measure::stats::extremes;
-use crate::studies::error::records::{Configuration, Study};
 use crate::studies::figure::Figure;
 use crate::timing::names::{Setting, sweep_text};
-use crate::timing::records::{Case, Measured, Mode, Run};
 use crate::timing::sweep::SIZE_KEY;
 
 /// Greatest number of charts of a measure: six rows of two, about three screens.
@@ -24,7 +27,8 @@ const LOG_X_FROM: f64 = 8.0;
 /// The same ratio of an axis of measured values. It is larger because a linear axis begins at 0,
 /// which lets times be compared by eye.
 const LOG_Y_FROM: f64 = 20.0;
-/// Characters of a label that have room at the usual distance of ticks.
+/// Characters of a label that fit between ticks at their usual distance, 64 px or 9 columns, with
+/// a gap of one or two characters.
 const TICK_CHARS: usize = 7;
 
 /// One measured figure at a point of a sweep.
@@ -61,66 +65,6 @@ struct Point {
     x: f64,
     figure: Figure,
     value: String,
-}
-
-/// Returns the charts of a bench with a sweep: the frame time and the GPU time.
-pub fn charts_of_run(run: &Run) -> Vec<SweepChart> {
-    let figures = |of: fn(&Mode) -> Option<Measured>| -> Vec<SweptFigure> {
-        run.cases.iter().flat_map(|case| figures_of_case(case, of)).collect()
-    };
-    [
-        ("Frame time", "time of a frame, ms", (|m| m.frame_ms) as fn(&Mode) -> Option<Measured>),
-        ("GPU time", "GPU time of a frame, ms", |m| m.gpu_ms),
-    ]
-    .into_iter()
-    .flat_map(|(name, measure, of)| charts(name, measure, &figures(of)))
-    .collect()
-}
-
-fn figures_of_case(case: &Case, of: fn(&Mode) -> Option<Measured>) -> Vec<SweptFigure> {
-    let is_still = case.is_still();
-    let phase = case.phase.iter().map(|name| Setting { key: "phase".into(), value: name.clone() });
-    let point: Vec<Setting> = case.sweep.iter().cloned().chain(phase).collect();
-    // The loop without skipping is the figure of a case that stands still, and of no other.
-    let has_skip = case.modes.iter().any(|m| m.skip);
-    let modes = case.modes.iter().filter(|m| m.skip != is_still || !has_skip);
-    let figure = |mode: &Mode| {
-        let m = of(mode)?;
-        let figure = Figure { value: m.of.p50, low: m.p50_low, high: m.p50_high };
-        Some(SweptFigure { point: point.clone(), series: mode.name(), figure })
-    };
-    modes.filter_map(figure).collect()
-}
-
-/// Returns the charts of a study: its time and its error against each knob.
-pub fn charts_of_study(study: &Study) -> Vec<SweepChart> {
-    let mut shapes: Vec<Vec<&str>> = Vec::new();
-    for c in &study.configurations {
-        let shape = keys_of(c);
-        if !shape.is_empty() && !shapes.contains(&shape) {
-            shapes.push(shape);
-        }
-    }
-    let time = format!("{} time of a frame, ms", study.time.name());
-    let mut all = Vec::new();
-    for shape in shapes {
-        let of = |figure: fn(&Study, &Configuration) -> Option<Figure>| -> Vec<SweptFigure> {
-            let chosen = study.configurations.iter().filter(|c| keys_of(c) == shape);
-            let swept = |c: &Configuration| {
-                let (point, series) = (c.settings.clone(), String::new());
-                Some(SweptFigure { point, series, figure: figure(study, c)? })
-            };
-            chosen.filter_map(swept).collect()
-        };
-        all.extend(charts("Time", &time, &of(time_of)));
-        all.extend(charts("Error", metric_name(study.metric), &of(error_of)));
-    }
-    all
-}
-
-/// Returns the keys that a configuration sets.
-fn keys_of(configuration: &Configuration) -> Vec<&str> {
-    configuration.settings.iter().map(|s| s.key.as_str()).collect()
 }
 
 /// Returns the charts of one measure; none if no key has two values.
@@ -168,7 +112,7 @@ pub fn charts(name: &str, measure: &str, figures: &[SweptFigure]) -> Vec<SweepCh
     }
     let mut charts: Vec<SweepChart> = all.into_iter().map(|(_, chart)| chart).collect();
     let n_charts = charts.len();
-    // A single value is in the table.
+    // A chart of a single value would only repeat the table.
     charts.retain(|chart| chart.swept().len() > 1);
     charts.truncate(MOST_CHARTS);
     let n_more = n_charts - charts.len();
@@ -225,7 +169,8 @@ fn varied_keys(figures: &[SweptFigure]) -> Vec<(String, Vec<String>)> {
     keys
 }
 
-/// Returns the key of the x axis: of numbers, with the most values, the first of equals.
+/// Returns the index of the key for the x axis. Keys of numbers are preferred, then keys with more
+/// values, then earlier keys.
 fn x_key(keys: &[(String, Vec<String>)]) -> Option<usize> {
     let rank = |i: &usize| {
         let (key, values) = &keys[*i];
@@ -234,7 +179,8 @@ fn x_key(keys: &[(String, Vec<String>)]) -> Option<usize> {
     (0..keys.len()).max_by_key(rank)
 }
 
-/// Returns the numbers that all values of a key stand for: a picture's size stands for its pixels.
+/// Returns the values of a key as numbers; `None` if they are not numbers or not distinct. A size
+/// of a picture becomes its number of pixels.
 fn numbers(key: &str, values: &[String]) -> Option<Vec<f64>> {
     let number = |value: &String| {
         let pixels = || {
@@ -362,7 +308,7 @@ impl Chart for SweepChart {
         let n_lines = self.lines.len() as f64;
         for (i, line) in self.lines.iter().enumerate() {
             let color = series(i);
-            // Categories have room beside each other.
+            // Points of one category lie side by side, so that their intervals do not overlap.
             let aside = if self.categories.is_empty() {
                 0.0
             } else {

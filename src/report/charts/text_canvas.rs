@@ -45,6 +45,7 @@ impl TextCanvas {
     }
 
     fn dot(&mut self, (x, y): BackendCoord, color: BackendColor) {
+        /// Bit of each dot in Unicode's Braille characters, by row and column.
         const BITS: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
         let bit = BITS[y.rem_euclid(CELL.1) as usize][x.rem_euclid(CELL.0) as usize];
         if let Some(cell) = self.cell(x.div_euclid(CELL.0), y.div_euclid(CELL.1)) {

@@ -9,11 +9,12 @@ use super::pictures::Png;
 use super::provenance;
 use super::table::{Cell, count, median, ms, percent, table, text, value};
 use crate::error::Result;
+use crate::report::charts::passes::PassColors;
 use crate::report::charts::{frames, number, passes, sweep, with_interval};
 use crate::timing::attachments::picture_file;
 use crate::timing::records::{Case, Measured, Mode, PartRecord, Pass, Run};
 use crate::timing::results::BenchResults;
-use crate::timing::still::StillRemark;
+use crate::timing::still::{NO_RATIO, StillRemark, marked_name, skipped_text};
 
 /// Returns the name of a case.
 pub fn case_name(case: &Case) -> String {
@@ -21,11 +22,11 @@ pub fn case_name(case: &Case) -> String {
     if name.is_empty() { "the scene".to_owned() } else { name }
 }
 
-/// Returns the section of a bench.
+/// Returns the section of a bench, with the colours that passes have on the page.
 ///
 /// # Errors
 /// Fails if a chart cannot be drawn or a picture cannot be read.
-pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
+pub fn section(results: &BenchResults, folder: &Path, colors: &PassColors) -> Result<Markup> {
     let run = &results.run;
     let mut charts = Vec::new();
     for frames in frames::charts_of(results) {
@@ -34,7 +35,7 @@ pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
     }
     let sweep = sweep::charts_of_run(run);
     let sweep = sweep.iter().map(|chart| figure(chart, SWEEP)).collect::<Result<Vec<_>>>()?;
-    let passes = passes::chart(run)
+    let passes = passes::chart(run, colors)
         .map(|passes| figure(&passes, "GPU time of every pass; shorter is better."))
         .transpose()?;
     let mut pictures = Vec::new();
@@ -58,6 +59,7 @@ pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
         @if !sweep.is_empty() {
             h3 { "Times against the swept keys" }
             div class="panels" { @for chart in &sweep { (chart) } }
+            @if let Some(text) = skipped_text(run) { p class="why" { (sentence(&text)) } }
         }
         h3 { "Frames" }
         (loops(run))
@@ -78,7 +80,7 @@ const SWEEP: &str =
 
 /// Returns the charts of frames; those of many points of a sweep are folded.
 fn charts_of_frames(charts: &[Markup]) -> Markup {
-    // A sweep has many points, and one chart compares them.
+    /// Most charts that are not folded. More belong to a sweep, which has a chart of its own.
     const MOST_UNFOLDED: usize = 2;
     html! {
         @if charts.len() <= MOST_UNFOLDED {
@@ -92,6 +94,13 @@ fn charts_of_frames(charts: &[Markup]) -> Markup {
             }
         }
     }
+}
+
+/// Returns a remark of a table as a sentence of a page.
+fn sentence(remark: &str) -> String {
+    let mut rest = remark.chars();
+    let first = rest.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", rest.as_str())
 }
 
 /// Returns a warning about cases in which nothing moves.
@@ -109,7 +118,7 @@ fn loops(run: &Run) -> Markup {
     let row = |(case, mode): (&Case, &Mode)| {
         let of = |m: Option<Measured>| m.map(|m| m.of);
         vec![
-            text(&mode.name_in(case)),
+            text(&marked_name(case, mode)),
             count(mode.frames),
             median(mode.frame_ms),
             ms(of(mode.frame_ms).map(|s| s.p95)),
@@ -137,7 +146,8 @@ fn loops(run: &Run) -> Markup {
     ];
     let caption =
         "Every loop: medians with their 95 % intervals; \"1 % low\" is the mean of the slowest 1 %";
-    table(caption, &header, run.modes().map(row))
+    let modes = run.cases.iter().flat_map(|case| case.figure_first().map(move |mode| (case, mode)));
+    table(caption, &header, modes.map(row))
 }
 
 /// Returns the nodes of a distributed sweep, with the times of the first case on each.
@@ -162,17 +172,25 @@ fn parts(run: &Run) -> Markup {
     table(caption, &header, run.parts.iter().map(row))
 }
 
+/// Text of a cell for a case in which nothing moves.
+const NOT_GIVEN: &str = "not given";
+
 /// Returns the cases, with the gain from overlap and from skipping.
 fn cases(run: &Run) -> Markup {
     let row = |case: &Case| {
         let ratio = case.ratio.map(|r| with_interval(r.parallel_by_serial, r.low, r.high));
+        let (mut ratio, mut bound) =
+            (text(ratio.as_deref().unwrap_or("—")), ms(case.overlap.as_ref().map(|o| o.bound_ms)));
+        if case.is_still() {
+            (ratio, bound) = (text(NOT_GIVEN), text(NOT_GIVEN));
+        }
         let skipping = case.skipping;
         vec![
             text(&case_name(case)),
             count(case.particles as usize),
             text(&format!("{}×{}", case.width, case.height)),
-            text(ratio.as_deref().unwrap_or("—")),
-            ms(case.overlap.as_ref().map(|o| o.bound_ms)),
+            ratio,
+            bound,
             ms(skipping.map(|s| s.gpu_ms)),
             ms(skipping.map(|s| s.gpu_no_skip_ms)),
             text(match skipping.and_then(|s| s.same_bytes) {
@@ -193,7 +211,10 @@ fn cases(run: &Run) -> Markup {
         "same picture, to the byte",
     ];
     let caption = "The cases, with the gain from overlap and from skipping";
-    table(caption, &header, run.cases.iter().map(row))
+    html! {
+        (table(caption, &header, run.cases.iter().map(row)))
+        @if run.cases.iter().any(Case::is_still) { p class="why" { (NOT_GIVEN) ": " (NO_RATIO) } }
+    }
 }
 
 fn pass_table(run: &Run) -> Markup {
@@ -201,7 +222,7 @@ fn pass_table(run: &Run) -> Markup {
         let reasons = pass.reasons.iter().map(|r| format!("{} ({})", r.reason, number(r.n as f64)));
         vec![
             text(&pass.name),
-            text(&mode.name_in(case)),
+            text(&marked_name(case, mode)),
             ms(pass.p50_ms),
             ms(passes::ms_of_frame(pass)),
             percent(pass.share),

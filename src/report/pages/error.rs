@@ -80,7 +80,7 @@ fn reference(study: &Study) -> Markup {
 fn configurations(study: &Study) -> Markup {
     let row = |(c, number): (&Configuration, Option<usize>)| {
         vec![
-            text(&c.name),
+            text(&study.label(c)),
             number.map_or_else(|| text(""), count),
             text(front_name(c.front)),
             figure(c.gpu_ms),
@@ -111,7 +111,10 @@ fn configurations(study: &Study) -> Markup {
          number in the chart",
         metric_name(study.metric)
     );
-    table(&caption, &header, rows)
+    html! {
+        (table(&caption, &header, rows))
+        @if let Some(line) = study.base_line() { p class="why" { (line) } }
+    }
 }
 
 fn front_name(front: Front) -> &'static str {
@@ -139,7 +142,7 @@ fn best(study: &Study) -> Markup {
         };
         vec![
             text(&format!("at most {}{unit}", number(b.value))),
-            text(found.map_or("none", |c| &c.name)),
+            text(&found.map_or("none".to_owned(), |c| study.label(c))),
             figure(found.and_then(|c| time_of(study, c))),
             figure(found.and_then(|c| error_of(study, c))),
         ]
@@ -162,20 +165,21 @@ fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
     let mut shown = Vec::new();
     for c in &study.configurations {
         let (picture, map) = (read(&c.picture)?, read(&c.error_map)?);
+        let name = study.label(c);
         let map = map.map(|map| {
-            map.figure(&format!("Difference of {} from the reference", c.name), "difference")
+            map.figure(&format!("Difference of {name} from the reference"), "difference")
         });
         let error = error_of(study, c).map_or(String::new(), |e: Figure| {
             format!(", {} {}", metric_name(study.metric), number(e.value))
         });
         match (picture, &reference) {
             (Some(picture), Some(reference)) => {
-                // The page contains the reference once; the script takes it from there.
-                let caption = format!("{}{error}", c.name);
+                // The page embeds the reference once, and the script shows it in every slider.
+                let caption = format!("{name}{error}");
                 shown.push(html! {
                     div
                         class="pair against-reference"
-                        data-label=(c.name)
+                        data-label=(name)
                         data-width=(reference.width)
                     {
                         (picture.figure(&caption, &caption))
@@ -185,7 +189,7 @@ fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
             }
             (Some(picture), None) => shown.push(html! {
                 div class="pair" {
-                    (picture.figure(&c.name, &c.name))
+                    (picture.figure(&name, &name))
                     @if let Some(map) = &map { (map) }
                 }
             }),

@@ -17,7 +17,7 @@ pub fn figure(chart: &impl Chart, caption: &str) -> Result<Markup> {
 }
 
 /// Returns style rules that replace the charts' colours by variables, so that a dark page has its
-/// own. A rule has precedence over an attribute.
+/// own. Style rules take precedence over the colour attributes of SVG elements.
 pub fn color_rules() -> String {
     let hex = |s: &ThemeColor| format!("#{:02X}{:02X}{:02X}", s.light.0, s.light.1, s.light.2);
     let (mut light, mut dark, mut rules) = (String::new(), String::new(), String::new());

@@ -7,8 +7,12 @@ use super::source::{Results, Source, comparable_pairs};
 use super::{bench, comparison, error, ledger};
 use crate::error::Result;
 use crate::io::plain_text::plain_markup;
+use crate::report::charts::passes::PassColors;
+use crate::timing::records::Run;
 
+/// Style sheet, embedded so that the page needs no other file.
 const STYLE: &str = include_str!("page.css");
+/// Script, embedded like the style sheet.
 const SCRIPT: &str = include_str!("page.js");
 
 /// A content security policy that forbids loading anything.
@@ -19,11 +23,12 @@ const POLICY: &str =
 /// the first of their kind.
 ///
 /// # Errors
-/// If a picture of the results cannot be read.
+/// Fails if a picture of the results cannot be read.
 pub fn page(sources: &[Source]) -> Result<String> {
     let mut sections = Vec::new();
+    let colors = PassColors::of(sources.iter().filter_map(run_of));
     for (i, source) in sources.iter().enumerate() {
-        let (kind, markup) = section(source)?;
+        let (kind, markup) = section(source, &colors)?;
         sections.push((format!("{kind}: {}", source.name), format!("run-{i}"), markup));
     }
     for (i, (a, b)) in comparable_pairs(sources).into_iter().enumerate() {
@@ -73,9 +78,16 @@ pub fn page(sources: &[Source]) -> Result<String> {
     Ok(plain_markup(&markup.into_string()).into_owned())
 }
 
-fn section(source: &Source) -> Result<(&'static str, Markup)> {
+fn run_of(source: &Source) -> Option<&Run> {
+    match &source.results {
+        Results::Bench(recorded) => Some(&recorded.run),
+        Results::Study(_) | Results::Ledger(_) => None,
+    }
+}
+
+fn section(source: &Source, colors: &PassColors) -> Result<(&'static str, Markup)> {
     Ok(match &source.results {
-        Results::Bench(recorded) => ("Bench", bench::section(recorded, &source.folder)?),
+        Results::Bench(recorded) => ("Bench", bench::section(recorded, &source.folder, colors)?),
         Results::Study(study) => ("Time against error", error::section(study, &source.folder)?),
         Results::Ledger(ledger) => ("Ledger", ledger::section(ledger)?),
     })

@@ -31,12 +31,13 @@ pub enum Results {
     Ledger(Box<Ledger>),
 }
 
+/// Names of result files, in the order in which those of one folder are shown.
 const FILES: [&str; 3] = [RUN_FILE, Study::FILE, Ledger::FILE];
 
 /// Reads the results of a folder, or a single file of results.
 ///
 /// # Errors
-/// If there are no results, or they are incomplete or of another schema version.
+/// Fails if there are no results, or they are incomplete or of another schema version.
 pub fn read(path: &Path) -> Result<Vec<Source>> {
     if !path.is_dir() {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -19,7 +19,8 @@ pub struct Cell {
 
 /// Returns a cell of text.
 pub fn text(text: &str) -> Cell {
-    // The page does not wrap short texts.
+    /// Longest text that the page does not wrap, characters. Longer texts would widen the table; a
+    /// lower limit would make its rows taller.
     const SHORT: usize = 18;
     let is_short = text.chars().count() <= SHORT;
     let content = html! { span class=[is_short.then_some("short")] { (text) } };

@@ -236,7 +236,7 @@ fn a_choice_belongs_to_the_case_that_its_text_names() {
 /// The difference that is reported, and the change that causes it.
 type Change = (&'static str, fn(&mut Part));
 
-const CHANGES: [Change; 21] = [
+const CHANGES: [Change; 23] = [
     ("version: 0.1.0 of shard 0, 0.2.0 of shard 4", |p| p.run.nimbus = "0.2.0".to_owned()),
     ("build: 0123456789ab of shard 0, 0123456789ab-dirty of shard 4", |p| {
         p.run.revision += "-dirty"
@@ -253,7 +253,13 @@ const CHANGES: [Change; 21] = [
     }),
     ("environment: ", |p| p.run.environment = BTreeMap::new()),
     ("validation: false of shard 0, true", |p| p.run.command.push("--validation".to_owned())),
-    ("poison: ", |p| p.run.command.push("--poison".to_owned())),
+    ("guard bands: ", |p| p.run.command.push("--guard".to_owned())),
+    ("limit of a submission: default of shard 0, 20 of shard 4", |p| {
+        p.run.command.extend(["--max-submit-ms".to_owned(), "20".to_owned()])
+    }),
+    ("limit of a submission: default of shard 0, 20 of shard 4", |p| {
+        p.run.command.push("--max-submit-ms=20".to_owned())
+    }),
     ("passes: sort of shard 0, cull", |p| p.table.pass_names = vec!["cull".to_owned()]),
     ("first case: draw.cutoff=0 of shard 0, draw.cutoff=9", |p| p.run.cases[0].sweep = sweep(9)),
     ("scene of the first case: ", |p| p.run.cases[0].scene_hash = "cd".repeat(32)),

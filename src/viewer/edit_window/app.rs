@@ -47,7 +47,8 @@ pub struct Options {
     pub stop: &'static AtomicBool,
 }
 
-/// Interval between two updates of untouched panels, and between two looks at the stop flag.
+/// Interval between two updates of untouched panels, and between two looks at the stop flag: the
+/// window soon ends after Ctrl-C, and an idle window takes little time.
 const IDLE_INTERVAL: Duration = Duration::from_millis(250);
 
 /// Opens a window and edits until the user closes it.
@@ -298,7 +299,7 @@ impl App {
     }
 }
 
-/// Returns the first version of what the render thread draws.
+/// Returns the state that the render thread draws, as version 0.
 fn draw_state(controller: &EditorController, scene: &EditedScene, size: [u32; 2]) -> DrawState {
     let (pose, editor) = (controller.camera().pose(), controller.editor());
     DrawState {

@@ -26,9 +26,11 @@ impl FileDialog {
     }
 }
 
-/// Width of the dialog for a file, points.
+/// Width of the dialog for a file, points: room for a long path, and less than the smallest window
+/// with panels.
 const WIDTH: f32 = 420.0;
-/// Height of the list of recent files, points.
+/// Height of the list of recent files, points: a third of the smallest window with panels. The list
+/// scrolls.
 const RECENT: f32 = 160.0;
 
 /// Adds the open dialog, if there is one.

@@ -45,13 +45,14 @@ impl FieldTexts {
     }
 }
 
-/// Number of digits of lengths, of the largest length or coordinate of the box.
+/// Number of digits of the box's largest length or coordinate: the device computes in f32, which
+/// keeps at least six.
 const LENGTH_DIGITS: i32 = 6;
-/// Number of digits of a density, which follows from the other numbers.
+/// Number of digits of a density. It follows from the other numbers, so fewer digits suffice.
 const DENSITY_DIGITS: i32 = 4;
-/// Width of the fields' names, points.
+/// Width of the fields' names, points: the longest has nine letters.
 const NAMES: f32 = 66.0;
-/// Width of a field, points.
+/// Width of a field, points: the panel keeps room for names and margins.
 const FIELD: f32 = 130.0;
 
 /// A number as a field shows it.
@@ -72,8 +73,8 @@ impl FieldValue {
     }
 }
 
-/// Returns the length that matters in a box: the last of six digits of its largest number, and no
-/// more than the step of the grid.
+/// Returns the smallest length that the fields of a box show: the sixth digit of its largest
+/// number, but at most the step of the grid.
 fn resolution(b: &CloudBox, step: f64) -> f64 {
     let largest = b.center.abs().max(b.extent).max_element().max(b.radius_max);
     let digits = if largest > 0.0 { largest.log10().floor() } else { 0.0 };

@@ -16,19 +16,19 @@ use crate::viewer::layout::panel_width;
 use crate::viewer::overlay_text::{MESSAGE_ROWS, banner, rows_of_third, shrink_text};
 use crate::viewer::shortcut::Shortcut;
 
-/// Width of the panel, points.
+/// Width of the panel, points: the fields with their names, the margins, and some space.
 const WIDTH: f32 = 230.0;
 /// Largest part of the window's width that the panel covers. With the status line it is a third of
 /// a window of 640 × 480.
 const MAX_SHARE: f64 = 0.3;
-/// Height of the status line, points.
+/// Height of the status line, points: one line of text and its margins.
 const STATUS: f32 = 24.0;
 /// Part of the panel's height that a long list of boxes has at least: five boxes in a window of 640
 /// points.
 const LIST_SHARE: f32 = 0.17;
 /// Least height of a long list of boxes, points: two boxes and a half, which show that it scrolls.
 const LEAST_LIST: f32 = 60.0;
-/// Distance of buttons from each other, points.
+/// Distance of buttons from each other, points: less than egui's, so that more fit a row.
 const BUTTON_GAP: f32 = 5.0;
 /// The line over an empty picture.
 const FIRST_STEPS: &str = "A: add a box where the view looks    ?: all keys";

@@ -65,7 +65,7 @@ impl DrawRequests {
     }
 }
 
-/// Interval of looks at the stop flag, which Ctrl-C sets.
+/// Interval of looks at the stop flag, which Ctrl-C sets: too short for the user to wait.
 const MAX_WAIT: Duration = Duration::from_millis(200);
 
 /// An event that the render thread sends to the window.
@@ -103,7 +103,7 @@ impl RenderLinks {
 /// Renders the edited cloud into a window. Fields are dropped in this order.
 pub struct EditRenderer {
     active: Option<ActiveDocument>,
-    /// The window knows of a failure.
+    /// Whether the window shows a failure.
     has_failed: bool,
     target: WindowTarget,
     edited: EditedScene,
@@ -115,6 +115,8 @@ struct ActiveDocument {
     draw: PictureDraw,
     scene: PosedPlayer,
     document: Arc<Document>,
+    /// Size of its pictures.
+    picture: [u32; 2],
     /// Camera of the document's last frame; `None` before the first.
     drawn: Option<Pose>,
 }
@@ -184,7 +186,7 @@ impl EditRenderer {
                     self.links.send(RenderEvent::Failure(None));
                 }
                 Ok(()) => {}
-                // The document stays, also where it does not fit the device.
+                // The user keeps editing a document that the device cannot draw.
                 Err(error @ (Error::Limit { .. } | Error::Usage { .. })) => {
                     self.has_failed = true;
                     self.links.send(RenderEvent::Failure(Some(error.to_string())));
@@ -198,6 +200,11 @@ impl EditRenderer {
 
     /// Updates the document on the device and draws it, where either has changed.
     fn update(&mut self, state: &DrawState) -> Result<()> {
+        // Panels that are shown or hidden change the picture and not the window.
+        if self.active.as_ref().is_some_and(|active| active.picture != state.picture) {
+            self.target.finish();
+            self.active = None;
+        }
         let is_new = self.active.is_none();
         if is_new {
             self.active = match self.activate(state) {
@@ -240,7 +247,8 @@ impl EditRenderer {
         let draw = self.target.picture_draw(&player.renderer, &player.scene.film)?;
         let draw = draw.ok_or_else(|| Error::usage("the window has no visible area"))?;
         let scene = PosedPlayer::new(player, state.pose);
-        Ok(ActiveDocument { draw, scene, document: state.document.clone(), drawn: None })
+        let (document, picture) = (state.document.clone(), state.picture);
+        Ok(ActiveDocument { draw, scene, document, picture, drawn: None })
     }
 
     /// Returns the scene with the state's document and size.

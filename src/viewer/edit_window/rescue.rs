@@ -37,7 +37,7 @@ impl Rescue {
         let mut unsaved = lock(&self.0);
         let Some((path, document)) = unsaved.take() else { return };
         let name = |n| path.with_extension(format!("unsaved-{n}.dat"));
-        match write_free(name, |path| box_file::write(path, &document.boxes)) {
+        match write_free(name, |to| box_file::write_like(to, &path, &document.boxes)) {
             Ok(path) => say!("unsaved changes were written to {}", path.display()),
             Err(error) => say!("unsaved changes are lost: {error}"),
         }

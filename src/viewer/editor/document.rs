@@ -3,8 +3,8 @@
 use crate::io::box_file;
 use crate::model::boxes::CloudBox;
 
-/// Largest number of boxes. A line of a box file has at most 192 bytes (10 digits, seven numbers of
-/// at most 24 characters, 14 of separators), so this many fit the file limit of 64 MiB.
+/// Largest number of boxes: as many fit the file limit of 64 MiB. A line of a box file has at most
+/// 192 bytes: 10 digits, seven numbers of at most 24 characters, and 14 characters of separators.
 pub const MAX_BOXES: usize = 1 << 18;
 
 /// The boxes of a cloud, and its seed.
@@ -54,9 +54,9 @@ impl Document {
     /// Returns the boxes whose particles must be generated again after a change from `before`.
     ///
     /// The particles of a box follow from the cloud's seed, the index of the box, and the box.
-    /// Their places relative to the box's centre do not depend on that centre
-    /// (model.md §1). A box that only moves keeps its particles. A deleted box
-    /// changes the indices of the later ones.
+    /// Their places relative to the box's centre do not depend on that centre (model.md §1). A box
+    /// that only moves therefore keeps its particles. A deleted box changes the indices of later
+    /// boxes.
     pub fn regenerated_since(&self, before: &Document) -> Vec<usize> {
         let is_kept = |i: &usize| {
             let was = before.boxes.get(*i);

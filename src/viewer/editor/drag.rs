@@ -1,7 +1,7 @@
 //! A drag of a handle, from the press of a button to its release.
 //!
-//! The document follows from where the drag began and where the pointer is now, and not from the
-//! path between, so that rounding does not accumulate.
+//! The document follows from the drag's beginning and the pointer's present place. The path between
+//! them does not matter, so rounding does not accumulate.
 
 use glam::DVec3;
 
@@ -34,12 +34,12 @@ pub struct Drag {
     pub modifiers: DragModifiers,
 }
 
-/// Least distance of the start from the middle, as a part of the distance from the camera, for
-/// scaling by that distance.
+/// Smallest distance from the middle at which scaling may start, as a part of the camera's
+/// distance. Nearer to the middle, tiny movements would be large factors.
 const MIN_DISTANCE: f64 = 1e-2;
 /// Part of a drag's length below which a coordinate stays: it is rounding of the others.
 const MIN_COMPONENT: f64 = 1e-9;
-/// Grid of snapped factors.
+/// Step of snapped scale factors: fine enough to choose by hand, and easy to read as 10 %.
 const FACTOR_STEP: f64 = 0.1;
 
 impl Drag {

@@ -103,7 +103,7 @@ fn mirror(new: &mut Snapshot, axis: Axis, plane: MirrorPlane, result: MirrorResu
     }
 }
 
-/// Returns c + offset. A component without offset keeps its bits, where −0 + 0 would be 0.
+/// Returns c + offset. A component without offset keeps its bits: −0 + 0 would lose the sign.
 pub(super) fn shifted(c: DVec3, offset: DVec3) -> DVec3 {
     let add = |c: f64, d: f64| if d == 0.0 { c } else { c + d };
     DVec3::new(add(c.x, offset.x), add(c.y, offset.y), add(c.z, offset.z))

@@ -44,9 +44,10 @@ pub struct PlacedHandle {
 
 /// Distance from a face to its arrow, which leaves space for the face's handle, points.
 pub const GAP_POINTS: f64 = 16.0;
-/// Length of an arrow, points.
+/// Length of an arrow, points: eight times the pointer's reach, so that it is easy to grab.
 pub const ARROW_POINTS: f64 = 64.0;
-/// Largest distance of the pointer from a handle that it picks, points.
+/// Largest distance of the pointer from a handle that it picks, points: half of [`GAP_POINTS`], so
+/// that the reaches of a face's handle and of its arrow do not overlap.
 pub const REACH_POINTS: f64 = 8.0;
 /// Sine of the angle (6°) between view and axis below which the axis has no handles: the pointer's
 /// place would be magnified more than tenfold along it.

@@ -7,9 +7,10 @@ use std::collections::VecDeque;
 
 use super::snapshot::Snapshot;
 
-/// Largest number of steps that are kept.
+/// Largest number of steps that are kept: more than a user takes back one by one.
 pub const MAX_STEPS: usize = 1000;
-/// Largest size of the kept documents, bytes. The last step is kept whatever its size.
+/// Largest size of the kept documents, bytes: over ten of the largest documents, and little beside
+/// a computer's memory. The last step is kept whatever its size.
 pub const MAX_BYTES: usize = 256 << 20;
 
 /// A state next to the present one, and the name of the change between them.

@@ -7,6 +7,7 @@ struct Unit {
     per: f64,
 }
 
+/// Units that a typed length may have.
 const UNITS: [Unit; 4] = [
     Unit { name: "mm", metres: 1.0, per: 1000.0 },
     Unit { name: "cm", metres: 1.0, per: 100.0 },
@@ -14,7 +15,8 @@ const UNITS: [Unit; 4] = [
     Unit { name: "km", metres: 1000.0, per: 1.0 },
 ];
 
-/// Largest number of typed characters that a message repeats.
+/// Largest number of typed characters that a message repeats, so that a long pasted text does not
+/// hide the rest of the message.
 const MAX_SHOWN: usize = 40;
 
 /// Parses a length such as "1.5", "1.5 m", "150cm" or "2 km".
@@ -51,8 +53,8 @@ pub fn density(text: &str, metres_per_unit: f64) -> Result<f64, String> {
     let cubed = ["³", "^3", "3"].iter().find_map(|power| volume.strip_suffix(power));
     let Some(name) = cubed else { return Err(unexpected(expected, text)) };
     let unit = unit_named(name.trim(), text)?;
-    // The ratio of the edges that is above 1 may be an exact integer: 12 /m³ are 12000 in a cube of
-    // 10 m.
+    // Of the two ratios of edges, only the one above 1 can be an exact integer, which makes the
+    // result exact: 12 /m³ are 12000 in a cube of 10 m.
     let (edge, inverse) =
         (unit.metres / unit.per / metres_per_unit, metres_per_unit * unit.per / unit.metres);
     let v = if edge < 1.0 { v * inverse.powi(3) } else { v / edge.powi(3) };

@@ -56,9 +56,11 @@ impl Gesture {
     }
 }
 
-/// Largest distance between press and release of a click, points.
+/// Largest distance between press and release of a click, points: a hand moves a little in a click,
+/// and an intended drag goes further.
 const CLICK_POINTS: f64 = 3.0;
-/// Angle that the camera turns when the pointer crosses the picture, rad.
+/// Angle that the camera turns when the pointer crosses the picture, rad: one stroke shows a box
+/// from the opposite side.
 const TURN: f64 = std::f64::consts::PI;
 
 /// The pointer and the camera.

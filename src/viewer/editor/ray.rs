@@ -13,10 +13,11 @@ pub struct Ray {
     pub direction: DVec3,
 }
 
-/// Least sine squared of the angle between a ray and an axis. At 0.01 rad an error of the pointer
-/// is magnified 10⁴ times along the axis.
+/// Smallest squared sine of the angle between a ray and an axis. At 0.01 rad an error of the
+/// pointer is magnified about 100 times along the axis.
 const MIN_SINE_SQUARED: f64 = 1e-4;
-/// Least sine of the angle between a ray and a plane.
+/// Smallest sine of the angle between a ray and a plane. At 0.01 rad an error of the pointer is
+/// magnified about 100 times along the plane.
 const MIN_SINE: f64 = 1e-2;
 
 impl Ray {

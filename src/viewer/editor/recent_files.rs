@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::io::text_file::{RECORD_LIMIT, read_result};
 
-/// Largest number of files in the list.
+/// Largest number of files in the list: few enough to read at a glance.
 pub const MAX_FILES: usize = 10;
 
 /// Paths of recently opened files, newest first, each once.

@@ -109,6 +109,8 @@ pub enum Request {
     Save {
         /// The file.
         path: PathBuf,
+        /// The file that was opened. Boxes of it that were not edited keep its text.
+        opened: PathBuf,
         /// The document as written.
         document: Arc<Document>,
     },
@@ -208,7 +210,7 @@ impl Session {
                 let path = path.clone()?;
                 // The intent follows after the save.
                 self.pending = pending;
-                Some(Request::Save { path, document: self.editor.shared_document() })
+                Some(self.save_as(path))
             }
             SessionEvent::Saved { path, document } => {
                 self.path = Some(path.clone());
@@ -258,8 +260,12 @@ impl Session {
     }
 
     fn save(&self) -> Request {
-        let document = self.editor.shared_document();
-        self.path.clone().map_or(Request::ChooseToSave, |path| Request::Save { path, document })
+        self.path.clone().map_or(Request::ChooseToSave, |path| self.save_as(path))
+    }
+
+    fn save_as(&self, path: PathBuf) -> Request {
+        let opened = self.path.clone().unwrap_or_else(|| path.clone());
+        Request::Save { path, opened, document: self.editor.shared_document() }
     }
 
     /// Replaces the document. The scene's seed and the settings stay.
@@ -275,8 +281,10 @@ pub fn perform(request: &Request) -> Option<SessionEvent> {
         Request::Open(path) => {
             box_file::read(path).map(|boxes| SessionEvent::Opened { path: path.clone(), boxes })
         }
-        Request::Save { path, document } => box_file::write(path, &document.boxes)
-            .map(|()| SessionEvent::Saved { path: path.clone(), document: document.clone() }),
+        Request::Save { path, opened, document } => {
+            box_file::write_like(path, opened, &document.boxes)
+                .map(|()| SessionEvent::Saved { path: path.clone(), document: document.clone() })
+        }
         Request::Ask(_)
         | Request::ChooseToOpen
         | Request::ChooseToSave

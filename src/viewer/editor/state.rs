@@ -26,9 +26,10 @@ pub struct Editor {
     drag: Option<Drag>,
 }
 
-/// Share of the view's height that a new box has.
+/// Share of the view's height that a new box has: large enough to see, small enough to place.
 const NEW_SHARE: f64 = 0.1;
-/// Shares of the view's height that a copied box may have.
+/// Shares of the view's height that a copied box may have. A smaller box is hard to pick, and a
+/// larger one hides its surroundings.
 const COPIED_SHARES: std::ops::RangeInclusive<f64> = 0.01..=0.7;
 
 /// The box that is added to an empty document, in units of its edge: the most common one in P.

@@ -67,7 +67,7 @@ impl Shared {
         if let Some(current) = &mut self.lock().request
             && current.has_same_reference(&request)
         {
-            // An equal request with this scene is then recognized by its pointer.
+            // The next request with this scene is recognized by its pointer, which is fast.
             current.scene = request.scene;
             return;
         }
@@ -156,16 +156,17 @@ impl Worker {
 
     /// Computes the reference at a few pixels, then at as many as the budget allows.
     fn compute(&self, job: &Job) -> Result<()> {
-        /// Pixels of the first reference, before the time of one pixel is known.
+        /// Pixels of the first reference, before the time of one pixel is known: few, so that the
+        /// user soon sees an error.
         const N_FIRST: usize = 256;
         let [width, height] = job.request.size;
         let n_all = width as usize * height as usize;
         let first = Pixels::sample(width, height, N_FIRST);
         let (cell, n_first) = (first.cell, first.at.len());
         let Reference { seconds, pixels_s, .. } = self.reference(job, first)?.reference;
-        // The budget pays for the first reference and for the second one's light. These are the
-        // times of the computation also where the reference came from the cache, so that a later
-        // run chooses the same pixels and finds them there.
+        // The budget also pays for the first reference and for the light of the second. A cached
+        // reference carries the times of its computation, so a later run chooses the same pixels
+        // and finds them in the cache.
         let left_s = self.budget.as_secs_f64() - seconds - (seconds - pixels_s);
         let n_more = (left_s / (pixels_s / n_first as f64)).clamp(0.0, n_all as f64) as usize;
         let more = Pixels::sample(width, height, n_more.max(1));

@@ -63,9 +63,9 @@ pub struct WindowTimes {
     pub panels_ms: Vec<f64>,
 }
 
-/// Interval between two updates of the panels, and between two looks at the scene's files.
+/// Interval of panel updates and of looks at the scene's files: numbers stay long enough to read.
 const IDLE_INTERVAL: Duration = Duration::from_millis(250);
-/// Time that the hint stays after the first picture, unless a key ends it before.
+/// Time that the hint stays after the first picture if no key ends it: enough for five entries.
 const HINT_FOR: Duration = Duration::from_secs(6);
 
 /// Opens a window and shows the scene until the user closes it.

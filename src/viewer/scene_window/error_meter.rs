@@ -13,7 +13,7 @@ use crate::viewer::error_probe::{ErrorProbe, ProbeRequest, ProbeStatus, Referenc
 use crate::viewer::fly_camera::FlyCamera;
 use crate::viewer::sync::lock;
 
-/// Time for the reference of one view.
+/// Time for the reference of one view: more time gives more pixels, and the user waits for it.
 const BUDGET: Duration = Duration::from_secs(10);
 
 /// The error measurement of a scene window.

@@ -23,11 +23,13 @@ pub struct Changed {
     pub shaders: bool,
 }
 
-/// Time without events after which a file counts as completely written.
+/// Time without events after which a file counts as completely written: longer than the pauses of
+/// an editor that saves, and too short to notice.
 const SETTLED: Duration = Duration::from_millis(100);
-/// Time after which a missing file counts as deleted, and not as being replaced.
+/// Time after which a missing file counts as deleted. An editor that replaces a file needs less.
 const DELETED: Duration = Duration::from_millis(1000);
 /// Interval of polling, where the system has no notifications or its limit of watches is reached.
+/// The window asks for changes as often.
 const POLL_INTERVAL: Duration = Duration::from_millis(250);
 
 #[derive(Default)]

@@ -30,9 +30,9 @@ pub struct LoopTimes {
 
 /// Frames after a start whose times are not counted: the warm-up that a bench has by default.
 const N_WARM_UP: u32 = 10;
-/// Interval between two updates of the title.
+/// Interval between two updates of the title: numbers that change faster cannot be read.
 const TITLE_INTERVAL: Duration = Duration::from_millis(500);
-/// Longest time that a held key flies in one step, however long the frame took, s.
+/// Longest time that a held key flies in one step, s: a slow frame must not throw the camera far.
 const MAX_STEP_S: f64 = 0.25;
 
 /// Frame times by loop and by whether panels were shown.

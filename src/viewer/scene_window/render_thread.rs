@@ -1,5 +1,5 @@
-//! The render thread of the scene window: it makes the scene ready on the device, runs the frame
-//! loop, and falls back to the last good scene where a change cannot be drawn.
+//! The render thread of the scene window. It makes the scene ready on the device and runs the frame
+//! loop. If a change cannot be drawn, it falls back to the last good scene.
 
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ struct GoodScene {
 struct Attempt {
     version: u64,
     n_shader_loads: u64,
-    /// The size of the window, where the size is the fault. Another size mends no other fault.
+    /// The size of the window, if the size is the fault. Other faults do not depend on it.
     size: Option<[u32; 2]>,
 }
 
@@ -123,7 +123,7 @@ impl SceneRenderer {
             let old_shaders = self.reload_shaders(&state);
             match self.activate(&state) {
                 Ok(Some(active)) => {
-                    // An error stays visible until something else is drawn than what failed.
+                    // The error stays visible until a state without the same fault is drawn.
                     if self.failed_at.is_some_and(|at| !at.is_of(&state)) {
                         self.failed_at = None;
                         lock(&self.links.status).render_error = None;
@@ -194,11 +194,11 @@ impl SceneRenderer {
         std::thread::sleep(HIDDEN_DELAY);
     }
 
-    /// Restores the old shaders, or else the last good scene, or else waits for the size of the
-    /// window.
+    /// Restores the old shaders, or else the last good scene, or else waits until the window has
+    /// another size.
     ///
     /// # Errors
-    /// There is neither; the error is the given one.
+    /// Returns `error` if none of these can help.
     fn fall_back(
         &mut self,
         error: Error,

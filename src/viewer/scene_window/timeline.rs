@@ -6,7 +6,7 @@ use std::time::Instant;
 use crate::frame::FrameTimes;
 use crate::measure::stats::{Summary, median};
 
-/// Number of frames that a timeline keeps.
+/// Number of frames that a timeline keeps: four seconds at 60 frames a second.
 pub const CAPACITY: usize = 240;
 
 /// Begin and end, ms after the beginning of a time line.
@@ -84,8 +84,8 @@ pub fn ms_after(zero: Instant, t: Instant) -> f64 {
 
 /// Returns name, begin and end of a frame's passes on the device; none without timestamps.
 ///
-/// The last pass is assumed to end with the frame, because the offset between the clocks of device
-/// and host is not measured here (`bench --trace` measures it).
+/// The offset between the clocks of device and host is not measured here, so the last pass is
+/// assumed to end with the frame. `bench --trace` measures the offset.
 pub fn device_spans(
     frame: &FrameTimes,
     zero: Instant,

@@ -52,7 +52,7 @@ pub struct ViewState {
     pub fits_panels: bool,
     /// Whether the list of keys is shown.
     pub shows_help: bool,
-    /// Whether the line with the first keys is shown. It goes with the first key.
+    /// Whether the line with the first keys is shown. The first key press hides it.
     pub shows_hint: bool,
     /// The next frame's values are to be counted.
     pub wants_counts: bool,
@@ -84,7 +84,8 @@ pub enum Response {
     SaveScene,
 }
 
-/// Angle that the camera turns when the mouse crosses the window, rad.
+/// Angle that the camera turns when the mouse crosses the window, rad: one stroke looks aside, and
+/// small movements still aim well.
 const TURN: f64 = std::f64::consts::FRAC_PI_2;
 
 impl ViewState {
@@ -217,8 +218,8 @@ impl ViewState {
         Response::Nothing
     }
 
-    /// Takes the size of the window in pixels. Panels that the user has not chosen are shown where
-    /// the window has room for them.
+    /// Takes the size of the window in pixels. Until the user shows or hides the panels, they are
+    /// shown where the window has room for them.
     #[cfg(feature = "window")]
     pub fn resize(&mut self, size: [u32; 2], display_scale: f64) {
         self.size = size;

@@ -8,18 +8,19 @@ use crate::viewer::editor::axis::Axis;
 use crate::viewer::editor::state::Editor;
 use crate::viewer::editor::viewport::{FACES, corners};
 
-/// Largest number of the nearest boxes that are drawn, and of further selected boxes. They take
-/// some milliseconds.
+/// Largest number of the nearest boxes that are drawn, and of further selected boxes. It bounds an
+/// update of the overlay to some milliseconds.
 pub const MAX_DRAWN: usize = 4096;
 
+/// Colour of the faces of boxes that are not active.
 const GREY: Color = [150, 164, 188, 255];
 /// Colour of the active box.
 pub const RED: Color = [214, 52, 44, 255];
 /// Outline of selected boxes.
 pub const ORANGE: Color = [255, 150, 30, 255];
-/// Edges of boxes that the cloud shows between.
+/// Colour of the edges of unselected boxes without faces. It is translucent over the cloud.
 pub const EDGE: Color = [196, 206, 222, 200];
-/// Alpha of the active box's faces where the cloud shows through.
+/// Alpha of the active box's faces over the cloud: a quarter, so that the cloud shows through.
 pub const TRANSLUCENT: u8 = 64;
 
 /// Returns the boxes to draw, and for every box whether it is selected.

@@ -13,13 +13,14 @@ pub const AXES: [Color; 3] = [[226, 70, 70, 255], [110, 190, 70, 255], [80, 130,
 pub const HIGHLIGHT: Color = [255, 226, 90, 255];
 /// Colour of the centre's handle and of labels.
 pub const CENTER: Color = [245, 245, 245, 255];
+/// Colour of the ground grid, translucent so that boxes and axes stand out.
 const GRID: Color = [128, 136, 150, 70];
 
-/// Half the side of a handle's square, points.
+/// Half the side of a handle's square, points: its corners are within the pointer's reach.
 const SQUARE_POINTS: f64 = 4.5;
-/// Length of an arrow's head, points.
+/// Length of an arrow's head, points: about a fifth of the arrow.
 const HEAD_POINTS: f64 = 12.0;
-/// Lines of the grid on each side of the middle.
+/// Lines of the grid on each side of the middle: the grid ends at the next larger power of ten.
 const N_LINES: i32 = 10;
 
 /// Adds the handles and the label of the active box, and the line of a restricted drag.
@@ -73,7 +74,8 @@ fn draw_handle(p: &PlacedHandle, canvas: &mut Canvas<'_>, is_highlighted: bool) 
     ]);
 }
 
-/// Returns the distance of grid lines: a power of ten below the camera's distance from the origin.
+/// Returns the distance of grid lines: the largest power of ten that is at most a quarter of the
+/// camera's distance from the origin.
 fn grid_step(canvas: &Canvas<'_>) -> Option<f64> {
     let distance = canvas.view.pose.position.length();
     let step = 10f64.powf((distance / 4.0).log10().floor());

@@ -14,6 +14,7 @@ use super::viewport::Viewport;
 use canvas::{Canvas, with_alpha};
 pub use canvas::{Color, Shape, Stroke};
 
+/// Colour of the selection rectangle; its fill is translucent.
 const RECTANGLE: Color = [120, 170, 255, 255];
 
 /// Returns the shapes of the editor's state.

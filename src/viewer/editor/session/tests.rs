@@ -80,7 +80,11 @@ fn every_intent_that_would_lose_changes_asks_first() {
         let document = dirty.editor().shared_document();
         assert_eq!(
             request,
-            Some(Request::Save { path: "a.dat".into(), document: document.clone() })
+            Some(Request::Save {
+                path: "a.dat".into(),
+                opened: "a.dat".into(),
+                document: document.clone()
+            })
         );
         let (_, request) = turn(&saving, SessionEvent::Saved { path: "a.dat".into(), document });
         assert_eq!(request, discarded);
@@ -101,7 +105,7 @@ fn a_new_cloud_is_saved_by_a_dialog_before_the_intent_follows() {
     assert_eq!(request, Some(Request::ChooseToSave));
     assert_eq!(turn(&saving, SessionEvent::ChosenToSave(None)).1, None);
     let (saving, request) = turn(&saving, SessionEvent::ChosenToSave(Some("n.dat".into())));
-    let Some(Request::Save { path, document }) = request else { panic!("{request:?}") };
+    let Some(Request::Save { path, document, .. }) = request else { panic!("{request:?}") };
     let (saved, request) = turn(&saving, SessionEvent::Saved { path, document });
     assert_eq!(
         (saved.path(), saved.is_dirty(), request),
@@ -111,6 +115,17 @@ fn a_new_cloud_is_saved_by_a_dialog_before_the_intent_follows() {
     let (session, _) = turn(&answer(&asking, Answer::Save).0, SessionEvent::ChosenToSave(None));
     let document = session.editor().shared_document();
     assert_eq!(turn(&session, SessionEvent::Saved { path: "n.dat".into(), document }).1, None);
+}
+
+#[test]
+fn a_file_saved_under_another_name_keeps_the_lines_of_the_opened_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let [old, new] = ["a.dat", "b.dat"].map(|name| folder.path().join(name));
+    std::fs::write(&old, "1\n1\n1 1.0 1.00 1 0 0 0 1.5\n").unwrap();
+    let session = Session::from_file(&old, box_file::read(&old).unwrap());
+    let (_, request) = turn(&session, SessionEvent::ChosenToSave(Some(new.clone())));
+    perform(&request.expect("a request"));
+    assert_eq!(std::fs::read(&new).unwrap(), std::fs::read(&old).unwrap());
 }
 
 #[test]
@@ -143,7 +158,12 @@ fn files_are_opened_and_saved() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("c.dat");
     let document = Arc::new(document(4));
-    let request = Request::Save { path: path.clone(), document: document.clone() };
+    let save = |path: &Path| Request::Save {
+        path: path.to_owned(),
+        opened: "a.dat".into(),
+        document: document.clone(),
+    };
+    let request = save(&path);
     assert_eq!(
         perform(&request),
         Some(SessionEvent::Saved { path: path.clone(), document: document.clone() })
@@ -152,7 +172,7 @@ fn files_are_opened_and_saved() {
     assert_eq!(opened, Some(SessionEvent::Opened { path, boxes: document.boxes.clone() }));
     let missing = perform(&Request::Open(folder.path().join("d.dat")));
     assert!(matches!(missing, Some(SessionEvent::Failed(Error::Io { .. }))), "{missing:?}");
-    let nowhere = Request::Save { path: folder.path().join("no").join("c.dat"), document };
+    let nowhere = save(&folder.path().join("no").join("c.dat"));
     assert!(matches!(perform(&nowhere), Some(SessionEvent::Failed(Error::Io { .. }))));
     assert_eq!(perform(&Request::Quit), None);
 }

@@ -10,13 +10,14 @@ use crate::viewer::scene_window::timeline::{
     PassTime, Span, Timeline, device_spans, ms_after, recording_ms,
 };
 
-/// Number of frames on the time line.
+/// Number of frames on the time line: enough to show how they overlap, few enough that passes have
+/// a visible width.
 const N_FRAMES: usize = 4;
-/// Height of a lane, points.
+/// Height of a lane, points: room for its name, which is 10 points high.
 const LANE: f32 = 14.0;
-/// Height of a pass's bar, points.
+/// Height of a pass's bar, points: room for its text, which is 11 points high.
 const BAR: f32 = 13.0;
-/// Width of the lanes' names, points.
+/// Width of the lanes' names, points: the longest has six letters.
 const NAMES: f32 = 46.0;
 
 /// Adds the last frames as three lanes: game step, recording, and the device's passes.

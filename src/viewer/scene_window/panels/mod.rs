@@ -17,9 +17,9 @@ use crate::viewer::colors;
 use crate::viewer::layout::panel_width;
 use crate::viewer::overlay_text::{self, MESSAGE_ROWS, banner, rows_of_third, shrink_text};
 
-/// Width of the panels, points.
+/// Width of the panels, points: the table of frame times has all its columns.
 const WIDTH: f32 = 270.0;
-/// Largest part of the window that the panels cover.
+/// Largest part of the window that the panels cover: most of the window belongs to the picture.
 const MAX_SHARE: f64 = 1.0 / 3.0;
 /// Height of the window from which on the sections of passes begin open, too, points: below it they
 /// would push the settings out of sight.

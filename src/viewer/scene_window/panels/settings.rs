@@ -124,6 +124,7 @@ fn highlighted(text: RichText) -> RichText {
     text.color(Color32::WHITE).background_color(ERROR)
 }
 
+/// Tooltip of the button that keeps or drops B.
 const KEEP_B: &str =
     "keeps the present settings as B, to compare later ones (A) with them, or drops B (m)";
 

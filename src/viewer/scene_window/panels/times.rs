@@ -6,9 +6,10 @@ use super::style::{DIM, PASSES, ms};
 use crate::measure::stats::Summary;
 use crate::viewer::scene_window::timeline::{CAPACITY, Timeline, recording_ms};
 
-/// Height of the graph, points.
+/// Height of the graph, points: peaks stand out, and the settings stay in sight below it.
 const HEIGHT: f32 = 70.0;
-/// Width from which on the table has all columns, points.
+/// Width from which on the table has all columns, points: just below the panels' usual width less
+/// margins.
 const WIDE: f32 = 250.0;
 
 /// Adds the graph and a table of percentiles.

@@ -397,6 +397,29 @@ fn frames_before_a_loss_are_kept() {
 }
 
 #[test]
+fn what_the_driver_says_of_a_loss_is_in_the_message() {
+    let driver = FakeDriver::new();
+    let tells = ("NIMBUS_FAKE_TELLS", "1");
+    for call in ["vkQueueSubmit2", "vkWaitSemaphores"] {
+        let log = format!("fault: {call} 2\n");
+        let lost = ("NIMBUS_FAKE_FAIL", &format!("{call}:2:DEVICE_LOST")[..]);
+        let says = "; the driver says: a page fault; a write to an address that is none from \
+                    0x12345000 to 0x12345fff; ";
+        for (variables, is_told) in [(&[lost, tells][..], true), (&[lost], false)] {
+            let ended = driver.run(RENDER.line, variables);
+            let error = ended.stderr.trim_end();
+            assert_eq!(ended.status.code(), Some(DEVICE), "{error}");
+            assert_eq!((faults_of_message(error), &ended.log[..]), (vec![], &log[..]));
+            assert_eq!(error.contains(says), is_told, "{error}");
+            assert_eq!(error.contains("(code 0x7, data 0x9)"), is_told, "{error}");
+            assert!(!error.contains(char::is_control), "{error:?}");
+        }
+    }
+    let ended = driver.run(RENDER.line, &[tells]);
+    assert!(ended.status.success() && ended.log.is_empty(), "{}{}", ended.stderr, ended.log);
+}
+
+#[test]
 fn the_list_of_devices_is_clear_on_every_machine() {
     let driver = FakeDriver::new();
     let devices = |variables: &[(&str, &str)], code: i32| {

@@ -3,19 +3,14 @@
 
 #[path = "harness/program.rs"]
 mod program;
+#[path = "harness/swiftshader.rs"]
+mod swiftshader;
 
 use std::path::Path;
 use std::process::Command;
 
 use nimbus::io::image;
 
-/// Places of SwiftShader's manifest, which Chromium's packages bring.
-const MANIFESTS: [&str; 4] = [
-    "/usr/lib/chromium/vk_swiftshader_icd.json",
-    "/usr/lib64/chromium-browser/vk_swiftshader_icd.json",
-    "/usr/lib/chromium-browser/vk_swiftshader_icd.json",
-    "/opt/google/chrome/vk_swiftshader_icd.json",
-];
 /// Greatest difference of two drivers' pictures, of colours up to about 1. Blending into a 16-bit
 /// target rounds each layer by 2⁻¹², and the drivers may round apart in each; thick clouds have
 /// some tens of layers that count.
@@ -24,21 +19,16 @@ const MOST: f64 = 32.0 / 4096.0;
 /// driver may take either side of it.
 const MOST_EDGES: usize = 8;
 
-fn manifest() -> &'static str {
-    let found = MANIFESTS.iter().find(|path| Path::new(path).exists());
-    found.expect("SwiftShader, which tools/bootstrap tests installs with Chromium")
-}
-
-fn render(scene: &Path, to: &Path, driver: Option<&str>) -> Vec<[f64; 4]> {
+fn render(scene: &Path, to: &Path, on_other: bool) -> Vec<[f64; 4]> {
     let [scene, out] = [scene, to].map(|path| path.display().to_string());
     let args = ["render", &scene, "--size", "64x48", "--validation", "--force", "-o", &out];
     let mut command: Command = program::nimbus(&args);
-    if let Some(driver) = driver {
-        command.env("VK_DRIVER_FILES", driver).env("VK_ICD_FILENAMES", driver);
+    if on_other {
+        swiftshader::choose(&mut command);
     }
     let output = command.output().expect("it runs");
     let text = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{scene} on {driver:?}: {text}");
+    assert!(output.status.success(), "{scene}, on another driver: {on_other}: {text}");
     image::read(to).expect("a picture").rgba
 }
 
@@ -46,8 +36,8 @@ fn render(scene: &Path, to: &Path, driver: Option<&str>) -> Vec<[f64; 4]> {
 fn every_scene_is_the_same_picture_on_another_driver() {
     let folder = tempfile::tempdir().expect("a folder");
     for scene in &program::scenes() {
-        let own = render(scene, &folder.path().join("a.exr"), None);
-        let other = render(scene, &folder.path().join("b.exr"), Some(manifest()));
+        let own = render(scene, &folder.path().join("a.exr"), false);
+        let other = render(scene, &folder.path().join("b.exr"), true);
         assert_eq!(own.len(), other.len());
         let apart = |(a, b): (&[f64; 4], &[f64; 4])| {
             a.iter().zip(b).map(|(a, b)| (a - b).abs() / a.abs().max(1.0)).fold(0.0, f64::max)

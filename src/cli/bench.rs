@@ -116,7 +116,8 @@ fn bench_scene(
         print_sizes(&stage.scene, Some(&stage));
     }
     let info = stage.info().clone();
-    let clocks = machine::clocks_record(&info, &mut stage.renderer)?;
+    let pass_times = args.options.pass_times;
+    let clocks = machine::clocks_record(&info, pass_times, &mut stage.renderer)?;
     // Read before and after the frames, to measure the drift between the two clocks.
     let readings = stage.device.read_clocks(N_CLOCK_READINGS)?;
     let (color, zones) = (context.color, context.zones.cloned());

@@ -1,5 +1,6 @@
 //! The remarks above and below the tables of `nimbus bench`.
 
+use crate::gpu::PassTimes;
 use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::machine::Clocks;
 use crate::timing::overlap::Overlap;
@@ -127,10 +128,25 @@ pub fn clocks_line(clocks: &Clocks) -> String {
     let empty = clocks
         .timestamp_overhead_ns
         .map_or(String::new(), |ns| format!(", {ns:.0} ns for an empty pass"));
+    let (resolution, overhead) = (clocks.resolution_ns, clocks.overhead_ns);
     format!(
-        "host clock: resolution {} ns, {:.0} ns a reading; device timestamps: {device}{empty}\n",
-        clocks.resolution_ns, clocks.overhead_ns
+        "host clock: resolution {resolution} ns, {overhead:.0} ns a reading; device timestamps: \
+         {device}{empty}\npasses: {}\n",
+        pass_times_text(clocks.pass_times)
     )
+}
+
+/// Returns how passes were timed, and what that costs or hides.
+pub fn pass_times_text(how: PassTimes) -> &'static str {
+    match how {
+        PassTimes::Drained => {
+            "timed one by one, the device idles between two (--pass-times drained)"
+        }
+        PassTimes::Overlapping => {
+            "timed without waits between them, their times may overlap (--pass-times overlapping)"
+        }
+        PassTimes::Off => "not timed (--pass-times off)",
+    }
 }
 
 /// Returns the lines that come before all tables if nothing moves in a case.
@@ -174,7 +190,11 @@ pub fn missing_lines(run: &Run) -> String {
             add("low, high: - : the times differ too much for an interval".to_owned());
         }
         if mode.frames > 0 && mode.gpu_ms.is_none() {
-            add("gpu, passes: - : this device has no timestamps".to_owned());
+            let why = match run.clocks.pass_times {
+                PassTimes::Off => "passes are not timed (--pass-times off)",
+                _ => "this device has no timestamps",
+            };
+            add(format!("gpu, passes: - : {why}"));
         }
     }
     let has_saved = run.cases.iter().any(|c| c.modes.iter().any(|m| !m.skip));

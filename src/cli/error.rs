@@ -201,9 +201,10 @@ fn reference(
 /// Returns the time that decides.
 fn time_kind(args: &ErrorArgs, has_timestamps: bool) -> Result<TimeKind> {
     match args.time {
-        Some(TimeKind::Gpu) if !has_timestamps => {
-            Err(Error::usage("--time gpu: this device has no timestamps; expected --time frame"))
-        }
+        Some(TimeKind::Gpu) if !has_timestamps => Err(Error::usage(
+            "--time gpu: this device has no timestamps, or --pass-times off is given; expected \
+             --time frame",
+        )),
         Some(time) => Ok(time),
         None => Ok(if has_timestamps { TimeKind::Gpu } else { TimeKind::Frame }),
     }

@@ -172,8 +172,8 @@ fn report(ledger: &Ledger) -> String {
         ledger.total.value, ledger.sum, ledger.quadrature
     );
     if ledger.rows.iter().any(|row| row.time_ratio.is_none()) {
-        out += "GPU time by without: - : the row has no counterpart on the device, the device has \
-            no timestamps, or the ledger ended before\n";
+        out += "GPU time by without: - : the row has no counterpart on the device, passes are \
+            not timed there, or the ledger ended before\n";
     }
     if ledger.rows.iter().any(|row| row.error.low.is_none()) {
         out += "95 %: - : an interval needs more pixels; see --pixels\n";

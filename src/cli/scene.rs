@@ -137,7 +137,7 @@ pub fn open_for_study(
     let gpu = GpuContext::open(&device_choice(args))?;
     limits::check(scene, gpu.device.limits())?;
     let mut player = gpu.player(scene.clone(), true)?;
-    let clocks = clocks_record(gpu.device.info(), &mut player.renderer)?;
+    let clocks = clocks_record(gpu.device.info(), args.pass_times, &mut player.renderer)?;
     let packet = player.game.step_at(0, time_s)?;
     let frame = DrawnFrame::of(time_s, &player.renderer.step(packet)?);
     print_unseen(scene, frame, &player.renderer.image()?, args.quiet)?;
@@ -180,6 +180,7 @@ pub fn device_choice(args: &SceneArgs) -> DeviceChoice {
             guard: args.guard,
             max_submit_ms: args.max_submit_ms,
             reports_pipelines: false,
+            pass_times: args.pass_times,
         },
     }
 }
@@ -203,7 +204,8 @@ pub fn check_time(scene: &Scene, time_s: f64) -> Result<()> {
     Err(Error::usage(format!("time {time} s: {what}")))
 }
 
-/// Prints the settings that "auto" chose, and warnings about the light of the last frame.
+/// Prints the settings that "auto" chose, and warnings about the light of the last frame and about
+/// long submissions.
 ///
 /// # Errors
 /// Fails if reading the light back from the device fails.
@@ -212,7 +214,7 @@ pub fn print_notes(stage: &mut Stage, args: &SceneArgs) -> Result<()> {
         for chosen in stage.take_chosen() {
             say!("note: {chosen}");
         }
-        for note in light_notes(stage)? {
+        for note in light_notes(stage)?.into_iter().chain(stage.device.take_over_limit()) {
             say!("warning: {note}");
         }
     }

@@ -37,7 +37,7 @@ pub fn run(args: &StressArgs) -> Result<()> {
             limits: args.limits.clone(),
             guard: args.guard,
             max_submit_ms: args.max_submit_ms,
-            reports_pipelines: false,
+            ..DeviceOptions::default()
         },
     };
     let mut context = StressContext::open(&choice)?;

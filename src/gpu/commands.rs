@@ -13,9 +13,12 @@ use super::rate::Pace;
 use super::timer::{ScopeTime, Timer};
 use crate::error::Result;
 
-/// A submission that takes longer than an hour is taken for a hang. The driver's watchdog ends a
-/// GPU's hang long before; a software device may take minutes for a million large sprites.
+/// A submission that takes longer than this is taken for a hang. The driver's watchdog ends most
+/// hangs of a GPU long before; a software device may take minutes for a million large sprites.
 const TIMEOUT_NS: u64 = 3_600_000_000_000;
+/// The same where submissions have a limit, of half a second by default. Tools that check every
+/// memory access make it a hundred times longer.
+const TIMEOUT_OF_PARTS_NS: u64 = 600_000_000_000;
 const MAX_SCOPES: u32 = 32;
 
 /// Command buffers with all that their submissions need: descriptors, timestamps, a timeline
@@ -55,19 +58,23 @@ impl Submission {
     /// Returns when the device has finished.
     ///
     /// # Errors
-    /// The device is lost, or an hour has passed.
+    /// The device is lost, or is taken for hung.
     pub fn wait(&self) -> Result<()> {
         let _zone = info_span!("wait").entered();
         let (semaphores, values) = ([self.semaphore.raw], [self.value]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        let timeout_ns = match self.shared.max_submit_ns {
+            Some(_) => TIMEOUT_OF_PARTS_NS,
+            None => TIMEOUT_NS,
+        };
         let waited = match self.shared.is_abandoned() {
             true => Err(vk::Result::TIMEOUT),
-            false => unsafe { self.shared.raw.wait_semaphores(&info, TIMEOUT_NS) },
+            false => unsafe { self.shared.raw.wait_semaphores(&info, timeout_ns) },
         };
         if let Err(failure) = waited {
             self.shared.settle(failure);
         }
-        waited.of_call("vkWaitSemaphores", &self.name)
+        self.shared.outcome(waited, "vkWaitSemaphores", &self.name)
     }
 
     /// Whether the device has finished already.
@@ -75,8 +82,8 @@ impl Submission {
     /// # Errors
     /// The device is lost.
     pub fn is_done(&self) -> Result<bool> {
-        let reached = unsafe { self.shared.raw.get_semaphore_counter_value(self.semaphore.raw) }
-            .of_call("vkGetSemaphoreCounterValue", &self.name)?;
+        let reached = unsafe { self.shared.raw.get_semaphore_counter_value(self.semaphore.raw) };
+        let reached = self.shared.outcome(reached, "vkGetSemaphoreCounterValue", &self.name)?;
         Ok(reached >= self.value)
     }
 }
@@ -210,10 +217,10 @@ impl Commands {
                 .wait_semaphore_infos(&waits)
                 .command_buffer_infos(&buffers)
                 .signal_semaphore_infos(&signals)];
-            unsafe {
+            let submitted = unsafe {
                 self.shared.raw.queue_submit2(*self.shared.lock_queue(), &info, vk::Fence::null())
-            }
-            .of_call("vkQueueSubmit2", &self.name)?;
+            };
+            self.shared.outcome(submitted, "vkQueueSubmit2", &self.name)?;
             (self.n_submitted, self.value) = (self.n_submitted + 1, value);
         }
         Ok(self.last_submission())
@@ -236,7 +243,7 @@ impl Commands {
     /// Waits for the last submission and returns the times of its scopes.
     ///
     /// # Errors
-    /// The device is lost, an hour has passed, or a guard band is broken.
+    /// The device is lost or taken for hung, or a guard band is broken.
     pub fn wait(&mut self) -> Result<Vec<ScopeTime>> {
         self.last_submission().wait()?;
         if let Some(guards) = &self.shared.guards {

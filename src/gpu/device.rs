@@ -5,15 +5,19 @@ use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use ash::prelude::VkResult;
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::call::Call;
 use super::device_info::DeviceInfo;
+use super::fault;
 use super::guard::Guards;
 use super::instance::Instance;
 use super::limits::Limits;
 use super::lowered::LoweredLimits;
+use super::over_limit::OverLimit;
+use super::pass_times::PassTimes;
 use super::statistics::{PipelineReport, Reports};
 use crate::error::{Error, Result};
 
@@ -29,6 +33,8 @@ pub struct DeviceOptions {
     /// Most milliseconds that a submission is predicted to take; without, 500 on a device that is
     /// no CPU, and any time on a CPU.
     pub max_submit_ms: Option<f64>,
+    /// The way in which the times of passes are taken.
+    pub pass_times: PassTimes,
 }
 
 /// Most milliseconds of a submission to a GPU. Windows resets a GPU that does not answer for two
@@ -55,10 +61,16 @@ pub(super) struct SharedDevice {
     pub guards: Option<Guards>,
     /// Most nanoseconds that a submission is predicted to take, if there is a limit.
     pub max_submit_ns: Option<f64>,
+    /// Pipelines that cannot keep to it.
+    pub over_limit: OverLimit,
+    /// The way in which the times of passes are taken.
+    pub pass_times: PassTimes,
     /// Whether the device may be at work for ever, so that nothing that it may use can be freed.
     is_abandoned: AtomicBool,
     /// Reports on new pipelines, where they are wanted.
     pub reports: Option<Reports>,
+    /// Where the driver says why the device was lost, if it does.
+    faults: Option<ext::device_fault::Device>,
     pub instance: Arc<Instance>,
 }
 
@@ -81,10 +93,13 @@ impl Device {
         options: &DeviceOptions,
     ) -> Result<Device> {
         let info = DeviceInfo::choose(DeviceInfo::list(instance)?, choice)?;
-        let info = match &options.limits {
+        let mut info = match &options.limits {
             Some(limits) => info.lowered(limits),
             None => info,
         };
+        if options.pass_times == PassTimes::Off {
+            info.limits.timestamp_valid_bits = 0;
+        }
         let has_statistics = options.reports_pipelines && info.has_pipeline_statistics;
         let raw = create(instance, &info, has_statistics)?;
         let queue = unsafe { raw.get_device_queue(info.queue_family, 0) };
@@ -109,6 +124,8 @@ impl Device {
             .then(|| ext::debug_utils::Device::new(&instance.vulkan.raw, &raw));
         let statistics = has_statistics
             .then(|| khr::pipeline_executable_properties::Device::new(&instance.vulkan.raw, &raw));
+        let faults =
+            info.tells_faults.then(|| ext::device_fault::Device::new(&instance.vulkan.raw, &raw));
         instance.messages().claim(raw.handle());
         instance.messages().claim(queue);
         let of_kind = (info.kind != "cpu").then_some(MAX_SUBMIT_MS);
@@ -122,8 +139,11 @@ impl Device {
             debug,
             guards: options.guard.then(Guards::default),
             max_submit_ns: max_submit_ms.map(|ms| 1e6 * ms),
+            over_limit: OverLimit::default(),
+            pass_times: options.pass_times,
             is_abandoned: AtomicBool::new(false),
             reports: options.reports_pipelines.then(|| Reports::new(statistics)),
+            faults,
             instance: instance.clone(),
         });
         Ok(Device { shared, info })
@@ -143,6 +163,11 @@ impl Device {
     /// [`DeviceOptions::reports_pipelines`].
     pub fn take_pipeline_reports(&self) -> Vec<PipelineReport> {
         self.shared.reports.as_ref().map_or(vec![], Reports::take)
+    }
+
+    /// Returns notes on work that takes longer than a submission is to take; each once.
+    pub fn take_over_limit(&self) -> Vec<String> {
+        self.shared.max_submit_ns.map_or(vec![], |limit| self.shared.over_limit.take(limit))
     }
 
     /// Returns the bytes allocated on the device at present.
@@ -209,6 +234,17 @@ impl SharedDevice {
     /// Keeps a report on a new pipeline, if the device was opened for reports.
     pub fn report(&self, raw: vk::Pipeline, name: &str, variant: &[(&str, u32)]) -> Result<()> {
         self.reports.as_ref().map_or(Ok(()), |reports| reports.add(raw, name, variant))
+    }
+
+    /// Turns the result of a call that can lose the device into ours. A loss comes with what the
+    /// driver says of it.
+    pub fn outcome<T>(&self, result: VkResult<T>, call: &str, object: &str) -> Result<T> {
+        let is_lost = matches!(result, Err(vk::Result::ERROR_DEVICE_LOST));
+        let told = self.faults.as_ref().filter(|_| is_lost).and_then(fault::told);
+        result.of_call(call, object).map_err(|e| match told {
+            Some(told) => e.with_note(&told),
+            None => e,
+        })
     }
 
     /// Makes it safe to drop the buffers of a submission after the wait for it has failed. Waits
@@ -332,8 +368,10 @@ fn create(instance: &Instance, info: &DeviceInfo, has_statistics: bool) -> Resul
     let statistics = has_statistics.then_some(khr::pipeline_executable_properties::NAME);
     // A device that has it demands that it is enabled.
     let portable = info.is_portable.then_some(khr::portability_subset::NAME);
-    let optional = [info.calibrated_timestamps, swapchain, statistics, portable];
+    let faults = info.tells_faults.then_some(ext::device_fault::NAME);
+    let optional = [info.calibrated_timestamps, swapchain, statistics, portable, faults];
     let extensions: Vec<_> = optional.into_iter().flatten().map(CStr::as_ptr).collect();
+    let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default().device_fault(true);
     let mut executables = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default()
         .pipeline_executable_info(true);
     let features = vk::PhysicalDeviceFeatures::default()
@@ -347,6 +385,9 @@ fn create(instance: &Instance, info: &DeviceInfo, has_statistics: bool) -> Resul
         .push_next(&mut v13);
     if has_statistics {
         create = create.push_next(&mut executables);
+    }
+    if info.tells_faults {
+        create = create.push_next(&mut fault);
     }
     unsafe { instance.vulkan.raw.create_device(info.physical, &create, None) }
         .of_call("vkCreateDevice", "")

@@ -6,6 +6,7 @@ use ash::{ext, khr, vk};
 
 use super::advice::no_driver;
 use super::call::Call;
+use super::fault;
 use super::instance::Instance;
 use super::limits::{LLVMPIPE_ITERATIONS, Limits};
 use crate::error::{Error, Result};
@@ -39,6 +40,8 @@ pub struct DeviceInfo {
     pub is_portable: bool,
     /// Whether the driver describes the pipelines that it makes.
     pub has_pipeline_statistics: bool,
+    /// Whether the driver says why a device was lost (VK_EXT_device_fault).
+    pub tells_faults: bool,
     pub(super) physical: vk::PhysicalDevice,
     pub(super) queue_family: u32,
 }
@@ -187,6 +190,8 @@ impl DeviceInfo {
             calibrated_timestamps: calibrated_timestamps(instance, physical),
             is_portable: has_extension(vulkan, physical, khr::portability_subset::NAME),
             has_pipeline_statistics: has_pipeline_statistics(vulkan, physical),
+            tells_faults: has_extension(vulkan, physical, ext::device_fault::NAME)
+                && fault::is_told(vulkan, physical),
             physical,
             queue_family: family.unwrap_or(0) as u32,
         }
@@ -210,6 +215,7 @@ impl DeviceInfo {
             calibrated_timestamps: None,
             is_portable: false,
             has_pipeline_statistics: false,
+            tells_faults: false,
             physical: vk::PhysicalDevice::null(),
             queue_family: 0,
         }

@@ -17,6 +17,7 @@ mod device;
 mod device_info;
 mod draw_pipeline;
 mod draws;
+mod fault;
 mod guard;
 mod image;
 mod instance;
@@ -25,9 +26,11 @@ mod kernel;
 mod limits;
 mod lowered;
 mod memory;
+mod over_limit;
 #[cfg(feature = "window")]
 mod overlay;
 mod pacing;
+mod pass_times;
 #[cfg(feature = "window")]
 mod presenter;
 mod rate;
@@ -60,6 +63,7 @@ pub use limits::Limits;
 pub use lowered::LoweredLimits;
 #[cfg(feature = "window")]
 pub use overlay::{Backdrop, Overlay, Widgets};
+pub use pass_times::PassTimes;
 pub use recorder::{DeviceCount, RecordCount, Recorder};
 pub use reflect::{Binding, BindingKind, Member, Reflection, Struct, reflect};
 pub use shader::{Compiler, Optimize, Sources, cache_folder, hex};

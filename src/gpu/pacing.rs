@@ -62,11 +62,15 @@ impl Recorder<'_> {
                 continue;
             }
             let part = if is_divisible { room.clamp(1, rest) } else { rest };
+            let ns = unit_ns * f64::from(part);
+            if ns > limit_ns {
+                self.commands.shared.over_limit.add(&pipeline.name, ns);
+            }
             record(self, first, part)?;
             first += part;
             let work = Work { i_scope: self.i_scope, rate: rate.clone(), n_units: part.into() };
             let pace = &mut self.commands.pace;
-            pace.pending_ns += unit_ns * f64::from(part);
+            pace.pending_ns += ns;
             pace.work.push(work);
         }
         Ok(())

@@ -7,6 +7,7 @@ use ash::vk;
 use super::buffer::{Buffer, MemoryUsage};
 use super::call::Call;
 use super::device::{Device, Owned, SharedDevice};
+use super::pass_times::PassTimes;
 use crate::error::Result;
 
 /// The GPU time of one named scope.
@@ -92,14 +93,15 @@ impl Timer {
         let Some(Queries { pool, .. }) = &self.queries else { return };
         let raw = &self.shared.raw;
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
+        unsafe { raw.cmd_write_timestamp2(commands, all, pool.raw, query) };
+        if self.shared.pass_times != PassTimes::Drained {
+            return;
+        }
         // An execution barrier after each timestamp keeps the next pass out of the scope: without
         // it some drivers (lavapipe) add a graphics pass to its neighbour's time.
         let barrier = [vk::MemoryBarrier2::default().src_stage_mask(all).dst_stage_mask(all)];
         let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
-        unsafe {
-            raw.cmd_write_timestamp2(commands, all, pool.raw, query);
-            raw.cmd_pipeline_barrier2(commands, &dependency);
-        }
+        unsafe { raw.cmd_pipeline_barrier2(commands, &dependency) };
     }
 
     /// Copies the timestamps to where `read` finds them; the last command but for a barrier.

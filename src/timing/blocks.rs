@@ -203,7 +203,8 @@ impl Bench<'_> {
             let rgba = stage.renderer.image()?;
             let unseen = last.map(|frame| unseen(&stage.scene, frame, &rgba));
             let unseen = unseen.transpose()?.flatten();
-            let notes = light_notes(stage)?;
+            let mut notes = light_notes(stage)?;
+            notes.extend(stage.device.take_over_limit());
             lock(self.outcome).notes.extend(unseen.iter().chain(&notes).map(named));
             let counts = Counts::new(&mut stage.renderer, &stage.device, &stage.scene)?;
             lock(self.outcome).counts.insert(block.i_case, counts);

@@ -68,6 +68,7 @@ pub fn differences(a: &Run, b: &Run) -> Vec<Difference> {
         (Condition::Device, "uuid", |r| r.device.uuid.clone()),
         (Condition::Device, "processor", |r| r.cpu.model.clone()),
         (Condition::Device, "cores", |r| r.cpu.logical_cores.to_string()),
+        (Condition::Device, "times of passes", |r| r.clocks.pass_times.name().to_owned()),
         (Condition::Build, "version", |r| r.nimbus.clone()),
         (Condition::Build, "revision", |r| r.revision.clone()),
     ] {

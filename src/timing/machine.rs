@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::frame::Renderer;
-use crate::gpu::DeviceInfo;
+use crate::gpu::{DeviceInfo, PassTimes};
 use crate::measure::clock::ClockQuality;
 
 /// A Vulkan device, as results name it.
@@ -60,6 +60,9 @@ pub struct Clocks {
     pub overhead_ns: f64,
     /// Tick of the device's timestamps; null if it has none.
     pub timestamp_period_ns: Option<f64>,
+    /// The way in which passes are timed; older results have passes "drained".
+    #[serde(default)]
+    pub pass_times: PassTimes,
     /// Measured time of a pass that does nothing. The time of a real pass means little if it is
     /// about as short.
     pub timestamp_overhead_ns: Option<f64>,
@@ -81,14 +84,24 @@ pub fn device_record(info: &DeviceInfo) -> Device {
 ///
 /// # Errors
 /// Fails if a Vulkan call fails.
-pub fn clocks_record(info: &DeviceInfo, renderer: &mut Renderer) -> Result<Clocks> {
+pub fn clocks_record(
+    info: &DeviceInfo,
+    pass_times: PassTimes,
+    renderer: &mut Renderer,
+) -> Result<Clocks> {
     let host = ClockQuality::measure();
     let limits = &info.limits;
     let timestamp_period_ns =
         (limits.timestamp_valid_bits > 0).then_some(limits.timestamp_period_ns);
     let timestamp_overhead_ns = renderer.empty_scope_ns()?;
     let (resolution_ns, overhead_ns) = (host.resolution_ns as f64, host.overhead_ns);
-    Ok(Clocks { resolution_ns, overhead_ns, timestamp_period_ns, timestamp_overhead_ns })
+    Ok(Clocks {
+        resolution_ns,
+        overhead_ns,
+        timestamp_period_ns,
+        pass_times,
+        timestamp_overhead_ns,
+    })
 }
 
 /// Returns the Git revision that was built (see build.rs).

@@ -118,7 +118,8 @@ impl Part {
             ("environment", format!("{environment:?}")),
             ("validation", has("--validation")),
             ("guard bands", has("--guard")),
-            ("limit of a submission", max_submit(command)),
+            ("limit of a submission", value_of(command, "--max-submit-ms")),
+            ("times of passes", self.run.clocks.pass_times.name().to_owned()),
             ("passes", self.table.pass_names.join(", ")),
             ("first case", of_base(&Case::name)),
             ("scene of the first case", of_base(&|c| c.scene_hash.clone())),
@@ -132,11 +133,10 @@ impl Part {
     }
 }
 
-/// Returns the limit that a command gives in ms, or "default".
-fn max_submit(command: &[String]) -> String {
-    const OPTION: &str = "--max-submit-ms";
-    let after = command.iter().position(|word| word == OPTION).and_then(|i| command.get(i + 1));
-    let joined = || command.iter().find_map(|word| word.strip_prefix(OPTION)?.strip_prefix('='));
+/// Returns the value that a command gives to an option, or "default".
+fn value_of(command: &[String], option: &str) -> String {
+    let after = command.iter().position(|word| word == option).and_then(|i| command.get(i + 1));
+    let joined = || command.iter().find_map(|word| word.strip_prefix(option)?.strip_prefix('='));
     after.map(String::as_str).or_else(joined).unwrap_or("default").to_owned()
 }
 

@@ -225,3 +225,37 @@ fn a_sweep_names_the_passes_whose_work_was_skipped() {
         table.lines().skip_while(|l| !l.contains("serial no-skip")).skip(3).collect::<Vec<_>>();
     assert!(after[0].contains("the loop without skipping (serial no-skip) times them"), "{table}");
 }
+
+#[test]
+fn the_ways_of_timing_passes_draw_the_same_and_are_told() {
+    let dir = temp();
+    let mut hashes = vec![];
+    for (how, told, is_timed) in [
+        ("drained", "passes: timed one by one, the device idles between two", true),
+        ("overlapping", "passes: timed without waits between them", true),
+        ("off", "passes: not timed (--pass-times off)", false),
+    ] {
+        let out = path(&dir, how);
+        let loops = ["--frames", "6", "--warmup", "1", "--repeat", "1"];
+        let args = ["bench", "scenes/hello.toml", "--pass-times", how, "-q", "--out", &out];
+        let (code, stdout, stderr) = run(&[&args[..], &loops].concat());
+        assert_eq!(code, 0, "{stderr}");
+        assert!(stdout.contains(told), "{told} in\n{stdout}");
+        let reason = "gpu, passes: - : passes are not timed (--pass-times off)";
+        assert_eq!(stdout.contains(reason), !is_timed, "{stdout}");
+        let json = std::fs::read(path(&dir, &format!("{how}/run.json"))).expect("run.json");
+        let json: Value = serde_json::from_slice(&json).expect("JSON");
+        assert_eq!(json["clocks"]["pass_times"], how);
+        assert_eq!(json["clocks"]["timestamp_period_ns"].is_number(), is_timed);
+        // The loop without skipping: every frame has passes to time.
+        let mode = &json["cases"][0]["modes"][2];
+        assert_eq!(mode["gpu_ms"].is_object(), is_timed, "{mode}");
+        hashes.push(mode["image_hash"].as_str().expect("a hash").to_owned());
+    }
+    assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:?}");
+
+    // Two runs that were timed in different ways were not made under the same conditions.
+    let [a, b] = ["drained", "overlapping"].map(|how| path(&dir, how));
+    let (_, stdout, stderr) = run(&["compare", &a, &b]);
+    assert!(stdout.contains("times of passes"), "{stdout}{stderr}");
+}

@@ -12,6 +12,7 @@
  *   NIMBUS_FAKE_LOG          file that gets a line for each fault, and for each object that is
  *                            still alive when its device is destroyed or the process exits
  *   NIMBUS_FAKE_COUNTS       file that gets the number of each call when the process exits
+ *   NIMBUS_FAKE_TELLS        1: the device tells why it was lost (fault_info.h)
  *
  * After DEVICE_LOST every call in the table CALLS fails with it. HANG stands for a device that
  * never finishes: vkWaitSemaphores returns VK_TIMEOUT at once and the log has the time that it
@@ -105,6 +106,8 @@ static const struct {
 /* Other calls that this driver wraps. */
 #define OTHERS(X)                       \
     X(GetDeviceProcAddr)                \
+    X(EnumerateDeviceExtensionProperties) \
+    X(GetPhysicalDeviceFeatures2)       \
     X(GetPhysicalDeviceProperties)      \
     X(GetPhysicalDeviceProperties2)     \
     X(GetPhysicalDeviceProperties2KHR)  \
@@ -197,6 +200,8 @@ __attribute__((destructor)) static void at_exit(void) {
         add_line("NIMBUS_FAKE_LOG", "alive at exit: %s %lld\n", "Device", n_alive[KIND_Device]);
 }
 
+#include "fault_info.h"
+
 /* Waits for all commands, so that the program may free what a lost or hung device would use. */
 static void finish_commands(void) {
     Word device = atomic_load(&open_device);
@@ -236,6 +241,12 @@ static int32_t answer(int call, Word a, Word b, Word c, Word d, Word e, Word f) 
         }
         if (call == CALL_DeviceWaitIdle)
             add_line("NIMBUS_FAKE_LOG", "never returns: %s %lld\n", NAMES[call], n_calls[call]);
+    }
+    char info[72];
+    const char *names[64];
+    if (call == CALL_CreateDevice && tells()) {
+        without_extension((char *)b, info, names);
+        b = (Word)info;
     }
     int32_t result;
     if (call == CALL_QueueSubmit2) {
@@ -356,6 +367,8 @@ static Function myGetDeviceProcAddr(void *device, const char *name) {
 
 /* Returns the wrapper of a function, or the function itself. */
 static Function wrap(const char *name, Function real) {
+    if (tells() && !strcmp(name, "vkGetDeviceFaultInfoEXT"))
+        return (Function)myGetDeviceFaultInfoEXT;
     if (!real || strncmp(name, "vk", 2)) return real;
     const char *devices = getenv("NIMBUS_FAKE_DEVICES");
     if (devices && !strcmp(devices, "0") && !strcmp(name, "vkEnumeratePhysicalDevices"))

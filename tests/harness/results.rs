@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use nimbus::error::Result;
+use nimbus::gpu::PassTimes;
 use nimbus::io::result_folder::Existing;
 use nimbus::timing::attachments::Attachments;
 use nimbus::timing::frame_rows::{FrameRow, FrameTable};
@@ -72,6 +73,7 @@ pub fn run(modes: Vec<Mode>) -> Run {
             resolution_ns: 1.0,
             overhead_ns: 22.5,
             timestamp_period_ns: None,
+            pass_times: PassTimes::Drained,
             timestamp_overhead_ns: None,
         },
         block_order: modes.iter().map(block).collect(),

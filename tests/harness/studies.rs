@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 
+use nimbus::gpu::PassTimes;
 use nimbus::studies::error::blocks::TimeKind;
 use nimbus::studies::error::front::{Front, Metric};
 use nimbus::studies::error::records::{Best, Budget, Configuration, Study};
@@ -40,6 +41,7 @@ pub fn provenance() -> Provenance {
             resolution_ns: 40.0,
             overhead_ns: 22.5,
             timestamp_period_ns: Some(1.0),
+            pass_times: PassTimes::Drained,
             timestamp_overhead_ns: Some(19_309.0),
         },
     }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use super::values::{parse_limits, parse_positive, parse_size};
-use crate::gpu::LoweredLimits;
+use crate::gpu::{LoweredLimits, PassTimes};
 
 /// Arguments of every command with a scene.
 #[derive(Debug, Clone, ClapArgs)]
@@ -27,6 +27,15 @@ pub struct SceneArgs {
     /// take a busy GPU for hung [default: 500 on a GPU, no limit on a CPU]
     #[arg(long, value_name = "MS", value_parser = parse_positive, help_heading = "Device")]
     pub max_submit_ms: Option<f64>,
+    /// Take the times of passes in this way
+    #[arg(
+        long,
+        value_enum,
+        value_name = "HOW",
+        default_value = "drained",
+        help_heading = "Device"
+    )]
+    pub pass_times: PassTimes,
     /// Run as a device of these lower limits would: a TOML file, such as
     /// tests/data/limits/mali-g78.toml
     #[arg(long, value_name = "FILE", value_parser = parse_limits, help_heading = "Device")]

@@ -45,6 +45,7 @@ pub fn section(record: &impl Serialize) -> Result<Markup> {
         .clocks
         .timestamp_overhead_ns
         .map(|ns| format!(", {} ns for an empty pass", number(ns)));
+    let how = origin.clocks.pass_times.name();
     Ok(html! {
         @if origin.interrupted {
             p class="warning" {
@@ -68,6 +69,7 @@ pub fn section(record: &impl Serialize) -> Result<Markup> {
                 "host: resolution " (number(origin.clocks.resolution_ns)) " ns, "
                 (number(origin.clocks.overhead_ns)) " ns a reading; device: " (period)
                 @if let Some(pass) = &pass { (pass) }
+                "; times of passes: " (how)
             }
             dt { "Date" } dd { time datetime=(origin.date) { (origin.date) } }
             dt { "nimbus" } dd { (origin.nimbus) ", revision " code { (origin.revision) } }

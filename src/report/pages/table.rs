@@ -81,8 +81,8 @@ pub fn remark_list(remarks: &[String]) -> Markup {
 const MISSING: &str = "—";
 
 /// Reasons for a cell without a value.
-const WHY_MISSING: &str = "— : there is no value: the device has no timestamps, the pass or the \
-    loop did not run, or the run ended before it.";
+const WHY_MISSING: &str = "— : there is no value: passes were not timed, the pass or the loop did \
+    not run, or the run ended before it.";
 
 /// Number of rounds of a study that a confidence interval needs: one round has no scatter.
 const N_ROUNDS_NEEDED: usize = 2;

@@ -3,6 +3,7 @@ use std::collections::BTreeMap;
 use serde_json::json;
 
 use super::*;
+use crate::gpu::PassTimes;
 use crate::io::result_folder::Existing;
 use crate::measure::stats::Summary;
 use crate::timing::json::ResultFile;
@@ -236,7 +237,7 @@ fn a_choice_belongs_to_the_case_that_its_text_names() {
 /// The difference that is reported, and the change that causes it.
 type Change = (&'static str, fn(&mut Part));
 
-const CHANGES: [Change; 23] = [
+const CHANGES: [Change; 24] = [
     ("version: 0.1.0 of shard 0, 0.2.0 of shard 4", |p| p.run.nimbus = "0.2.0".to_owned()),
     ("build: 0123456789ab of shard 0, 0123456789ab-dirty of shard 4", |p| {
         p.run.revision += "-dirty"
@@ -253,6 +254,7 @@ const CHANGES: [Change; 23] = [
     }),
     ("environment: ", |p| p.run.environment = BTreeMap::new()),
     ("validation: false of shard 0, true", |p| p.run.command.push("--validation".to_owned())),
+    ("times of passes: ", |p| p.run.clocks.pass_times = PassTimes::Overlapping),
     ("guard bands: ", |p| p.run.command.push("--guard".to_owned())),
     ("limit of a submission: default of shard 0, 20 of shard 4", |p| {
         p.run.command.extend(["--max-submit-ms".to_owned(), "20".to_owned()])

@@ -86,7 +86,7 @@ pub fn show_passes(ui: &mut Ui, timeline: &Timeline) {
         response.on_hover_text(format!("in {:.0} % of the last frames", 100.0 * share));
     }
     if passes.is_empty() && timeline.frames().len() > 0 {
-        ui.weak("no pass ran, or the device has no timestamps");
+        ui.weak("no pass ran, or passes are not timed");
     }
 }
 

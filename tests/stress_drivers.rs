@@ -1,0 +1,59 @@
+//! The stress suite on a second driver, and on lavapipe with other widths of vectors, which are
+//! other sizes of subgroups.
+
+#[path = "harness/program.rs"]
+mod program;
+#[path = "harness/swiftshader.rs"]
+mod swiftshader;
+
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Runs cases of the suite and asserts that none fails, on a device whose name has `device`, and
+/// that at least `n_least` pass.
+fn stress(families: &[&str], device: &str, n_least: usize, choose: impl FnOnce(&mut Command)) {
+    let mut command = program::nimbus(&[&["stress", "-q", "--json", "--guard"], families].concat());
+    choose(&mut command);
+    let output = command.output().expect("it runs");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "on {device}: {errors}");
+    let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let name = json["device"]["name"].as_str().expect("a name");
+    assert!(name.contains(device), "ran on {name}");
+    let cases = json["cases"].as_array().expect("cases");
+    let of = |verdict: &str| cases.iter().filter(|c| c["verdict"] == verdict).count();
+    println!("{name}: {} passed, {} cannot be run", of("passed"), of("not-here"));
+    assert!(of("passed") >= n_least, "{} of {} pass on {name}", of("passed"), cases.len());
+}
+
+/// Chooses lavapipe with vectors of `bits`. Mesa's cache of compiled shaders does not know of the
+/// width.
+fn width<'a>(bits: &'a str, cache: &'a tempfile::TempDir) -> impl FnOnce(&mut Command) + 'a {
+    move |command| {
+        command.args(["--device", "llvmpipe"]).env("LP_NATIVE_VECTOR_WIDTH", bits);
+        command.env("MESA_SHADER_CACHE_DIR", cache.path());
+    }
+}
+
+#[test]
+fn the_suite_passes_with_subgroups_of_four() {
+    let cache = tempfile::tempdir().expect("a folder");
+    stress(&[], "128 bits", 130, width("128", &cache));
+}
+
+/// Mesa 22.3.6 crashes in every graphics pipeline at this width, so that only families without
+/// pictures run.
+#[test]
+fn computed_families_pass_with_subgroups_of_sixteen() {
+    let cache = tempfile::tempdir().expect("a folder");
+    let families = ["functions/", "generation/", "live/", "moisture/", "sorting/"];
+    stress(&families, "512 bits", 40, width("512", &cache));
+}
+
+/// The other families take half an hour there.
+#[test]
+fn families_pass_on_another_driver() {
+    let families = ["functions/", "moisture/", "brdf/", "sorting/", "compositing/"];
+    stress(&families, "SwiftShader", 50, swiftshader::choose);
+}

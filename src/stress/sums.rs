@@ -35,7 +35,8 @@ pub const CASES: &[Case] = &[
     },
 ];
 
-/// A single invocation that adds the terms, 16 per iteration.
+/// A single invocation that adds `N_TERMS` terms, 16 per iteration. With guard bands a buffer is
+/// longer than its terms.
 const SUM: &str = r#"#version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
@@ -48,7 +49,7 @@ layout(std430, binding = 1) writeonly buffer Totals { float total; };
     ADD(sum, terms[i + 3u])
 void main() {
     SUM1 sum = EMPTY1;
-    for (uint i = 0u; i < terms.length(); i += 16u) {
+    for (uint i = 0u; i < N_TERMS; i += 16u) {
         FOUR(i);
         FOUR(i + 4u);
         FOUR(i + 8u);
@@ -83,7 +84,8 @@ fn sums(
         return Ok(());
     }
     let sums = Sums { summation, precision };
-    let kernel = ctx.kernel("sum", SUM, &[], SumMacros::from(sums).list())?;
+    let source = SUM.replace("N_TERMS", &format!("{N_TERMS}u"));
+    let kernel = ctx.kernel("sum", &source, &[], SumMacros::from(sums).list())?;
     for (what, terms) in ["wide", "dust"].into_iter().zip(terms()) {
         let (x, y) = (ctx.upload(&terms)?, ctx.buffer::<f32>(1)?);
         ctx.run(|rec| rec.dispatch_groups(&kernel, &[&x, &y], &(), 1))?;

@@ -68,7 +68,9 @@ pub fn section(results: &BenchResults, folder: &Path, colors: &PassColors) -> Re
         h3 { "Passes" }
         @match &passes {
             Some(passes) => { (passes) }
-            None => { p { "No pass was timed: the device has no timestamps, or they were turned off." } }
+            None => {
+                p { "No pass was timed: the device has no timestamps, or they were turned off." }
+            }
         }
         (pass_table(run))
     })

@@ -185,8 +185,8 @@ fn zones_are_nested_and_passes_lie_in_their_frames() {
 fn a_calibrated_clock_places_the_passes_exactly() {
     let (samples, stage, _) = benched(&Zones::default());
     let real = ClockFit::from_samples(&stage.device.read_clocks(4).expect("readings"));
-    assert_eq!(real.is_some(), stage.info().calibrated_timestamps.is_some());
-    println!("{:?}: {real:?}", stage.info().calibrated_timestamps);
+    assert_eq!(real.is_some(), stage.info().clock_calibration.is_some());
+    println!("{:?}: {real:?}", stage.info().clock_calibration);
     // A device whose own clock is unknown: the last pass of a frame ends when the frame does, so
     // read there.
     let pairs: Vec<ClockSample> = samples

@@ -1,5 +1,7 @@
 //! `nimbus devices`.
 
+use std::borrow::Cow;
+
 use serde_json::json;
 
 use super::args::DevicesArgs;
@@ -78,16 +80,19 @@ fn describe(d: &DeviceInfo, i_used: Option<usize>) -> String {
         bits => format!("timestamps {bits} bits, {} ns a tick", l.timestamp_period_ns),
     };
     out += &format!("   images up to {} a side; {timestamps}\n", l.max_image_extent);
-    out + &match d.calibrated_timestamps {
-        Some(name) => {
-            format!("   clock calibrated with the host's by {}\n", name.to_string_lossy())
-        }
+    out + &match calibration(d) {
+        Some(name) => format!("   clock calibrated with the host's by {name}\n"),
         None => {
             "   clock not calibrated with the host's: VK_KHR_ and VK_EXT_calibrated_timestamps \
-             are missing\n"
+             are missing, or lack the clock of this system\n"
                 .to_owned()
         }
     }
+}
+
+/// Returns the extension that calibrates the device's clock.
+fn calibration(d: &DeviceInfo) -> Option<Cow<'static, str>> {
+    d.clock_calibration.map(|calibration| calibration.extension.to_string_lossy())
 }
 
 fn to_json(d: &DeviceInfo, i_used: Option<usize>) -> serde_json::Value {
@@ -96,7 +101,7 @@ fn to_json(d: &DeviceInfo, i_used: Option<usize>) -> serde_json::Value {
         "index": d.index, "name": d.name, "driver": d.driver, "api": version(d),
         "type": d.kind, "uuid": d.uuid,
         "used": Some(d.index) == i_used, "unusable": d.unusable,
-        "calibrated_timestamps": d.calibrated_timestamps.map(|name| name.to_string_lossy()),
+        "calibrated_timestamps": calibration(d),
         "limits": {
             "device_memory_bytes": l.device_memory_bytes,
             "max_storage_buffer_bytes": l.max_storage_buffer_bytes,

@@ -1,9 +1,8 @@
 //! The device's clock beside the host's.
 //!
 //! The device reads both clocks at one moment (VK_KHR_calibrated_timestamps, or its predecessor of
-//! EXT). A line through several readings converts times of the device to the host's clock.
-//! `Instant` is CLOCK_MONOTONIC on Linux, one of the extension's time domains; elsewhere nothing
-//! is calibrated.
+//! EXT). A line through several readings converts times of the device to the host's clock. Devices
+//! that cannot read a clock of this system (gpu/host_clock.rs) are not calibrated.
 
 use std::time::Instant;
 
@@ -11,6 +10,7 @@ use ash::{ext, khr, vk};
 
 use super::call::Call;
 use super::device::Device;
+use super::host_clock::instant_of;
 use crate::error::Result;
 
 /// Both clocks at one moment.
@@ -87,19 +87,18 @@ impl ClockFit {
 
 impl Device {
     /// Reads both clocks `n` times; empty on a device without
-    /// [`super::DeviceInfo::calibrated_timestamps`].
+    /// [`super::DeviceInfo::clock_calibration`].
     ///
     /// # Errors
     /// The device is lost or out of memory.
     pub fn read_clocks(&self, n: usize) -> Result<Vec<ClockSample>> {
-        let Some(name) = self.info().calibrated_timestamps else { return Ok(vec![]) };
+        let Some(calibration) = self.info().clock_calibration else { return Ok(vec![]) };
         let (instance, raw) = (&self.shared().instance.vulkan.raw, &self.shared().raw);
         let domain = |domain| vk::CalibratedTimestampInfoKHR::default().time_domain(domain);
-        let domains =
-            [domain(vk::TimeDomainKHR::DEVICE), domain(vk::TimeDomainKHR::CLOCK_MONOTONIC)];
+        let domains = [domain(vk::TimeDomainKHR::DEVICE), domain(calibration.domain)];
         let read = || {
             let (clocks, deviation_ns) = unsafe {
-                if name == khr::calibrated_timestamps::NAME {
+                if calibration.extension == khr::calibrated_timestamps::NAME {
                     khr::calibrated_timestamps::Device::new(instance, raw)
                         .get_calibrated_timestamps(&domains)
                 } else {
@@ -108,41 +107,12 @@ impl Device {
                 }
             }
             .of_call("vkGetCalibratedTimestamps", "")?;
-            let (host, reading_ns) = instant_of(clocks[1]);
+            let (host, reading_ns) = instant_of(calibration.domain, clocks[1]);
             let device_ns = self.limits().ticks_ns(clocks[0]);
             Ok(ClockSample { device_ns, host, deviation_ns: deviation_ns as f64 + reading_ns })
         };
         (0..n).map(|_| read()).collect()
     }
-}
-
-/// Returns the `Instant` when CLOCK_MONOTONIC showed `ns`, and its possible error in nanoseconds.
-///
-/// `Instant` does not tell its zero, so it is read between two readings of the same clock. The
-/// closest of several such pairs counts.
-#[cfg(target_os = "linux")]
-fn instant_of(ns: u64) -> (Instant, f64) {
-    use std::time::Duration;
-    const N_TRIES: usize = 5;
-    let monotonic_ns = || {
-        let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
-        i128::from(now.tv_sec) * 1_000_000_000 + i128::from(now.tv_nsec)
-    };
-    let read = |_| (monotonic_ns(), Instant::now(), monotonic_ns());
-    let between = |(before, _, after): &(i128, Instant, i128)| after - before;
-    let first = read(0);
-    let (before, now, after) = (1..N_TRIES)
-        .map(read)
-        .fold(first, |best, next| if between(&next) < between(&best) { next } else { best });
-    let ago = (before + after) / 2 - i128::from(ns);
-    let apart = Duration::from_nanos(u64::try_from(ago.unsigned_abs()).unwrap_or(u64::MAX));
-    let at = if ago >= 0 { now.checked_sub(apart) } else { now.checked_add(apart) };
-    (at.unwrap_or(now), (after - before) as f64)
-}
-
-#[cfg(not(target_os = "linux"))]
-fn instant_of(_: u64) -> (Instant, f64) {
-    (Instant::now(), f64::INFINITY)
 }
 
 #[cfg(test)]
@@ -199,20 +169,5 @@ mod tests {
             assert!((got - want).abs() < 200.0, "{got} for {want}");
         }
         assert_eq!(ClockFit::from_samples(&[]), None);
-    }
-
-    #[test]
-    #[cfg(target_os = "linux")]
-    fn instant_of_inverts_the_monotonic_clock() {
-        let reading = || rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
-        let ns = |t: rustix::time::Timespec| t.tv_sec as u64 * 1_000_000_000 + t.tv_nsec as u64;
-        let before = Instant::now();
-        let between = ns(reading());
-        let after = Instant::now();
-        let (at, off_ns) = instant_of(between);
-        let slack = Duration::from_nanos(off_ns as u64 + 1);
-        assert!(at + slack >= before && at <= after + slack, "{off_ns}");
-        // It converts future times, too.
-        assert!(instant_of(between + 1_000_000_000).0 > after);
     }
 }

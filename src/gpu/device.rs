@@ -369,7 +369,8 @@ fn create(instance: &Instance, info: &DeviceInfo, has_statistics: bool) -> Resul
     // A device that has it demands that it is enabled.
     let portable = info.is_portable.then_some(khr::portability_subset::NAME);
     let faults = info.tells_faults.then_some(ext::device_fault::NAME);
-    let optional = [info.calibrated_timestamps, swapchain, statistics, portable, faults];
+    let calibration = info.clock_calibration.map(|calibration| calibration.extension);
+    let optional = [calibration, swapchain, statistics, portable, faults];
     let extensions: Vec<_> = optional.into_iter().flatten().map(CStr::as_ptr).collect();
     let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default().device_fault(true);
     let mut executables = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default()

@@ -7,6 +7,7 @@ use ash::{ext, khr, vk};
 use super::advice::no_driver;
 use super::call::Call;
 use super::fault;
+use super::host_clock::{self, ClockCalibration};
 use super::instance::Instance;
 use super::limits::{LLVMPIPE_ITERATIONS, Limits};
 use crate::error::{Error, Result};
@@ -32,9 +33,8 @@ pub struct DeviceInfo {
     pub limits: Limits,
     /// Whether it can present to windows.
     pub has_swapchain: bool,
-    /// The extension that reads the device's clock and the host's at one moment, where the device
-    /// has one.
-    pub calibrated_timestamps: Option<&'static CStr>,
+    /// The way in which the device reads its clock and the host's at one moment, where it can.
+    pub clock_calibration: Option<ClockCalibration>,
     /// Whether the device is one over another API (VK_KHR_portability_subset), such as MoltenVK's.
     /// nimbus uses nothing that such a device may lack.
     pub is_portable: bool,
@@ -187,7 +187,7 @@ impl DeviceInfo {
                 timestamp_period_ns: f64::from(limits.timestamp_period),
             },
             has_swapchain: has_extension(vulkan, physical, khr::swapchain::NAME),
-            calibrated_timestamps: calibrated_timestamps(instance, physical),
+            clock_calibration: clock_calibration(instance, physical),
             is_portable: has_extension(vulkan, physical, khr::portability_subset::NAME),
             has_pipeline_statistics: has_pipeline_statistics(vulkan, physical),
             tells_faults: has_extension(vulkan, physical, ext::device_fault::NAME)
@@ -212,7 +212,7 @@ impl DeviceInfo {
             unusable: None,
             limits,
             has_swapchain: false,
-            calibrated_timestamps: None,
+            clock_calibration: None,
             is_portable: false,
             has_pipeline_statistics: false,
             tells_faults: false,
@@ -269,21 +269,18 @@ fn unusable(
     missing.map(|(_, name)| format!("feature {name} is missing"))
 }
 
-/// Returns the extension by which a device reads its clock and CLOCK_MONOTONIC at one moment,
-/// the newer one first.
-fn calibrated_timestamps(
+/// Returns the way in which a device reads its clock and one of the host at one moment, by the
+/// newer extension where there are two.
+fn clock_calibration(
     instance: &Instance,
     physical: vk::PhysicalDevice,
-) -> Option<&'static CStr> {
-    if !cfg!(target_os = "linux") {
-        return None;
-    }
+) -> Option<ClockCalibration> {
     let (entry, raw) = (&instance.vulkan.entry, &instance.vulkan.raw);
-    let name = [khr::calibrated_timestamps::NAME, ext::calibrated_timestamps::NAME]
+    let extension = [khr::calibrated_timestamps::NAME, ext::calibrated_timestamps::NAME]
         .into_iter()
         .find(|name| has_extension(raw, physical, name))?;
     let domains = unsafe {
-        if name == khr::calibrated_timestamps::NAME {
+        if extension == khr::calibrated_timestamps::NAME {
             khr::calibrated_timestamps::Instance::new(entry, raw)
                 .get_physical_device_calibrateable_time_domains(physical)
         } else {
@@ -291,9 +288,8 @@ fn calibrated_timestamps(
                 .get_physical_device_calibrateable_time_domains(physical)
         }
     };
-    let domains = domains.ok()?;
-    let needs = [vk::TimeDomainKHR::DEVICE, vk::TimeDomainKHR::CLOCK_MONOTONIC];
-    needs.iter().all(|d| domains.contains(d)).then_some(name)
+    let domain = host_clock::domain_among(&domains.ok()?)?;
+    Some(ClockCalibration { extension, domain })
 }
 
 /// Whether a device describes its pipelines.

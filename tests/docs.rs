@@ -180,7 +180,7 @@ fn run_lines(page: &str, lines: Vec<String>) -> Vec<String> {
             None => continue,
         };
         #[cfg(feature = "window")]
-        command.env("DISPLAY", display.name());
+        command.envs(display.variables());
         let output =
             command.current_dir(folder.path()).stdin(Stdio::null()).output().expect("it runs");
         if !output.status.success() {

@@ -31,7 +31,7 @@ impl<'a> Window<'a> {
     fn open(display: &'a Display, dir: &Path, file: &Path) -> Window<'a> {
         let mut command: Command =
             nimbus(&["edit", &file.to_string_lossy(), "--size", "900x640", "--validation"]);
-        command.current_dir(dir).env("DISPLAY", display.name()).env("XDG_CONFIG_HOME", dir);
+        command.current_dir(dir).envs(display.variables()).env("XDG_CONFIG_HOME", dir);
         let child = command.spawn().expect("the program runs");
         let id = display.window_of(child.id());
         let window = Window { display, id, child };

@@ -25,7 +25,7 @@ const DELAYS_MS: [u64; 8] = [0, 5, 10, 20, 40, 80, 160, 320];
 /// Starts the editor, and adds a box. Returns the editor and its window.
 fn open(display: &Display, file: &Path) -> (Child, String) {
     let mut command = nimbus(&["edit", &file.to_string_lossy(), "--size", "640x480"]);
-    command.env("DISPLAY", display.name()).env("XDG_CONFIG_HOME", file.parent().expect("a folder"));
+    command.envs(display.variables()).env("XDG_CONFIG_HOME", file.parent().expect("a folder"));
     let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("it starts");
     let window = display.window_of(child.id());
     wait_for("title", || display.title(&window).contains("| nimbus"));
@@ -89,7 +89,7 @@ fn ctrl_c_closes_a_window_and_says_so() {
         ),
     ] {
         let mut command = nimbus(&[&args[..], &["--size", "320x240"]].concat());
-        command.env("DISPLAY", display.name()).env("XDG_CONFIG_HOME", dir.path());
+        command.envs(display.variables()).env("XDG_CONFIG_HOME", dir.path());
         let child = command.spawn().expect("it starts");
         let window = display.window_of(child.id());
         wait_for("title", || !display.title(&window).is_empty());

@@ -45,7 +45,7 @@ impl<'a> View<'a> {
         let mut command = nimbus(&[&["view"], args, &options].concat());
         command
             .current_dir(dir)
-            .env("DISPLAY", display.name())
+            .envs(display.variables())
             .env("NIMBUS_CACHE_DIR", dir.join("cache"))
             .stderr(std::fs::File::create(&stderr).expect("a file"));
         let child = command.spawn().expect("the program runs");
@@ -184,22 +184,24 @@ fn the_window_follows_keys_mouse_and_size() {
 
 #[test]
 fn a_missing_display_is_reported_with_a_command_that_needs_none() {
-    let run = |display: Option<&str>, args: &[&str]| {
+    let run = |variables: &[(&str, &str)], args: &[&str]| {
         let mut command = nimbus(args);
-        command.env_remove("WAYLAND_DISPLAY").env_remove("DISPLAY");
-        if let Some(display) = display {
-            command.env("DISPLAY", display);
-        }
+        command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET").env_remove("DISPLAY");
+        command.envs(variables.iter().copied());
         let output = command.output().expect("the program runs");
         assert_eq!(output.status.code(), Some(3));
         String::from_utf8_lossy(&output.stderr).into_owned()
     };
     for args in [["view", HELLO, "-q"], ["edit", "none.dat", "-q"]] {
-        for (display, why) in [
-            (None, "there is no display: DISPLAY is not set"),
-            (Some(":6543"), "the display :6543 cannot be opened"),
+        for (variables, why) in [
+            (&[][..], "there is no display: neither WAYLAND_DISPLAY nor DISPLAY is set"),
+            (&[("DISPLAY", ":6543")], "the display :6543 cannot be opened"),
+            (
+                &[("DISPLAY", ":6543"), ("WAYLAND_DISPLAY", "wayland-6543")],
+                "the Wayland display wayland-6543 cannot be opened",
+            ),
         ] {
-            let text = run(display, &args);
+            let text = run(variables, &args);
             assert!(text.contains(why) && text.contains("nimbus render"), "{text}");
         }
     }
@@ -321,7 +323,7 @@ fn keys_are_listed_in_the_window_and_panels_keep_to_a_third_at_every_scale() {
         let stderr = dir.path().join("stderr.txt");
         let size = format!("{width}x{height}");
         let mut command = nimbus(&["view", HELLO, "--size", &size, "--present", "immediate"]);
-        command.current_dir(dir.path()).env("DISPLAY", display.name());
+        command.current_dir(dir.path()).envs(display.variables());
         command.env("WINIT_X11_SCALE_FACTOR", scale);
         command.stderr(std::fs::File::create(&stderr).expect("a file"));
         let child = command.spawn().expect("the program runs");

@@ -3,13 +3,13 @@
 //!
 //! Xlib reports a broken connection through a function that must not return. It may be called on
 //! any thread, in the middle of a call of the window system. winit has a connection of its own, and
-//! panics if that connection breaks first.
+//! panics if that connection breaks first. On Wayland, winit ends its loop with an exit code.
+//! Windows and macOS have no such connection.
 
-use std::ffi::c_int;
 use std::panic::{PanicHookInfo, set_hook, take_hook};
 use std::sync::{Mutex, Once};
 
-use x11_dl::xlib;
+use winit::error::EventLoopError;
 
 use super::sync::lock;
 use crate::error::Error;
@@ -35,14 +35,39 @@ pub fn on_loss(rescue: impl FnOnce() + Send + 'static) {
             move |panic| if is_of_display(panic) { end_process() } else { others(panic) },
         ));
     });
-    if let Ok(library) = xlib::Xlib::open() {
-        // SAFETY: the function has the required type, stays valid, and never returns.
-        unsafe { (library.XSetIOErrorHandler)(Some(end)) };
+    #[cfg(all(unix, not(target_os = "macos")))]
+    x11::on_loss();
+}
+
+#[cfg(all(unix, not(target_os = "macos")))]
+mod x11 {
+    use std::ffi::c_int;
+
+    use x11_dl::xlib;
+
+    /// Makes Xlib end the process when its connection breaks.
+    pub fn on_loss() {
+        if let Ok(library) = xlib::Xlib::open() {
+            // SAFETY: the function has the required type, stays valid, and never returns.
+            unsafe { (library.XSetIOErrorHandler)(Some(end)) };
+        }
+    }
+
+    unsafe extern "C" fn end(_: *mut xlib::Display) -> c_int {
+        super::end_process()
     }
 }
 
-unsafe extern "C" fn end(_: *mut xlib::Display) -> c_int {
-    end_process()
+/// Returns the error of an event loop that has ended with `error`.
+pub fn of_loop(error: &EventLoopError) -> Error {
+    match error {
+        EventLoopError::ExitFailure(_) => lost(),
+        other => Error::vulkan("window", other),
+    }
+}
+
+fn lost() -> Error {
+    Error::vulkan("window", "the connection to the display is lost")
 }
 
 /// Returns whether winit panicked because its connection to the display broke.
@@ -62,7 +87,7 @@ fn end_process() -> ! {
     if let Some(rescue) = rescue.take() {
         rescue();
     }
-    let error = Error::vulkan("window", "the connection to the display is lost");
+    let error = lost();
     say!("error: {error}");
     atomic::abandon_and_exit(error.exit_code())
 }

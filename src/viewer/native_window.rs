@@ -46,18 +46,34 @@ pub fn open_window(
 /// There is no display, or it cannot be opened.
 pub fn event_loop<T: 'static>(alternative: &str) -> Result<EventLoop<T>> {
     EventLoop::with_user_event().build().map_err(|error| {
-        let problem = match std::env::var("DISPLAY") {
-            Ok(name) if !name.is_empty() => format!(
-                "the display {name} cannot be opened: no X server answers there, or it does not \
-                 let this user in (over ssh, `ssh -X` forwards a display)"
-            ),
-            _ => "there is no display: DISPLAY is not set; run nimbus in a desktop session, over \
-                  `ssh -X`, or by `xvfb-run`"
-                .to_owned(),
-        };
+        let problem = problem_of_display(|name| std::env::var(name).ok());
         let cause = without_place(&error.to_string()).trim_end_matches('.').to_owned();
         Error::vulkan("opening a window", format!("{problem} ({cause}); {alternative}"))
     })
+}
+
+/// Returns why no display can be opened where the environment has these variables. winit takes
+/// Wayland where there are both window systems.
+fn problem_of_display(variable: impl Fn(&str) -> Option<String>) -> String {
+    if cfg!(any(windows, target_os = "macos")) {
+        return "the system opens no window; run nimbus in a desktop session".to_owned();
+    }
+    let set = |name| variable(name).filter(|value| !value.is_empty());
+    if let Some(name) = set("WAYLAND_DISPLAY").or_else(|| set("WAYLAND_SOCKET")) {
+        return format!(
+            "the Wayland display {name} cannot be opened: no compositor answers there, or \
+             libwayland-client is not installed (without WAYLAND_DISPLAY, nimbus uses X11)"
+        );
+    }
+    match set("DISPLAY") {
+        Some(name) => format!(
+            "the display {name} cannot be opened: no X server answers there, or it does not let \
+             this user in (over ssh, `ssh -X` forwards a display)"
+        ),
+        None => "there is no display: neither WAYLAND_DISPLAY nor DISPLAY is set; run nimbus in a \
+                 desktop session, over `ssh -X`, or by `xvfb-run`"
+            .to_owned(),
+    }
 }
 
 /// Returns the text of an error of winit without the place in winit's source that it begins with:

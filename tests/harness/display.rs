@@ -62,8 +62,11 @@ impl Display {
         assert!(ended.success());
     }
 
-    pub fn name(&self) -> &str {
-        &self.name
+    /// Returns the variables of a program that is to open its windows here. An empty variable
+    /// counts as none; a program would otherwise prefer the Wayland session of whoever runs the
+    /// tests.
+    pub fn variables(&self) -> [(&'static str, &str); 3] {
+        [("DISPLAY", &self.name), ("WAYLAND_DISPLAY", ""), ("WAYLAND_SOCKET", "")]
     }
 
     /// Runs xdotool. Returns its output where it succeeds.

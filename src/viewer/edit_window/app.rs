@@ -63,7 +63,7 @@ pub fn run(options: Options) -> Result<()> {
     let mut app = App::new(options, &events)?;
     let rescue = app.rescue.clone();
     display_loss::on_loss(move || rescue.write());
-    let ran = events.run_app(&mut app).map_err(|e| Error::vulkan("window", e));
+    let ran = events.run_app(&mut app).map_err(|e| display_loss::of_loop(&e));
     app.close();
     // The render thread ends before the window that it draws into.
     let rendered = app.thread.take().map(RenderThread::join);

@@ -101,7 +101,7 @@ pub fn run(options: Options) -> Result<WindowTimes> {
         error_meter: ErrorMeter::default(),
         failure: None,
     };
-    let ran = events.run_app(&mut app).map_err(|e| Error::vulkan("window", e));
+    let ran = events.run_app(&mut app).map_err(|e| display_loss::of_loop(&e));
     app.state().is_closing = true;
     // The render thread ends before the window that it draws into.
     let rendered = app.thread.take().map(RenderThread::join);

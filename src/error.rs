@@ -138,7 +138,7 @@ impl Error {
             | OutOfMemory
             | WouldBlock => Error::transient(path, cause),
             // A disk or a server that answers with an error: Rust has no kind for it.
-            _ if cause.raw_os_error() == Some(EIO) => Error::transient(path, cause),
+            _ if is_io_error(cause) => Error::transient(path, cause),
             _ => Error::io(path, cause),
         }
     }
@@ -246,8 +246,17 @@ fn cause_text(cause: &str) -> String {
     text
 }
 
-/// The system's number for an I/O error, the same on every Unix.
-const EIO: i32 = 5;
+/// The system's numbers for an I/O error: EIO, the same on every Unix.
+#[cfg(not(windows))]
+const IO_ERRORS: &[i32] = &[5];
+/// The system's numbers for an I/O error: ERROR_CRC, ERROR_IO_DEVICE.
+#[cfg(windows)]
+const IO_ERRORS: &[i32] = &[23, 1117];
+
+/// Returns whether the system names a failure of the disk itself.
+fn is_io_error(cause: &io::Error) -> bool {
+    cause.raw_os_error().is_some_and(|number| IO_ERRORS.contains(&number))
+}
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -1,7 +1,5 @@
 //! `nimbus farm emit` and `nimbus farm submit`.
 
-use std::fs;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use super::args::{EmitArgs, EngineArg, JobArgs, SubmitArg, SubmitArgs};
@@ -113,8 +111,7 @@ fn write(args: &JobArgs, files: &Path, engine: EngineArg) -> Result<Option<(Vec<
     for Script { name, text } in &scripts {
         let path = files.join(name);
         atomic::write_synced(&path, text.as_bytes())?;
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755))
-            .map_err(|cause| Error::io(&path, cause))?;
+        atomic::make_executable(&path)?;
     }
     Ok(Some((scripts, status)))
 }

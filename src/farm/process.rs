@@ -1,6 +1,7 @@
 //! Processes of nimbus that a farm starts.
 
-use std::os::unix::process::CommandExt;
+mod system;
+
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,7 +29,8 @@ pub fn program() -> Result<PathBuf> {
 /// once.
 pub fn quiet(program: &Path) -> Command {
     let mut command = Command::new(program);
-    command.stdin(Stdio::null()).stdout(Stdio::null()).process_group(0);
+    command.stdin(Stdio::null()).stdout(Stdio::null());
+    system::become_own_group(&mut command);
     command
 }
 
@@ -55,11 +57,11 @@ pub fn wait(
         }
         if !is_asked && stop.load(Ordering::Relaxed) {
             is_asked = true;
-            interrupt(child);
+            system::interrupt(child);
         }
         if looked.elapsed() >= between {
             looked = Instant::now();
-            let now = processor_ticks(child.id());
+            let now = system::processor_ticks(child);
             // A system that does not tell the time has no limit.
             if now.is_none() || now != used {
                 (used, active) = (now, looked);
@@ -71,23 +73,7 @@ pub fn wait(
     }
 }
 
-/// Returns the processor time of all threads of a process, in clock ticks (proc(5), fields utime
-/// and stime).
-fn processor_ticks(pid: u32) -> Option<u64> {
-    let text = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // The name of the program, in parentheses, may have spaces. The state, field 3, follows it.
-    let mut fields = text.rsplit_once(')')?.1.split_whitespace().skip(14 - 3);
-    Some(fields.next()?.parse::<u64>().ok()? + fields.next()?.parse::<u64>().ok()?)
-}
-
-/// Asks a process to end, as Ctrl-C does.
-fn interrupt(child: &Child) {
-    let mut kill = Command::new("kill");
-    // A failure means that the process has ended; the caller waits for it in any case.
-    let _ = kill.args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
-}
-
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use std::os::unix::process::ExitStatusExt;
 
@@ -106,6 +92,8 @@ mod tests {
         // The loop uses processor time until it has counted, on a busy machine as well.
         let count = "i=0; while [ $i -lt 300000 ]; do i=$((i+1)); done; exit 7";
         assert_eq!(run(count, Duration::from_secs(30)).code(), Some(7));
-        assert!(processor_ticks(std::process::id()).is_some());
+        let mut child = quiet(Path::new("sh")).args(["-c", "read line"]).spawn().expect("a shell");
+        assert!(system::processor_ticks(&child).is_some());
+        child.wait().expect("an end");
     }
 }

@@ -4,7 +4,15 @@ use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+/// What to install: the loader, and drivers for GPUs or for the CPU.
+#[cfg(windows)]
+pub const PACKAGES: &str = "install your GPU maker's driver, which brings the Vulkan loader";
+/// What to install: the loader, and a driver over Metal.
+#[cfg(target_os = "macos")]
+pub const PACKAGES: &str = "install the Vulkan loader and MoltenVK: the Vulkan SDK of LunarG, or \
+    `brew install vulkan-loader molten-vk`";
 /// Packages of the loader, and of drivers for GPUs and for the CPU.
+#[cfg(not(any(windows, target_os = "macos")))]
 pub const PACKAGES: &str = "install the Vulkan loader and a driver: on Debian and Ubuntu \
     `apt install libvulkan1 mesa-vulkan-drivers` (llvmpipe needs no GPU), on Fedora \
     `dnf install vulkan-loader mesa-vulkan-drivers`, or your GPU maker's driver";

@@ -212,11 +212,12 @@ pub struct Compiler {
 }
 
 /// Returns the folder `name` for files that can be made again: in `$NIMBUS_CACHE_DIR`, else
-/// `$XDG_CACHE_HOME/nimbus`, else `~/.cache/nimbus`.
+/// `$XDG_CACHE_HOME/nimbus`, else `~/.cache/nimbus`; on Windows `%LOCALAPPDATA%\nimbus`.
 pub fn cache_folder(name: &str) -> Option<PathBuf> {
     let var = |name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let base = var("NIMBUS_CACHE_DIR")
         .or_else(|| var("XDG_CACHE_HOME").map(|d| d.join("nimbus")))
+        .or_else(|| var("LOCALAPPDATA").filter(|_| cfg!(windows)).map(|d| d.join("nimbus")))
         .or_else(|| var("HOME").map(|d| d.join(".cache/nimbus")))?;
     Some(base.join(name))
 }

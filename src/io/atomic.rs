@@ -122,8 +122,29 @@ pub fn append_synced(path: &Path, line: &str) -> Result<()> {
 /// # Errors
 /// As [`write_synced`].
 pub fn sync(path: &Path) -> Result<()> {
-    let synced = File::open(path).and_then(|file| file.sync_all());
+    // Windows has no such wait for a folder, and flushes a file only if it is open for writing.
+    if cfg!(windows) && path.is_dir() {
+        return Ok(());
+    }
+    let file = OpenOptions::new().read(true).write(cfg!(windows)).open(path);
+    let synced = file.and_then(|file| file.sync_all());
     synced.map_err(|cause| Error::of_io(path, &cause))
+}
+
+/// Lets every user run the file at `path`. Windows has no such permission.
+///
+/// # Errors
+/// As [`write_synced`].
+pub fn make_executable(path: &Path) -> Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        fs::set_permissions(path, fs::Permissions::from_mode(0o755))
+            .map_err(|cause| Error::of_io(path, &cause))?;
+    }
+    #[cfg(not(unix))]
+    let _ = path;
+    Ok(())
 }
 
 /// Makes a folder and those above it.

@@ -34,12 +34,12 @@ pub fn replace_files(
 /// When they cannot.
 pub fn check_writable(folder: &Path) -> Result<()> {
     // Asks the system and makes no trial file, because a killed process would leave that behind.
-    #[cfg(target_os = "linux")]
+    #[cfg(unix)]
     let checked = {
         use rustix::fs::{Access, access};
         access(folder, Access::WRITE_OK | Access::EXEC_OK).map_err(std::io::Error::from)
     };
-    #[cfg(not(target_os = "linux"))]
+    #[cfg(not(unix))]
     let checked = Temporary::folder(folder, "results").map(drop);
     checked.map_err(|cause| Error::io(folder, format!("nothing can be written in it: {cause}")))
 }
@@ -87,9 +87,11 @@ fn moved_or_removed(new: &Path, old: &Path) -> std::io::Result<()> {
     }
 }
 
+/// Makes a folder that is not there yet. Returns false for any other: nimbus exchanges the names of
+/// folders on Linux only.
 #[cfg(not(target_os = "linux"))]
-fn exchanged(_: &Path, _: &[&str], _: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
-    Ok(false)
+fn exchanged(folder: &Path, _: &[&str], write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
+    if folder.symlink_metadata().is_ok() { Ok(false) } else { moved_in(folder, write) }
 }
 
 /// Replaces the folder as a whole. Returns false, with nothing changed, where that is impossible:
@@ -129,7 +131,6 @@ fn exchanged(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>)
 }
 
 /// Moves the new folder to a place where there is none yet.
-#[cfg(target_os = "linux")]
 fn moved_in(folder: &Path, write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
     let failed = |cause| Error::io(folder, cause);
     let Some(name) = folder.file_name() else {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
@@ -111,14 +112,25 @@ pub fn revision() -> &'static str {
 
 /// Returns the processor of this machine.
 pub fn cpu() -> Cpu {
-    let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = text
-        .lines()
-        .find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, name)| name));
+    let model = processor_name().map(|name| name.trim().to_owned());
     Cpu {
-        model: model.map_or_else(|| "unknown".to_owned(), |name| name.trim().to_owned()),
+        model: model.filter(|name| !name.is_empty()).unwrap_or_else(|| "unknown".to_owned()),
         logical_cores: std::thread::available_parallelism().map_or(1, usize::from),
     }
+}
+
+/// Returns the name of the processor, where the system tells it.
+fn processor_name() -> Option<String> {
+    if cfg!(windows) {
+        return std::env::var("PROCESSOR_IDENTIFIER").ok();
+    }
+    if cfg!(target_os = "macos") {
+        let output = Command::new("sysctl").args(["-n", "machdep.cpu.brand_string"]).output();
+        return String::from_utf8(output.ok()?.stdout).ok();
+    }
+    let text = fs::read_to_string("/proc/cpuinfo").ok()?;
+    let name_of = |line: &str| Some(line.strip_prefix("model name")?.split_once(':')?.1.to_owned());
+    text.lines().find_map(name_of)
 }
 
 /// Returns the environment variables that Vulkan drivers and the loader read: Mesa's for every

@@ -420,6 +420,30 @@ fn what_the_driver_says_of_a_loss_is_in_the_message() {
 }
 
 #[test]
+fn commands_of_a_pass_have_its_name_as_a_label() {
+    let driver = FakeDriver::new();
+    let path = driver.folder.path().join("labels");
+    for limit in ["", " --max-submit-ms 0.01"] {
+        let _ = fs::remove_file(&path);
+        let line = format!("{}{limit}", RENDER.line);
+        let ended = driver.run(&line, &[("NIMBUS_FAKE_LABELS", path.to_str().expect("UTF-8"))]);
+        assert!(ended.status.success(), "{}", ended.stderr);
+        let labels = fs::read_to_string(&path).expect("labels");
+        let (mut open, mut names) = (0, vec![]);
+        for line in labels.lines() {
+            match line.strip_prefix("begin ") {
+                Some(name) => (open, names) = (open + 1, [names, vec![name]].concat()),
+                None => open -= 1,
+            }
+            // Passes lie side by side.
+            assert!((0..=1).contains(&open), "{labels}");
+        }
+        assert_eq!(open, 0, "{labels}");
+        assert!(names.len() >= 3 && names.contains(&"sort"), "{labels}");
+    }
+}
+
+#[test]
 fn the_list_of_devices_is_clear_on_every_machine() {
     let driver = FakeDriver::new();
     let devices = |variables: &[(&str, &str)], code: i32| {

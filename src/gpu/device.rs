@@ -1,6 +1,6 @@
 //! An open Vulkan device: its queue, its allocator and its leak report.
 
-use std::ffi::{CStr, CString};
+use std::ffi::CStr;
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -56,7 +56,8 @@ pub(super) struct SharedDevice {
     pub queue_family: u32,
     pub limits: Limits,
     pub allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
-    debug: Option<ext::debug_utils::Device>,
+    /// Names and labels for the tools that show them.
+    pub debug: Option<ext::debug_utils::Device>,
     /// The guard bands of buffers, where they are wanted.
     pub guards: Option<Guards>,
     /// Most nanoseconds that a submission is predicted to take, if there is a limit.
@@ -267,19 +268,6 @@ impl SharedDevice {
     /// Whether the device was given up. It and its objects then live until the process exits.
     pub fn is_abandoned(&self) -> bool {
         self.is_abandoned.load(Ordering::Relaxed)
-    }
-
-    /// Names a handle for frame debuggers, and claims validation messages about it.
-    pub fn name<H: vk::Handle + Copy>(&self, handle: H, name: &str) {
-        if self.instance.vulkan.has_validation {
-            self.instance.messages().claim(handle);
-        }
-        let Some(debug) = &self.debug else { return };
-        let Ok(name) = CString::new(name) else { return };
-        let info =
-            vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
-        // A name that cannot be set is no reason to stop.
-        let _ = unsafe { debug.set_debug_utils_object_name(&info) };
     }
 
     /// Names a new handle and returns it as an owned one that `destroy` destroys.

@@ -24,6 +24,7 @@ mod image;
 mod instance;
 mod interface;
 mod kernel;
+mod labels;
 mod limits;
 mod lowered;
 mod memory;

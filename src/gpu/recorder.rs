@@ -86,7 +86,7 @@ impl Commands {
 }
 
 impl Recorder<'_> {
-    /// Runs `f` between two timestamps under `name`.
+    /// Runs `f` between two timestamps, under a label `name` for the tools that read such labels.
     ///
     /// # Errors
     /// `f` fails, or a guard band is broken.
@@ -97,12 +97,14 @@ impl Recorder<'_> {
     ) -> Result<()> {
         let _zone = info_span!("record", name).entered();
         let commands = &mut self.commands;
+        commands.shared.begin_label(commands.buffer(), name);
         let i = commands.timer.begin(commands.buffer(), name);
         let outer = (self.scope, self.i_scope);
         (self.scope, self.i_scope) = (name, i);
         let done = f(self);
         (self.scope, self.i_scope) = outer;
         self.commands.timer.end(self.commands.buffer(), i);
+        self.commands.shared.end_label(self.commands.buffer());
         done?;
         let Commands { is_divisible, shared, .. } = &*self.commands;
         match shared.clone().guards.as_ref().filter(|_| *is_divisible) {

@@ -12,6 +12,7 @@
  *   NIMBUS_FAKE_LOG          file that gets a line for each fault, and for each object that is
  *                            still alive when its device is destroyed or the process exits
  *   NIMBUS_FAKE_COUNTS       file that gets the number of each call when the process exits
+ *   NIMBUS_FAKE_LABELS       file that gets a line for each begin and end of a label of commands
  *   NIMBUS_FAKE_TELLS        1: the device tells why it was lost (fault_info.h)
  *
  * After DEVICE_LOST every call in the table CALLS fails with it. HANG stands for a device that
@@ -107,6 +108,8 @@ static const struct {
 #define OTHERS(X)                       \
     X(GetDeviceProcAddr)                \
     X(EnumerateDeviceExtensionProperties) \
+    X(CmdBeginDebugUtilsLabelEXT)       \
+    X(CmdEndDebugUtilsLabelEXT)         \
     X(GetPhysicalDeviceFeatures2)       \
     X(GetPhysicalDeviceProperties)      \
     X(GetPhysicalDeviceProperties2)     \
@@ -351,6 +354,18 @@ static void myGetPhysicalDeviceQueueFamilyProperties2(Word device, uint32_t *n, 
 static void myGetPhysicalDeviceQueueFamilyProperties2KHR(Word device, uint32_t *n, char *families) {
     ((GetFamilies)realGetPhysicalDeviceQueueFamilyProperties2KHR)(device, n, families);
     change_families(n, families ? families + CHAIN : NULL, CHAIN + 24);
+}
+
+static void myCmdBeginDebugUtilsLabelEXT(Word commands, const char *info) {
+    const char *name;
+    memcpy(&name, info + CHAIN, sizeof name);
+    add_line("NIMBUS_FAKE_LABELS", "begin %s\n", name, 0);
+    ((void (*)(Word, const char *))realCmdBeginDebugUtilsLabelEXT)(commands, info);
+}
+
+static void myCmdEndDebugUtilsLabelEXT(Word commands) {
+    add_line("NIMBUS_FAKE_LABELS", "end\n", "", 0);
+    ((void (*)(Word))realCmdEndDebugUtilsLabelEXT)(commands);
 }
 
 static int32_t no_devices(Word instance, uint32_t *n, Word *devices) {

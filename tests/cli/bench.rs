@@ -256,6 +256,7 @@ fn the_ways_of_timing_passes_draw_the_same_and_are_told() {
 
     // Two runs that were timed in different ways were not made under the same conditions.
     let [a, b] = ["drained", "overlapping"].map(|how| path(&dir, how));
-    let (_, stdout, stderr) = run(&["compare", &a, &b]);
-    assert!(stdout.contains("times of passes"), "{stdout}{stderr}");
+    let (code, _, stderr) = run(&["compare", &a, &b]);
+    let told = "device, times of passes: A drained, B overlapping";
+    assert!(code == 2 && stderr.contains(told), "{code}: {stderr}");
 }

@@ -1,11 +1,12 @@
 //! `nimbus devices`.
 
 use std::borrow::Cow;
+use std::path::Path;
 
 use serde_json::json;
 
 use super::args::DevicesArgs;
-use super::{kernels, output};
+use super::{clock_locks, kernels, output};
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceInfo, Instance, no_permission};
 use crate::io::console::say;
@@ -22,7 +23,9 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     let devices = DeviceInfo::list(&instance)?;
     let used = DeviceInfo::choose(devices.clone(), args.device.as_deref());
     let i_used = used.as_ref().ok().map(|d| d.index);
-    if args.json {
+    if args.lock {
+        output::text(&clock_locks::text(&devices, Path::new("/sys")))?;
+    } else if args.json {
         let list: Vec<_> = devices.iter().map(|d| to_json(d, i_used)).collect();
         output::object(&list)?;
     } else {

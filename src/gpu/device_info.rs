@@ -27,6 +27,10 @@ pub struct DeviceInfo {
     pub kind: &'static str,
     /// VkPhysicalDeviceIDProperties::deviceUUID in hexadecimal.
     pub uuid: String,
+    /// The maker's number in PCI, or of Khronos.
+    pub vendor: u32,
+    /// Its address on the PCI bus, such as 0000:03:00.0, where the driver tells it.
+    pub pci_address: Option<String>,
     /// The reason why nimbus cannot use it, where there is one.
     pub unusable: Option<String>,
     /// Its limits.
@@ -154,6 +158,8 @@ impl DeviceInfo {
                 _ => "other",
             },
             uuid: id.device_uuid.iter().map(|b| format!("{b:02x}")).collect(),
+            vendor: properties.vendor_id,
+            pci_address: pci_address(vulkan, physical),
             unusable: unusable(vulkan, physical, version, family),
             limits: Limits {
                 max_storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
@@ -201,7 +207,7 @@ impl DeviceInfo {
 #[cfg(test)]
 impl DeviceInfo {
     /// Returns a device that does not exist.
-    pub(super) fn of_limits(name: &str, kind: &'static str, limits: Limits) -> DeviceInfo {
+    pub(crate) fn of_limits(name: &str, kind: &'static str, limits: Limits) -> DeviceInfo {
         DeviceInfo {
             index: 0,
             name: name.to_owned(),
@@ -209,6 +215,8 @@ impl DeviceInfo {
             api_version: (1, 3, 0),
             kind,
             uuid: String::new(),
+            vendor: 0,
+            pci_address: None,
             unusable: None,
             limits,
             has_swapchain: false,
@@ -290,6 +298,18 @@ fn clock_calibration(
     };
     let domain = host_clock::domain_among(&domains.ok()?)?;
     Some(ClockCalibration { extension, domain })
+}
+
+/// Returns a device's address on the PCI bus, as Linux writes it.
+fn pci_address(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Option<String> {
+    let mut bus = vk::PhysicalDevicePCIBusInfoPropertiesEXT::default();
+    let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut bus);
+    if !has_extension(instance, physical, ext::pci_bus_info::NAME) {
+        return None;
+    }
+    unsafe { instance.get_physical_device_properties2(physical, &mut all) };
+    let [domain, number, device] = [bus.pci_domain, bus.pci_bus, bus.pci_device];
+    Some(format!("{domain:04x}:{number:02x}:{device:02x}.{:x}", bus.pci_function))
 }
 
 /// Whether a device describes its pipelines.

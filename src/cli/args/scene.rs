@@ -63,7 +63,8 @@ pub struct SceneArgs {
 /// Arguments of `nimbus devices`.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "All devices, and what the driver's compiler makes of two scenes:\n  \
-    nimbus devices\n  nimbus devices --kernels scenes/hello.toml scenes/ground.toml")]
+    nimbus devices\n  nimbus devices --kernels scenes/hello.toml scenes/ground.toml\n\n\
+    The commands that lock clocks before a benchmark:\n  nimbus devices --lock")]
 pub struct DevicesArgs {
     /// The device to mark as used, by index or part of its name
     #[arg(long, value_name = "INDEX|NAME")]
@@ -82,6 +83,10 @@ pub struct DevicesArgs {
     #[arg(long, value_name = "FILE", value_parser = parse_limits, requires = "kernels")]
     #[arg(help_heading = "Kernels")]
     pub limits: Option<LoweredLimits>,
+    /// Print the commands that hold each device's clocks at one speed while it is timed, and those
+    /// that undo it; nothing is changed
+    #[arg(long, conflicts_with_all = ["kernels", "json"])]
+    pub lock: bool,
     /// Print JSON instead of the table
     #[arg(long)]
     pub json: bool,

@@ -44,9 +44,11 @@ from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tupl
 try:
     import numpy as np
 except ImportError:
-    raise ImportError(
-        "nimbus_results needs numpy: pip install numpy, or the package python3-numpy"
-    ) from None
+    NEEDS = "nimbus_results needs numpy: pip install numpy, or the package python3-numpy"
+    if __name__ == "__main__":
+        print(f"error: {NEEDS}", file=sys.stderr)
+        sys.exit(2)
+    raise ImportError(NEEDS) from None
 
 __all__ = [
     "Interval",

@@ -153,6 +153,7 @@ fn existing(path: PathBuf) -> Result<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gpu::Limits;
 
     /// A folder like /sys with one card at a PCI address, which has these files.
     fn sys(address: &str, files: &[&str]) -> tempfile::TempDir {
@@ -173,11 +174,10 @@ mod tests {
 
     fn device(kind: &'static str, vendor: u32, address: Option<&str>) -> DeviceInfo {
         let uuid = "00112233445566778899aabbccddeeff".to_owned();
-        DeviceInfo { kind, vendor, uuid, pci_address: address.map(str::to_owned), ..blank() }
-    }
-
-    fn blank() -> DeviceInfo {
-        DeviceInfo::of_limits("a device", "other", crate::gpu::Limits::default())
+        let mut device = DeviceInfo::of_limits("a device", kind, Limits::default());
+        (device.vendor, device.uuid) = (vendor, uuid);
+        device.pci_address = address.map(str::to_owned);
+        device
     }
 
     #[test]

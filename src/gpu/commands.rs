@@ -36,6 +36,8 @@ pub struct Commands {
     /// Whether a recording may be submitted in parts.
     pub(super) is_divisible: bool,
     pub(super) pace: Pace,
+    /// The labels that are open, the outer one first.
+    labels: Vec<&'static str>,
     pub(super) descriptors: DescriptorPools,
     pub(super) timer: Timer,
     /// The value that the semaphore has after the last submission.
@@ -107,6 +109,7 @@ impl Commands {
             n_submitted: 0,
             is_divisible: true,
             pace: Pace::default(),
+            labels: vec![],
             descriptors,
             timer,
             value: 0,
@@ -139,6 +142,7 @@ impl Commands {
         unsafe { self.shared.raw.reset_command_pool(self.pool.raw, flags) }
             .of_call("vkResetCommandPool", "")?;
         (self.i_buffer, self.n_submitted) = (0, 0);
+        self.labels.clear();
         self.pace = Pace::default();
         self.begin_buffer()
     }
@@ -172,16 +176,39 @@ impl Commands {
     /// Begins a part of the recording, which is submitted apart from what was recorded before.
     pub(super) fn begin_part(&mut self) -> Result<()> {
         self.pace.pending_ns = 0.0;
-        self.end()?;
-        self.begin_buffer()
+        self.end_part()?;
+        self.continue_part()
     }
 
     /// Submits what is recorded so far, waits for it, and begins a part.
     pub(super) fn finish_part(&mut self) -> Result<()> {
         self.pace.pending_ns = 0.0;
-        self.end()?;
+        self.end_part()?;
         self.submit()?.wait()?;
-        self.begin_buffer()
+        self.continue_part()
+    }
+
+    /// Ends a command buffer whose labels go on in the next one.
+    fn end_part(&mut self) -> Result<()> {
+        self.labels.iter().for_each(|_| self.shared.end_label(self.buffer()));
+        self.end()
+    }
+
+    fn continue_part(&mut self) -> Result<()> {
+        self.begin_buffer()?;
+        self.labels.iter().for_each(|name| self.shared.begin_label(self.buffer(), name));
+        Ok(())
+    }
+
+    /// Begins a label, which holds until [`Commands::end_label`].
+    pub(super) fn begin_label(&mut self, name: &'static str) {
+        self.labels.push(name);
+        self.shared.begin_label(self.buffer(), name);
+    }
+
+    pub(super) fn end_label(&mut self) {
+        self.labels.pop();
+        self.shared.end_label(self.buffer());
     }
 
     /// Starts the recorded commands and returns at once.

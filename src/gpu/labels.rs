@@ -27,7 +27,8 @@ impl SharedDevice {
         unsafe { debug.cmd_begin_debug_utils_label(commands, &label) };
     }
 
-    /// Ends the stretch that began last. It may have begun in an earlier part of the recording.
+    /// Ends the stretch that began last, in the same command buffer: Vulkan allows another one, and
+    /// Mesa 22.3 crashes there.
     pub fn end_label(&self, commands: vk::CommandBuffer) {
         if let Some(debug) = &self.debug {
             unsafe { debug.cmd_end_debug_utils_label(commands) };

@@ -97,14 +97,14 @@ impl Recorder<'_> {
     ) -> Result<()> {
         let _zone = info_span!("record", name).entered();
         let commands = &mut self.commands;
-        commands.shared.begin_label(commands.buffer(), name);
+        commands.begin_label(name);
         let i = commands.timer.begin(commands.buffer(), name);
         let outer = (self.scope, self.i_scope);
         (self.scope, self.i_scope) = (name, i);
         let done = f(self);
         (self.scope, self.i_scope) = outer;
         self.commands.timer.end(self.commands.buffer(), i);
-        self.commands.shared.end_label(self.commands.buffer());
+        self.commands.end_label();
         done?;
         let Commands { is_divisible, shared, .. } = &*self.commands;
         match shared.clone().guards.as_ref().filter(|_| *is_divisible) {

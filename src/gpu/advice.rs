@@ -4,10 +4,10 @@ use std::fs::OpenOptions;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// What to install: the loader, and drivers for GPUs or for the CPU.
+/// The driver to install.
 #[cfg(windows)]
 pub const PACKAGES: &str = "install your GPU maker's driver, which brings the Vulkan loader";
-/// What to install: the loader, and a driver over Metal.
+/// The loader, and the driver over Metal, to install.
 #[cfg(target_os = "macos")]
 pub const PACKAGES: &str = "install the Vulkan loader and MoltenVK: the Vulkan SDK of LunarG, or \
     `brew install vulkan-loader molten-vk`";

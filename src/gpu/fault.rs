@@ -1,4 +1,4 @@
-//! What a driver says of the loss of its device (VK_EXT_device_fault).
+//! The reasons that a driver gives for the loss of its device (VK_EXT_device_fault).
 
 use std::ffi::CStr;
 use std::ptr;

@@ -102,7 +102,7 @@ impl Device {
             info.limits.timestamp_valid_bits = 0;
         }
         let has_statistics = options.reports_pipelines && info.has_pipeline_statistics;
-        let raw = create(instance, &info, has_statistics)?;
+        let raw = create(instance, &info, options, has_statistics)?;
         let queue = unsafe { raw.get_device_queue(info.queue_family, 0) };
         let mut debug_settings = gpu_allocator::AllocatorDebugSettings::default();
         // Device::drop reports leaks itself, into the messages that tests read.
@@ -338,7 +338,12 @@ impl<H: vk::Handle + Copy> Drop for Owned<H> {
     }
 }
 
-fn create(instance: &Instance, info: &DeviceInfo, has_statistics: bool) -> Result<ash::Device> {
+fn create(
+    instance: &Instance,
+    info: &DeviceInfo,
+    options: &DeviceOptions,
+    has_statistics: bool,
+) -> Result<ash::Device> {
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(info.queue_family)
@@ -365,7 +370,9 @@ fn create(instance: &Instance, info: &DeviceInfo, has_statistics: bool) -> Resul
         .pipeline_executable_info(true);
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(info.limits.has_int64)
-        .shader_float64(info.limits.has_float64);
+        .shader_float64(info.limits.has_float64)
+        // A read far beyond the end must not end the process before the bands are checked.
+        .robust_buffer_access(options.guard);
     let mut create = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)

@@ -14,10 +14,10 @@ mod svg;
 #[path = "plots/sweeps.rs"]
 mod sweeps;
 
+use nimbus::measure::figure::Figure;
 use nimbus::report::charts::{Chart, error, frames, ledger};
 use nimbus::studies::error::front::Front;
 use nimbus::studies::error::records::Study;
-use nimbus::studies::figure::Figure;
 use nimbus::studies::ledger::records::Ledger;
 use nimbus::timing::frame_rows::FrameRow;
 use studies::{configuration, row, study, usual_ledger, usual_study};

@@ -3,11 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 
 use clap::ColorChoice;
 
 use super::args::{BenchArgs, SceneArgs};
 use super::bench_cases::{BenchCases, bench_cases, plan};
+use super::bench_check;
 use super::bench_record::{Recorder, Runs, print_json};
 use super::interrupt::{self, PATIENCE};
 use super::output::{SharedFolder, check_out, claim_file, lock_folder};
@@ -147,7 +149,9 @@ fn bench_scene(
         let folder = open_results(dir, Existing::new(args.force), cases.len(), args.plot)?;
         *lock_folder(&recorder.folder) = Some(folder);
     }
+    let begin = Instant::now();
     let ended = time(stage, &recorder, context.stop, &outcome);
+    bench_check::run(&recorder, begin.elapsed(), context.stop, &outcome);
     keeping.finish();
     let outcome = std::mem::take(&mut *blocks::lock(&outcome));
     let Finished { stage, failure } = ended;
@@ -162,13 +166,14 @@ fn bench_scene(
         (Some(_), Some(stage)) => stage.device.read_clocks(N_CLOCK_READINGS)?,
         _ => Vec::new(),
     };
+    let wrong = bench_check::wrong(&outcome, &recorder.cases);
     let is_cut = outcome.interrupted || failure.is_some();
     let run = recorder.record(&outcome, &later, is_cut)?;
     runs.lock().unwrap_or_else(PoisonError::into_inner).push(run);
     if failure.is_none() {
         stage.map_or(Ok(()), Stage::close)?;
     }
-    failure.or(outcome.interrupted.then_some(Error::Interrupted)).map_or(Ok(()), Err)
+    failure.or(outcome.interrupted.then_some(Error::Interrupted)).or(wrong).map_or(Ok(()), Err)
 }
 
 /// Runs all blocks, with a progress bar.

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::farm::{Workload, bench_workload};
 use crate::io::console::say;
 use crate::model::scene::Threading;
+use crate::studies::check::checked_pixels;
 use crate::timing::blocks::BenchPlan;
 use crate::timing::cases::{Case, LoopChoice, cases};
 use crate::timing::limits::{SceneMemory, check_bench, check_cases};
@@ -72,6 +73,7 @@ pub fn plan(args: &BenchArgs) -> BenchPlan {
         n_rounds: args.repeat,
         hash_frames: args.hash_frames,
         pictures: args.out.is_some(),
+        checked: (!args.no_check).then_some(checked_pixels),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::bench_check;
 use super::bench_remarks::{
     clocks_line, drawn_line, empty_line, latency_line, missing_lines, ms, overlap_lines,
     skipping_line, spread_lines, still_line, still_lines,
@@ -89,7 +90,8 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
 
 /// Returns what skipping saved, and the remarks on the last frames.
 fn last_frame_lines(case: &Case, same: Option<bool>) -> String {
-    let mut out = case.skipping.as_ref().map_or(String::new(), skipping_line);
+    let mut out = bench_check::line(case);
+    out += &case.skipping.as_ref().map_or(String::new(), skipping_line);
     out += &case.counts.map_or(String::new(), |counts| format!("last frame: {}\n", counts.text()));
     out += match same {
         Some(true) => "the last frames of all blocks are the same, to the byte\n",
@@ -191,7 +193,7 @@ fn pass_by_case_rows(run: &Run) -> Vec<Vec<String>> {
 /// Returns a row a case and loop.
 fn case_rows(run: &Run) -> Vec<Vec<String>> {
     let (mut header, columns) = case_columns(run);
-    const FIGURES: [&str; 15] = [
+    const FIGURES: [&str; 16] = [
         "particles",
         "drawn",
         "pixels",
@@ -201,6 +203,7 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
         "low",
         "high",
         "fps",
+        "RMSE",
         "game",
         "gpu",
         "latency",
@@ -229,6 +232,7 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
                 or_dash(mode.frame_ms.and_then(|m| m.p50_low), ms),
                 or_dash(mode.frame_ms.and_then(|m| m.p50_high), ms),
                 or_dash(mode.frame_ms, |m| format!("{:.1}", fps(m.of.p50))),
+                or_dash(case.check.as_ref().and_then(|c| c.rmse), |r| format!("{:.1e}", r.value)),
                 p50(mode.game_ms),
                 p50(mode.gpu_ms),
                 p50(mode.latency_ms),

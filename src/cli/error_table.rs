@@ -1,9 +1,9 @@
 //! The table that `nimbus error` prints.
 
 use super::output::{header, interval, or_dash, scientific, table};
+use crate::measure::figure::Figure;
 use crate::studies::error::front::Front;
 use crate::studies::error::records::{Best, Budget, Configuration, Study};
-use crate::studies::figure::Figure;
 use crate::studies::provenance::ReferenceRecord;
 
 /// Returns the whole text: the conditions, the configurations by time, and the best for each

@@ -5,6 +5,7 @@ pub mod args;
 mod attach;
 mod bench;
 mod bench_cases;
+mod bench_check;
 mod bench_plot;
 mod bench_record;
 mod bench_remarks;

@@ -14,8 +14,8 @@ pub use crate::io::claim::{refuse_any, refuse_existing};
 use crate::io::console::{self, say};
 use crate::io::plain_text::{plain, plain_json};
 use crate::io::result_folder::ResultFolder;
+use crate::measure::figure::Figure;
 use crate::report::charts::Chart;
-use crate::studies::figure::Figure;
 
 /// Prints `error: …` to stderr.
 pub fn error(error: &Error, color: ColorChoice) {

@@ -5,6 +5,7 @@
 
 pub mod bootstrap;
 pub mod clock;
+pub mod figure;
 pub mod lows;
 pub mod picture;
 pub(crate) mod random;

@@ -83,13 +83,11 @@ pub(super) struct Layered {
     pub value: [f64; 4],
     /// By how much a device's value may differ.
     pub bound: [f64; 4],
-    /// View depth of the background, and its bound.
-    pub opaque: (f64, f64),
 }
 
 impl From<&OpaquePixel> for Layered {
     fn from(b: &OpaquePixel) -> Layered {
-        Layered { value: b.color, bound: b.bound, opaque: (b.depth, b.depth_bound) }
+        Layered { value: b.color, bound: b.bound }
     }
 }
 

@@ -54,7 +54,19 @@ pub fn render_over(
     let (width, height) = (view.width, view.height);
     let at: Vec<[u32; 2]> = (0..width * height).map(|i| [i % width, i / width]).collect();
     let whole = Raster { first: [0, 0], n_columns: width, cell: 1, at: &at };
-    let pixels = layered(view, &whole, opaque, sprites, rounding, &|_| ());
+    render_over_at(view, &whole, opaque, sprites, rounding)
+}
+
+/// Returns the values and bounds of [`render_over`] at the pixels of `raster` alone, over `opaque`,
+/// one each.
+pub fn render_over_at(
+    view: &View,
+    raster: &Raster<'_>,
+    opaque: &[OpaquePixel],
+    sprites: &Sprites<'_>,
+    rounding: &Rounding,
+) -> Bounded {
+    let pixels = layered(view, raster, opaque, sprites, rounding, &|_| ());
     pixels.iter().map(|p| (p.value, p.bound)).unzip()
 }
 
@@ -92,6 +104,57 @@ fn layered(
     rounding: &Rounding,
     on_row: &(dyn Fn(usize) + Sync),
 ) -> Vec<Layered> {
+    let over = |pixel: &mut Layered, j: usize, layer: &Layer| {
+        pixel.over(layer.alpha, layer.off, sprites.radiance[j], rounding);
+    };
+    let start = |behind: &OpaquePixel| Layered::from(behind);
+    composed(view, raster, opaque, (sprites, rounding), start, over, on_row)
+}
+
+/// The shares of a pixel.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Shares {
+    /// Blobs, and the share of each one's radiance in the pixel, far to near.
+    pub blobs: Vec<(u32, f64)>,
+    /// Share of what is behind all blobs.
+    pub behind: f64,
+}
+
+/// Returns the shares of the pixels of `raster` in the picture of [`render_at`], whatever the
+/// blobs' radiance is.
+pub fn shares_at(
+    view: &View,
+    raster: &Raster<'_>,
+    opaque: &[OpaquePixel],
+    sprites: &Sprites<'_>,
+) -> Vec<Shares> {
+    let start = |_: &OpaquePixel| Shares { blobs: Vec::new(), behind: 1.0 };
+    let over = |pixel: &mut Shares, j: usize, layer: &Layer| {
+        pixel.blobs.push((j as u32, layer.alpha));
+    };
+    let exact = (sprites, &Rounding::NONE);
+    let mut pixels = composed(view, raster, opaque, exact, start, over, &|_| ());
+    for pixel in &mut pixels {
+        for (_, alpha) in pixel.blobs.iter_mut().rev() {
+            let share = *alpha * pixel.behind;
+            pixel.behind *= 1.0 - *alpha;
+            *alpha = share;
+        }
+    }
+    pixels
+}
+
+/// Composes the layers of every pixel of `raster` far to near: `start` makes a pixel of what is
+/// behind, `over` lays a blob's layer over it.
+fn composed<P: Send + Clone>(
+    view: &View,
+    raster: &Raster<'_>,
+    opaque: &[OpaquePixel],
+    (sprites, rounding): (&Sprites<'_>, &Rounding),
+    start: impl Fn(&OpaquePixel) -> P + Sync + Send,
+    over: impl Fn(&mut P, usize, &Layer) + Sync + Send,
+    on_row: &(dyn Fn(usize) + Sync),
+) -> Vec<P> {
     let footprint = |&j: &u32| Some((j as usize, sprites.footprint(view, j as usize, rounding)?));
     let footprints: Vec<(usize, Footprint)> = sprites.order.iter().filter_map(footprint).collect();
     let Raster { first: [left, top], cell, at, .. } = *raster;
@@ -99,7 +162,8 @@ fn layered(
     let n_rows = at.len().div_ceil(n_columns.max(1));
     let rows = parallel_map(n_rows, |i| {
         let here = i * n_columns..((i + 1) * n_columns).min(at.len());
-        let mut pixels: Vec<Layered> = opaque[here.clone()].iter().map(Layered::from).collect();
+        let opaque = &opaque[here.clone()];
+        let mut pixels: Vec<P> = opaque.iter().map(&start).collect();
         let (first, end) = (top + i as u32 * cell, top + (i as u32 + 1) * cell);
         for (j, f) in footprints.iter().filter(|(_, f)| f.rows.0 < end && f.rows.1 > first) {
             let [from, to] = [f.columns.0, f.columns.1].map(|column| column.saturating_sub(left));
@@ -109,7 +173,11 @@ fn layered(
                 if (f.columns.0..f.columns.1).contains(&column)
                     && (f.rows.0..f.rows.1).contains(&row)
                 {
-                    sprites.lay(view, *j, f, [column, row], pixel, rounding);
+                    let (ray, behind) = (view.ray(column, row), &opaque[k]);
+                    let behind = (behind.depth, behind.depth_bound);
+                    if let Some(layer) = f.seen.layer(view, sprites, *j, ray, behind, rounding) {
+                        over(pixel, *j, &layer);
+                    }
                 }
             }
         }
@@ -199,22 +267,6 @@ impl Sprites<'_> {
         }
         let [columns, rows] = view.rectangle(blob, seen.c, reach);
         Some(Footprint { seen, columns, rows })
-    }
-
-    /// Lays blob `j` over a pixel.
-    fn lay(
-        &self,
-        view: &View,
-        j: usize,
-        footprint: &Footprint,
-        [column, row]: [u32; 2],
-        pixel: &mut Layered,
-        r: &Rounding,
-    ) {
-        let ray = view.ray(column, row);
-        if let Some(layer) = footprint.seen.layer(view, self, j, ray, pixel.opaque, r) {
-            pixel.over(layer.alpha, layer.off, self.radiance[j], r);
-        }
     }
 }
 

@@ -48,9 +48,12 @@ pub fn hit(surface: &Surface, view: &View, ray: DVec3) -> Option<Hit> {
 /// Returns the radiance at `hit` of a surface whose facets have `facets`: bilinear between their
 /// centres, constant beyond the outermost, and black on the back.
 pub fn radiance(surface: &Surface, facets: &[DVec3], hit: &Hit) -> DVec3 {
-    if !hit.is_front {
-        return DVec3::ZERO;
-    }
+    weights(surface, hit).map(|(i, weight)| weight * facets[i]).into_iter().sum()
+}
+
+/// Returns four facets and the share of each one's radiance in that at `hit`, as [`radiance`] has
+/// them: all 0 on the back.
+pub fn weights(surface: &Surface, hit: &Hit) -> [(usize, f64); 4] {
     let along = |x: f64, n: u32| {
         let at = (0.5 * (x + 1.0) * f64::from(n) - 0.5).clamp(0.0, f64::from(n - 1));
         let low = (at.floor() as usize).min(n as usize - 1);
@@ -59,8 +62,14 @@ pub fn radiance(surface: &Surface, facets: &[DVec3], hit: &Hit) -> DVec3 {
     let [n_u, n_v] = surface.subdivide;
     let (i0, i1, a) = along(hit.s, n_u);
     let (j0, j1, b) = along(hit.t, n_v);
-    let row = |j: usize| facets[j * n_u as usize + i0].lerp(facets[j * n_u as usize + i1], a);
-    row(j0).lerp(row(j1), b)
+    let facet = |i: usize, j: usize| j * n_u as usize + i;
+    let shown = if hit.is_front { 1.0 } else { 0.0 };
+    [
+        (facet(i0, j0), shown * (1.0 - a) * (1.0 - b)),
+        (facet(i1, j0), shown * a * (1.0 - b)),
+        (facet(i0, j1), shown * (1.0 - a) * b),
+        (facet(i1, j1), shown * a * b),
+    ]
 }
 
 /// Returns the picture of `surfaces` at some pixels, [column, row]. `facets` is the radiance of all

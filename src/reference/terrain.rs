@@ -55,17 +55,10 @@ impl Triangle {
         terrain: &'a Terrain,
         radiance: &'a [DVec3],
     ) -> impl Iterator<Item = Triangle> + 'a {
-        let of_cell = move |i: u64| {
-            let corners = terrain.corners(i as u32);
-            HALVES.map(|half| {
-                let numbers = half.map(|k| corners[k]);
-                Triangle::new(
-                    numbers.map(|k| terrain.origin + terrain.points[k]),
-                    numbers.map(|k| radiance[k]),
-                )
-            })
-        };
-        (0..terrain.n_cells()).flat_map(of_cell)
+        halves(terrain).map(|numbers| {
+            let points = numbers.map(|k| terrain.origin + terrain.points[k]);
+            Triangle::new(points, numbers.map(|k| radiance[k]))
+        })
     }
 
     /// Returns the corner, the end of u and the end of v.
@@ -92,8 +85,7 @@ impl Triangle {
         if !hit.is_front {
             return DVec3::ZERO;
         }
-        let [corner, along, across] = self.radiance;
-        corner * (1.0 - hit.s - hit.t) + along * hit.s + across * hit.t
+        self.radiance.iter().zip(shares(hit)).map(|(radiance, share)| *radiance * share).sum()
     }
 
     /// Returns the pixel that the ray sees of the triangle.
@@ -137,6 +129,35 @@ impl Triangle {
         };
         [range(low.x, high.x, size[0]), range(low.y, high.y, size[1])]
     }
+}
+
+/// Returns the points of every triangle: corner, end of u and end of v.
+fn halves(terrain: &Terrain) -> impl Iterator<Item = [usize; 3]> + '_ {
+    let of_cell = |i: u64| {
+        let corners = terrain.corners(i as u32);
+        HALVES.map(|half| half.map(|k| corners[k]))
+    };
+    (0..terrain.n_cells()).flat_map(of_cell)
+}
+
+/// Shares of the radiance at corner, end of u and end of v in that at `hit`.
+fn shares(hit: &Hit) -> [f64; 3] {
+    [1.0 - hit.s - hit.t, hit.s, hit.t]
+}
+
+/// Returns the depth along `ray` at which `terrain` is seen, and the share of each point's radiance
+/// in that of the place: all 0 from below.
+pub fn weights(terrain: &Terrain, view: &View, ray: DVec3) -> Option<(f64, [(usize, f64); 3])> {
+    let dark = [DVec3::ZERO; 3];
+    let hits = halves(terrain).filter_map(|numbers| {
+        let points = numbers.map(|k| terrain.origin + terrain.points[k]);
+        Some((numbers, Triangle::new(points, dark).hit(view, ray)?))
+    });
+    let nearest = hits.reduce(|near, next| if next.1.depth <= near.1.depth { next } else { near });
+    let (numbers, hit) = nearest?;
+    let shown = if hit.is_front { 1.0 } else { 0.0 };
+    let shares = shares(&hit).map(|share| shown * share);
+    Some((hit.depth, [0, 1, 2].map(|k| (numbers[k], shares[k]))))
 }
 
 /// Columns and rows (first, end) of a part of a picture.

@@ -5,8 +5,8 @@
 //! [`picture_error`] against references in f64, which [`reference_cache`] keeps between runs, and
 //! begin their records with [`provenance`].
 
+pub mod check;
 pub mod error;
-pub mod figure;
 pub mod ledger;
 pub mod picture_error;
 pub mod provenance;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::figure::Figure;
 use crate::measure::bootstrap::Bootstrap;
+use crate::measure::figure::Figure;
 use crate::measure::picture::errors;
 use crate::reference::picture::Pixels;
 
@@ -41,7 +41,7 @@ pub fn picture_error(
     let squares: Vec<f64> = picture.iter().zip(reference).map(|(p, r)| square(p, r)).collect();
     let pairs = reference.iter().flatten().copied().zip(picture.iter().flatten().copied());
     let whole = errors(pairs).filter(|_| squares.iter().all(|s| s.is_finite()))?;
-    let parts = parts(pixels, &squares);
+    let parts = parts(pixels, squares.iter().copied().map(Some));
     let root = |rows: &[usize]| {
         let (sum, n) =
             rows.iter().map(|&r| parts[r]).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
@@ -55,6 +55,68 @@ pub fn picture_error(
     };
     let is_resolved = own_error * RESOLVED <= whole.rmse;
     Some(PictureError { rmse, max: whole.max_abs, relmse: whole.rel_mse, is_resolved })
+}
+
+/// What is known of the difference of one pixel: that of its drawing, and two independent estimates
+/// of that of its light, if there are any.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Samples {
+    drawing: [f64; 4],
+    light: Option<[[f64; 4]; 2]>,
+}
+
+impl Samples {
+    /// Returns the samples of a pixel.
+    pub fn new(drawing: [f64; 4], light: Option<[[f64; 4]; 2]>) -> Samples {
+        Samples { drawing, light }
+    }
+
+    /// Returns the difference, by the mean of both estimates.
+    pub fn difference(&self) -> [f64; 4] {
+        let [a, b] = self.light.unwrap_or_default();
+        std::array::from_fn(|k| self.drawing[k] + 0.5 * (a[k] + b[k]))
+    }
+
+    /// Returns the greatest magnitude of the difference.
+    pub fn greatest(&self) -> f64 {
+        self.difference().into_iter().map(f64::abs).fold(0.0, f64::max)
+    }
+
+    /// Returns the square of the drawing's difference, and what the light adds to it.
+    fn squares(&self) -> (f64, Option<f64>) {
+        let mean = |of: &dyn Fn(usize) -> f64| (0..4).map(of).sum::<f64>() / 4.0;
+        let drawing = mean(&|k| self.drawing[k] * self.drawing[k]);
+        let light = self
+            .light
+            .map(|[a, b]| mean(&|k| (self.drawing[k] + a[k]) * (self.drawing[k] + b[k])) - drawing);
+        (drawing, light)
+    }
+}
+
+/// Returns the root mean square difference with its interval over the parts of the picture, widened
+/// by the reference's own error; none if a value is not finite.
+pub fn rmse_of(pixels: &Pixels, samples: &[Samples], own_error: f64) -> Option<Figure> {
+    let squares: Vec<(f64, Option<f64>)> = samples.iter().map(Samples::squares).collect();
+    let is_finite = |(drawing, light): &(f64, Option<f64>)| {
+        drawing.is_finite() && light.is_none_or(f64::is_finite)
+    };
+    if !squares.iter().all(is_finite) {
+        return None;
+    }
+    let drawing = parts(pixels, squares.iter().map(|s| Some(s.0)));
+    let light = parts(pixels, squares.iter().map(|s| s.1));
+    let mean = |rows: &[usize], of: &[(f64, f64)]| {
+        let sum = rows.iter().map(|&r| of[r]).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        if sum.1 > 0.0 { sum.0 / sum.1 } else { 0.0 }
+    };
+    let root = |rows: &[usize]| (mean(rows, &drawing) + mean(rows, &light)).max(0.0).sqrt();
+    let interval = Bootstrap::default().interval([drawing.len()], |[rows]| root(rows));
+    let rows: Vec<usize> = (0..drawing.len()).collect();
+    Some(Figure {
+        value: root(&rows),
+        low: interval.map(|i| (i.low.max(0.0) - own_error).max(0.0)),
+        high: interval.map(|i| i.high + own_error),
+    })
 }
 
 /// Returns the values of a device's picture (RGBA, rows from the top) at `pixels`.
@@ -75,14 +137,16 @@ fn square(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / 4.0
 }
 
-/// Returns, for every part of the picture, the sum of its squares and their number.
-fn parts(pixels: &Pixels, squares: &[f64]) -> Vec<(f64, f64)> {
+/// Returns, for every part of the picture, the sum of the squares that it has and their number.
+fn parts(pixels: &Pixels, squares: impl Iterator<Item = Option<f64>>) -> Vec<(f64, f64)> {
     let side = pixels.width.max(pixels.height).div_ceil(N_PARTS).max(1);
     let columns = pixels.width.div_ceil(side) as usize;
     let mut parts = vec![(0.0, 0.0); columns * pixels.height.div_ceil(side) as usize];
-    for ([i, j], s) in pixels.at.iter().zip(squares) {
+    for ([i, j], square) in pixels.at.iter().zip(squares) {
         let part = &mut parts[(j / side) as usize * columns + (i / side) as usize];
-        *part = (part.0 + s, part.1 + 1.0);
+        if let Some(square) = square {
+            *part = (part.0 + square, part.1 + 1.0);
+        }
     }
     parts
 }

@@ -84,7 +84,13 @@ pub fn is_same(against: ReferenceKind, a: &Scene, b: &Scene) -> bool {
     relevant(a, against) == relevant(b, against)
 }
 
-fn hash_of(against: ReferenceKind, scene: &Scene, time_s: f64, pixels: &Pixels) -> String {
+/// Returns the hash of everything that a reference depends on.
+pub(super) fn hash_of(
+    against: ReferenceKind,
+    scene: &Scene,
+    time_s: f64,
+    pixels: &Pixels,
+) -> String {
     let mut hasher = Sha256::new();
     let pixels = (pixels.width, pixels.height, pixels.tile, pixels.cell);
     hasher.update(format!(
@@ -173,7 +179,8 @@ fn write(path: &Path, hash: &str, reference: &Reference) -> Result<()> {
     })
 }
 
-fn digest(bytes: &[u8]) -> String {
+/// Returns the SHA-256 of `bytes` in hex.
+pub(super) fn digest(bytes: &[u8]) -> String {
     format!("{:x}", Sha256::digest(bytes))
 }
 

@@ -8,11 +8,13 @@ use sha2::{Digest, Sha256};
 
 use super::attachments::CasePicture;
 use super::cases::{Case, Loop};
+use super::check::{Check, DevicePicture};
 use crate::error::{Error, Result};
 use crate::frame::{Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
 use crate::gpu::hex;
 use crate::io::image::display_bytes;
-use crate::model::scene::{Draw, Scene};
+use crate::model::scene::{Draw, LightingMode, Scene};
+use crate::reference::picture::Pixels;
 
 /// How many frames a bench runs, and what it keeps of them.
 #[derive(Debug, Clone, Copy)]
@@ -25,6 +27,9 @@ pub struct BenchPlan {
     pub hash_frames: bool,
     /// Whether the last frame of every case is read back, after all its blocks.
     pub pictures: bool,
+    /// Returns the pixels of a film whose numbers are kept of the last frame of every block, to be
+    /// checked; none without a check.
+    pub checked: Option<fn(u32, u32) -> Pixels>,
 }
 
 /// One frame of one block.
@@ -70,6 +75,10 @@ pub struct Outcome {
     pub pictures: Vec<CasePicture>,
     /// Counts of odd values in the last frame of each case that ran to its end.
     pub counts: BTreeMap<usize, Counts>,
+    /// The last frames of the blocks, to be checked; one of several with the same bytes.
+    pub drawn: Vec<DevicePicture>,
+    /// What checks found, by case.
+    pub checks: BTreeMap<usize, Check>,
     /// Whether Ctrl-C came before the end.
     pub interrupted: bool,
 }
@@ -194,6 +203,9 @@ impl Bench<'_> {
         })?;
         // The last frame of a block that was cut short is another one.
         let image_hash = if is_stopped() { None } else { Some(image_hash(&mut stage.renderer)?) };
+        if let Some((pixels, hash)) = self.plan.checked.zip(image_hash.as_ref()) {
+            keep_drawn(stage, self.outcome, block, (pixels, hash))?;
+        }
         lock(self.outcome).blocks.push(Block { i_case: block.i_case, of: block.of, image_hash });
         if block.is_last {
             let last = lock(self.outcome)
@@ -218,6 +230,38 @@ impl Bench<'_> {
         }
         Ok(())
     }
+}
+
+/// Keeps the numbers of a block's last frame that are checked, unless a block of the case had the
+/// same bytes.
+fn keep_drawn(
+    stage: &mut Stage,
+    outcome: &Mutex<Outcome>,
+    &NextBlock { i_case, of, .. }: &NextBlock,
+    (pixels, hash): (fn(u32, u32) -> Pixels, &str),
+) -> Result<()> {
+    let (times, is_known) = {
+        let outcome = lock(outcome);
+        let is_known = outcome.drawn.iter().any(|d| d.i_case == i_case && d.hash == hash);
+        (outcome.samples.last().map(|s| (s.times.i_frame, s.times.time_s)), is_known)
+    };
+    let Some((i_frame, time_s)) = times.filter(|_| !is_known) else { return Ok(()) };
+    let film = stage.scene.film;
+    let pixels = pixels(film.width, film.height);
+    let rgba = stage.renderer.image()?;
+    let at = |&at: &[u32; 2]| {
+        let pixel = &rgba[4 * pixels.index(at)..][..4];
+        [0, 1, 2, 3].map(|k| f64::from(pixel[k]))
+    };
+    let rgba = pixels.at.iter().map(at).collect();
+    let light = match stage.scene.lighting.mode {
+        LightingMode::None => vec![],
+        _ => stage.renderer.facets(&stage.device)?.1.iter().map(|l| [l.first, l.second]).collect(),
+    };
+    let (scene, loop_name, hash) = (stage.scene.clone(), of.name(), hash.to_owned());
+    let picture = DevicePicture { i_case, loop_name, hash, scene, i_frame, time_s, rgba, light };
+    lock(outcome).drawn.push(picture);
+    Ok(())
 }
 
 /// Returns the scene with the settings that "auto" chose, if they are known.
@@ -314,7 +358,13 @@ mod tests {
             names(&two, 2).trim_end(),
             there.iter().chain(back).copied().collect::<Vec<_>>().join(" ")
         );
-        let plan = BenchPlan { n_warm_up: 2, n_rounds: 2, hash_frames: false, pictures: false };
+        let plan = BenchPlan {
+            n_warm_up: 2,
+            n_rounds: 2,
+            hash_frames: false,
+            pictures: false,
+            checked: None,
+        };
         assert_eq!(n_frames_total(&two, &plan), 2 * (3 * 8 + 2 * 7));
     }
 }

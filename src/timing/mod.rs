@@ -12,6 +12,7 @@
 pub mod attachments;
 pub mod blocks;
 pub mod cases;
+pub mod check;
 pub mod compare;
 pub mod difference;
 pub mod frame_rows;

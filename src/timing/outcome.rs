@@ -95,6 +95,7 @@ impl Outcome {
             counts: self.counts.get(&i).copied(),
             skipping: unskipped.and_then(|unskipped| self.skipping(i, case, unskipped)),
             figure: None,
+            check: self.checks.get(&i).cloned(),
         };
         record.figure = record.figure_mode().map(Mode::name);
         record

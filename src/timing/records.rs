@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::check::Check;
 use super::json::ResultFile;
 use super::machine::{Clocks, Cpu, Device};
 use super::names::{Setting, case_name, loop_name, mode_name, sweep_text};
@@ -106,6 +107,9 @@ pub struct Case {
     /// moves, the one without skipping. Null if that loop has no timed frame.
     #[serde(default)]
     pub figure: Option<String>,
+    /// What was found about its pictures. Null in results of versions that did not check them.
+    #[serde(default)]
+    pub check: Option<Check>,
 }
 
 impl Case {

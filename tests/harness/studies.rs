@@ -5,10 +5,10 @@
 use std::collections::BTreeMap;
 
 use nimbus::gpu::PassTimes;
+use nimbus::measure::figure::Figure;
 use nimbus::studies::error::blocks::TimeKind;
 use nimbus::studies::error::front::{Front, Metric};
 use nimbus::studies::error::records::{Best, Budget, Configuration, Study};
-use nimbus::studies::figure::Figure;
 use nimbus::studies::ledger::records::{Ledger, Row};
 use nimbus::studies::picture_error::PictureError;
 use nimbus::studies::provenance::{Provenance, ReferenceRecord};

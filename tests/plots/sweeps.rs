@@ -1,12 +1,12 @@
 //! Charts of sweeps: ticks as typed, lines, panels, and notes on what they lack.
 
+use nimbus::measure::figure::Figure;
 use nimbus::measure::stats::Summary;
 use nimbus::report::charts::Chart;
 use nimbus::report::charts::sweep::{
     SweepChart, SweptFigure, charts, charts_of_run, charts_of_study,
 };
 use nimbus::studies::error::front::Front;
-use nimbus::studies::figure::Figure;
 use nimbus::timing::names::Setting;
 use nimbus::timing::records::{Case, Measured, Mode, Run};
 use proptest::prelude::*;

@@ -37,7 +37,7 @@ pub type Sample = [DVec3; 3];
 pub const NOTHING: Sample = [DVec3::ZERO; 3];
 
 /// An integral with its error estimates.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Estimate {
     /// Radiance, W m⁻² sr⁻¹.
     pub radiance: DVec3,

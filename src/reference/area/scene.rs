@@ -13,6 +13,7 @@ use crate::model::material::Brdf;
 use crate::model::surface::Surface;
 use crate::reference::Blob;
 use crate::reference::occlude::{Rectangle, Source, source_of};
+use crate::reference::parallel::parallel_map;
 
 /// A diffuse facet of a cloud or of the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,7 +101,7 @@ impl<'a> AreaScene<'a> {
         };
         scene.regions = scene.rectangles.iter().map(|r| scene.lit_regions(r)).collect();
         scene.disc_radiance =
-            (0..discs.len()).map(|i| scene.first(&scene.on_disc(i), discs[i].normal)).collect();
+            parallel_map(discs.len(), |i| scene.first(&scene.on_disc(i), discs[i].normal));
         scene
     }
 

@@ -49,7 +49,11 @@ pub(super) fn opaque_pixels(
 }
 
 /// Radiance of the facets of surfaces and ground. Without lighting it is their materials' K_d.
-fn solid_radiance(scene: &Scene, frame: &FrameReference, placed: &[Surface]) -> Vec<DVec3> {
+pub(super) fn solid_radiance(
+    scene: &Scene,
+    frame: &FrameReference,
+    placed: &[Surface],
+) -> Vec<DVec3> {
     if scene.lighting.mode != LightingMode::None {
         return (0..scene.n_solid_facets() as usize).map(|i| frame.facet_radiance(i)).collect();
     }

@@ -9,7 +9,7 @@ use crate::model::frame_state::FrameState;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
-use crate::reference::area::adaptive::Accuracy;
+use crate::reference::area::adaptive::{Accuracy, Estimate};
 use crate::reference::area::{AreaScene, DiscFacet, Receiver};
 use crate::reference::facets::{Facet, FacetSources};
 use crate::reference::generate::Generated;
@@ -17,6 +17,14 @@ use crate::reference::occlude::Rectangle;
 use crate::reference::parallel::parallel_map;
 use crate::reference::transmit::{self, Obstacles};
 use crate::reference::{self, Blob};
+
+/// Returns the second reflection of a facet.
+pub type SecondOf<'a> = dyn Fn(usize) -> Estimate + Sync + 'a;
+
+/// The second reflection where there is none.
+fn nothing(_: usize) -> Estimate {
+    Estimate::default()
+}
 
 /// All stages of one frame up to the light on its facets. Positions are relative to the lighting
 /// origin; facets are ordered surfaces, ground, clouds.
@@ -66,10 +74,40 @@ impl FrameReference {
         on_facet: &(dyn Fn(usize) + Sync),
     ) -> Result<FrameReference> {
         let mut frame = FrameReference::unlit(scene, time_s)?;
-        if scene.lighting.mode != LightingMode::None {
-            frame.light(scene, on_facet);
+        if scene.lighting.mode == LightingMode::None {
+            return Ok(frame);
         }
+        let has_second = scene.lighting.mode == LightingMode::TwoReflection;
+        let found = frame.light(scene, |frame, second| {
+            let n = if has_second { frame.facets.len() } else { 0 };
+            parallel_map(n, |i| {
+                let found = second(i);
+                on_facet(n);
+                found
+            })
+        });
+        frame.indirect = found.iter().map(|e| e.irradiance).collect();
+        frame.second = found.iter().map(|e| e.radiance).collect();
+        frame.second_error = found.iter().map(|e| e.error).collect();
         Ok(frame)
+    }
+
+    /// Computes all stages but the second reflection, and calls `take` with them and with the
+    /// second reflection of any facet, which is 0 unless the lighting mode is "two-reflection".
+    ///
+    /// # Errors
+    /// As for [`FrameReference::new`].
+    pub fn with_second<T>(
+        scene: &Scene,
+        time_s: f64,
+        take: impl FnOnce(&FrameReference, &SecondOf<'_>) -> T,
+    ) -> Result<T> {
+        let mut frame = FrameReference::unlit(scene, time_s)?;
+        Ok(match scene.lighting.mode {
+            LightingMode::TwoReflection => frame.light(scene, take),
+            LightingMode::First => frame.light(scene, |frame, _| take(frame, &nothing)),
+            LightingMode::None => take(&frame, &nothing),
+        })
     }
 
     /// Computes the stages up to the placed particles, without light.
@@ -107,8 +145,13 @@ impl FrameReference {
         })
     }
 
-    /// Lights ground and clouds through the density grid, then the surfaces by their areas.
-    fn light(&mut self, scene: &Scene, on_facet: &(dyn Fn(usize) + Sync)) {
+    /// Lights ground and clouds through the density grid, then the surfaces by their areas. Calls
+    /// `take` with the frame and the second reflection of any facet.
+    fn light<T>(
+        &mut self,
+        scene: &Scene,
+        take: impl FnOnce(&FrameReference, &SecondOf<'_>) -> T,
+    ) -> T {
         let (grid, origin) = (&self.state.grid, self.state.light_origin);
         let local = LocalScene::new(scene, origin, self.state.time_s);
         let cells = reference::grid::deposit(grid, &self.blobs);
@@ -137,7 +180,7 @@ impl FrameReference {
             reference::first::irradiance(&positions, &normals, &transmittance, &local.lights);
         self.radiance =
             reference::first::radiance(&self.irradiance, &regions, &local.kd(), &self.facet_colors);
-        self.light_surfaces(scene, &local, on_facet);
+        self.light_surfaces(scene, &local, take)
     }
 
     /// Facets of the clouds and their colours, from the density grid.
@@ -175,16 +218,21 @@ impl FrameReference {
         take(&sources, &reference::place::cloud_centers(&scene.clouds, time_s, light_origin))
     }
 
-    /// Puts the surfaces' facets before all others, lit by the area reference, and adds the second
-    /// reflection to all.
-    fn light_surfaces(
+    /// Puts the surfaces' facets before all others, lit by the area reference.
+    fn light_surfaces<T>(
         &mut self,
         scene: &Scene,
         local: &LocalScene,
-        on_facet: &(dyn Fn(usize) + Sync),
-    ) {
-        let discs: Vec<DiscFacet> =
-            self.facets.iter().zip(&self.facet_colors).map(|(f, c)| local.disc(f, *c)).collect();
+        take: impl FnOnce(&FrameReference, &SecondOf<'_>) -> T,
+    ) -> T {
+        let disc = |(f, c): (&Facet, &DVec3)| local.disc(f, *c);
+        let discs: Vec<DiscFacet> = match scene.lighting.mode {
+            LightingMode::TwoReflection => {
+                self.facets.iter().zip(&self.facet_colors).map(disc).collect()
+            }
+            // They reflect onto nothing.
+            _ => vec![],
+        };
         let area_scene = AreaScene::new(
             &local.surfaces,
             local.surface_brdfs(),
@@ -202,22 +250,15 @@ impl FrameReference {
             .map(|r| (r, (eye - r.position).normalize_or(r.normal)))
             .collect();
         let of_surfaces = &receivers[..flat.len()];
-        let first = of_surfaces.iter().map(|(r, toward)| area_scene.first(r, *toward));
+        let n = of_surfaces.len();
+        let first = parallel_map(n, |i| area_scene.first(&of_surfaces[i].0, of_surfaces[i].1));
+        let irradiance = parallel_map(n, |i| area_scene.irradiance(&of_surfaces[i].0));
         self.radiance.splice(0..0, first);
-        self.irradiance.splice(0..0, of_surfaces.iter().map(|(r, _)| area_scene.irradiance(r)));
+        self.irradiance.splice(0..0, irradiance);
         self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, flat.len()));
         self.facets.splice(0..0, flat);
-        if scene.lighting.mode == LightingMode::TwoReflection {
-            let accuracy = Accuracy::relative(SECOND_ACCURACY);
-            let found = parallel_map(receivers.len(), |i| {
-                let second = area_scene.second(&receivers[i].0, receivers[i].1, &accuracy);
-                on_facet(receivers.len());
-                second
-            });
-            self.indirect = found.iter().map(|e| e.irradiance).collect();
-            self.second = found.iter().map(|e| e.radiance).collect();
-            self.second_error = found.iter().map(|e| e.error).collect();
-        }
+        let accuracy = Accuracy::relative(SECOND_ACCURACY);
+        take(self, &|i| area_scene.second(&receivers[i].0, receivers[i].1, &accuracy))
     }
 
     /// Returns L1 + L2 of facet `i` toward the eye.
@@ -231,15 +272,21 @@ impl FrameReference {
         if self.facets.is_empty() {
             return self.colors.clone();
         }
-        let n_before = scene.n_solid_facets() as usize;
+        self.particle_facets(scene).into_iter().map(|i| self.facet_radiance(i as usize)).collect()
+    }
+
+    /// Returns the facet that every particle is lit as, whether or not the facets are lit.
+    pub fn particle_facets(&self, scene: &Scene) -> Vec<u32> {
+        let n_before = scene.n_solid_facets() as u32;
+        let n_blobs = self.blobs.len() as u32;
         if !scene.groups_facets() {
-            return (0..self.blobs.len()).map(|i| self.facet_radiance(n_before + i)).collect();
+            return (n_before..n_before + n_blobs).collect();
         }
         let order = self.morton_order(scene, &reference::place::regions(&self.groups));
-        let mut found = vec![DVec3::ZERO; self.blobs.len()];
-        for (k, (first, end)) in scene.facet_runs().into_iter().enumerate() {
+        let mut found = vec![0; self.blobs.len()];
+        for (k, (first, end)) in (n_before..).zip(scene.facet_runs()) {
             for place in first..end {
-                found[order[place as usize] as usize] = self.facet_radiance(n_before + k);
+                found[order[place as usize] as usize] = k;
             }
         }
         found

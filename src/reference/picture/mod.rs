@@ -21,12 +21,13 @@ mod render;
 mod renderer;
 mod samples;
 mod scene_light;
+mod shares;
 mod sprites;
 
 pub use background::view;
 pub use error_estimate::ErrorEstimate;
 pub use expected::{PictureTime, expected_time};
-pub use frame::{FrameReference, colors};
+pub use frame::{FrameReference, SecondOf, colors};
 pub use kind::{ReferenceKind, n_reflections};
 pub use limits::check_memory;
 pub use model_picture::ModelDrawing;
@@ -38,3 +39,4 @@ pub use samples::{
     MAX_SAMPLES, MeanPicture, N_VALUES, PairwiseSum, ReferenceRequest, SampleSums, sums, to_f32,
 };
 pub use scene_light::{BlobModel, PixelSample, RenderedPixels, render_lit_scene};
+pub use shares::{Emitters, PixelShares, drawn_by_settings, pixel_shares};

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::frame::FrameReference;
 use crate::model::cloud::Group;
 use crate::model::count::MIN_DRAWN;
+use crate::model::frame_state::FrameState;
 use crate::model::scene::Scene;
 use crate::reference::sprites::Factor;
 use crate::reference::texture::{Pool, SplatTexture, Textured};
@@ -53,6 +54,23 @@ pub(super) fn drawn_blobs(scene: &Scene, frame: &FrameReference) -> (Vec<Blob>, 
         (0..blobs.len() as u32).filter(|&i| weights[i as usize] > 0.0).collect();
     order.sort_by(|&i, &j| depths[j as usize].total_cmp(&depths[i as usize]));
     (blobs, order)
+}
+
+/// Returns the order in which a device draws `blobs`, the first of [`drawn_blobs`], by the keys that
+/// `draw.sort_bits` asks for.
+pub(super) fn set_order(scene: &Scene, frame: &FrameReference, blobs: &[Blob]) -> Vec<u32> {
+    let (_, exact) = drawn_blobs(scene, frame);
+    let FrameState { pose, radius, time_s, .. } = frame.state;
+    let sigmas = place::sigma_means(&frame.groups, &scene.clouds, time_s);
+    let sigmas = sigmas.iter().zip(blobs).map(|(sigma, blob)| sigma * blob.aspect.min(1.0));
+    let sigma = sigmas.fold(f64::INFINITY, f64::min);
+    if scene.draw.sort_bits.of(radius, sigma) > 16 {
+        return exact;
+    }
+    let mut order = exact;
+    let key = |i: &u32| sort::key16(pose.forward.dot(blobs[*i as usize].position), radius);
+    order.sort_unstable_by_key(|i| (key(i), *i));
+    order
 }
 
 /// Factor on every particle's κ, model.md §3.

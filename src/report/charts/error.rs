@@ -12,11 +12,11 @@ use super::medium::{INK, MUTED, Medium, series};
 use super::number::{number, with_interval};
 use super::overlap::place_labels;
 use super::plot_area::{Canvas, GridLines, MarkerFill, PlotArea};
+use crate::measure::figure::Figure;
 use crate::measure::stats::extremes;
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::front::{Front, Metric};
 use crate::studies::error::records::{Configuration, Study};
-use crate::studies::figure::Figure;
 
 /// Number of configurations on the front that are listed below the chart: the list stays shorter
 /// than the chart, in a picture and in a terminal.

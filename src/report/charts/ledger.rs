@@ -9,7 +9,7 @@ use super::chart::{Chart, LegendEntry, Tooltip, shortened};
 use super::medium::{INK, MUTED, series};
 use super::number::{number, with_interval};
 use super::plot_area::{Canvas, GridLines, PlotArea};
-use crate::studies::figure::Figure;
+use crate::measure::figure::Figure;
 use crate::studies::ledger::records::{Ledger, Row};
 
 /// Bars begin this much below the smallest error, in decades, so that every bar has a length. It is

@@ -12,7 +12,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::axis::{Axis, Tick};
 use super::medium::{GRID, INK, MUTED, Medium, PAPER};
 use super::number::number;
-use crate::studies::figure::Figure;
+use crate::measure::figure::Figure;
 
 /// The drawing area of a chart, between `top` and `bottom` pixels from the edges of `root`.
 pub struct Canvas<'a, DB: DrawingBackend> {

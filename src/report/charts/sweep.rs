@@ -14,8 +14,8 @@ use super::chart::{Chart, LegendEntry, Tooltip};
 use super::medium::{SERIES_COLORS, glyph, series};
 use super::number::with_interval;
 use super::plot_area::{Canvas, GridLines, MarkerFill, PlotArea};
+use crate::measure::figure::Figure;
 use crate::measure::stats::extremes;
-use crate::studies::figure::Figure;
 use crate::timing::names::{Setting, sweep_text};
 use crate::timing::sweep::SIZE_KEY;
 

@@ -9,12 +9,12 @@ use super::pictures::{self, Png};
 use super::provenance;
 use super::table::{count, figure, remark_list, table, text, value};
 use crate::error::Result;
+use crate::measure::figure::Figure;
 use crate::report::charts::error::{chart, error_of, front_numbers, metric_name, time_of};
 use crate::report::charts::{number, sweep};
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::front::Front;
 use crate::studies::error::records::{Best, Budget, Configuration, Study};
-use crate::studies::figure::Figure;
 use crate::studies::picture_error::PictureError;
 
 /// File name of the reference's picture.

@@ -2,8 +2,8 @@
 
 use maud::{Markup, html};
 
+use crate::measure::figure::Figure;
 use crate::report::charts::{number, with_interval};
-use crate::studies::figure::Figure;
 use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::records::Measured;
 

@@ -5,8 +5,8 @@
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
+use crate::measure::figure::Figure;
 use crate::measure::stats::median;
-use crate::studies::figure::Figure;
 
 /// Configurations between two blocks of the unchanged scene, which is configuration 0.
 pub const BETWEEN: usize = 4;

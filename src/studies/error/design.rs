@@ -4,7 +4,7 @@
 use super::blocks::TimeKind;
 use super::front::Metric;
 use super::records::{Best, Budget, Configuration};
-use crate::studies::figure::Figure;
+use crate::measure::figure::Figure;
 use crate::timing::names::Setting;
 use crate::timing::sweep::{Axis, points};
 

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::io::result_folder::{Existing, ResultFolder};
 use crate::io::text_file::{TABLE_LIMIT, read_result};
-use crate::studies::figure::Figure;
+use crate::measure::figure::Figure;
 use crate::timing::json::{self, ResultFile};
 
 /// File name of the table of configurations.

@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-use crate::studies::figure::Figure;
+use crate::measure::figure::Figure;
 use crate::studies::picture_error::PictureError;
 
 /// The error that decides.

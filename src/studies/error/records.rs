@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::blocks::TimeKind;
 use super::front::{Front, Metric};
-use crate::studies::figure::Figure;
+use crate::measure::figure::Figure;
 use crate::studies::picture_error::PictureError;
 use crate::studies::provenance::{Provenance, ReferenceRecord};
 use crate::timing::json::ResultFile;

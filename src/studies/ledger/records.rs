@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::studies::figure::Figure;
+use crate::measure::figure::Figure;
 use crate::studies::provenance::Provenance;
 use crate::timing::json::ResultFile;
 

@@ -10,6 +10,7 @@ use super::approximations::approximations;
 use super::records::{Ledger, Row};
 use crate::error::{Error, Result};
 use crate::frame::GpuContext;
+use crate::measure::figure::Figure;
 use crate::measure::stats::median;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::picture::{
@@ -19,7 +20,6 @@ use crate::reference::picture::{
 use crate::studies::error::blocks::TimedBlock;
 use crate::studies::error::device_runner::{DeviceRunner, FrameChoice};
 use crate::studies::error::study::Runner;
-use crate::studies::figure::Figure;
 use crate::studies::picture_error::{RESOLVED, magnitude, picture_error, sampled};
 use crate::studies::provenance::Provenance;
 

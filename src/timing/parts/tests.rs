@@ -47,6 +47,7 @@ fn case(k: usize, ms: f64) -> Case {
         skipping: None,
         counts: None,
         figure: None,
+        check: None,
     }
 }
 

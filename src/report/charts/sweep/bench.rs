@@ -1,7 +1,7 @@
 //! The times of a bench against its swept keys.
 
 use super::{SweepChart, SweptFigure, charts};
-use crate::studies::figure::Figure;
+use crate::measure::figure::Figure;
 use crate::timing::names::Setting;
 use crate::timing::records::{Case, Measured, Mode, Run};
 use crate::timing::still::skipped_passes;

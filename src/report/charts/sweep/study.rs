@@ -1,9 +1,9 @@
 //! The time and the error of a study against its knobs.
 
 use super::{SweepChart, SweptFigure, charts, numbers};
+use crate::measure::figure::Figure;
 use crate::report::charts::error::{error_of, metric_name, time_of};
 use crate::studies::error::records::{Configuration, Study};
-use crate::studies::figure::Figure;
 use crate::timing::names::Setting;
 
 /// Returns the charts of a study: its time and its error against each knob. The unchanged scene is

@@ -1,0 +1,109 @@
+//! Checks the pictures that a bench timed, after it has timed them.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use super::bench_record::Recorder;
+use super::output::or_dash;
+use super::progress::progress;
+use crate::error::Error;
+use crate::measure::figure::Figure;
+use crate::studies::check::{CheckPlan, check};
+use crate::studies::reference_cache;
+use crate::timing::blocks::{self, Outcome};
+use crate::timing::cases::Case;
+use crate::timing::check::{Bounded, Check, CheckVerdict};
+use crate::timing::records;
+
+/// Share of a bench's time for the second reflection in f64.
+const SHARE: f64 = 0.05;
+/// Least time for that of a picture.
+const LEAST: Duration = Duration::from_millis(500);
+
+/// Checks all pictures in `outcome`, which took `timed` to time, until `stop` is set.
+pub fn run(recorder: &Recorder, timed: Duration, stop: &AtomicBool, outcome: &Mutex<Outcome>) {
+    let Recorder { args, cases, .. } = recorder;
+    if args.no_check {
+        let none = || Check::none("--no-check");
+        blocks::lock(outcome).checks = (0..cases.len()).map(|i| (i, none())).collect();
+        return;
+    }
+    let drawn = blocks::lock(outcome).drawn.clone();
+    let folder = reference_cache::default_folder();
+    let budget = timed.mul_f64(SHARE / drawn.len().max(1) as f64).max(LEAST);
+    let plan = CheckPlan { budget, folder: folder.as_deref() };
+    let bar = progress(drawn.len() as u64, "check", args.options.quiet);
+    for picture in drawn {
+        let found = match stop.load(Ordering::Relaxed) {
+            true => Check::none("Ctrl-C came before the check"),
+            false => check(&picture, &plan).unwrap_or_else(|e| Check::none(&e.to_string())),
+        };
+        bar.advance();
+        let found = Check {
+            reason: found.reason.clone().map(|r| named(&found, &picture.loop_name, r)),
+            ..found
+        };
+        let checks = &mut blocks::lock(outcome).checks;
+        // Of several pictures of a case a wrong one counts.
+        let is_worse = |before: &Check| found.is_wrong() && !before.is_wrong();
+        if checks.get(&picture.i_case).is_none_or(is_worse) {
+            checks.insert(picture.i_case, found);
+        }
+    }
+}
+
+/// Returns a reason with the loop whose picture is wrong.
+fn named(check: &Check, loop_name: &str, reason: String) -> String {
+    if check.is_wrong() { format!("loop {loop_name}: {reason}") } else { reason }
+}
+
+/// Returns the error that a bench ends with whose picture is wrong; none if no picture is.
+pub fn wrong(outcome: &Outcome, cases: &[Case]) -> Option<Error> {
+    let (i, check) = outcome.checks.iter().find(|(_, check)| check.is_wrong())?;
+    let n = outcome.checks.values().filter(|check| check.is_wrong()).count();
+    let name = cases.get(*i).map(Case::name).unwrap_or_default();
+    let place = if name.is_empty() { String::new() } else { format!("{name}: ") };
+    let more = if n > 1 { format!(" ({n} cases are wrong)") } else { String::new() };
+    let reason = check.reason.clone().unwrap_or_default();
+    let what = format!(
+        "the device's picture is wrong: {place}{reason}{more}; its times are of no use. `nimbus \
+         stress` looks for the stage that is wrong"
+    );
+    Some(Error::Check { what })
+}
+
+/// Returns an RMSE with its interval.
+pub fn rmse_text(rmse: Figure) -> String {
+    let interval = rmse.low.zip(rmse.high);
+    let interval = interval.map(|(low, high)| format!(" ({low:.1e} to {high:.1e})"));
+    format!("{:.2e}{}", rmse.value, interval.unwrap_or_default())
+}
+
+/// Returns a line about the error of a case's picture.
+pub fn line(case: &records::Case) -> String {
+    let Some(check) = &case.check else { return String::new() };
+    let reason = check.reason.as_deref().unwrap_or_default();
+    if check.verdict == CheckVerdict::NotChecked {
+        return format!("error: NOT CHECKED against f64: {reason}\n");
+    }
+    let of = |of: Option<Bounded>| or_dash(of, |of| format!("{:.1e} of {:.1e}", of.rms, of.bound));
+    let verdict = match (check.is_wrong(), reason) {
+        (true, _) => format!("WRONG: {reason}"),
+        (false, "") => "right".to_owned(),
+        (false, _) => format!("right, but {reason}"),
+    };
+    format!(
+        "error: RMSE {} against f64, {:.2e} at most, over {} pixels of frame {}; {verdict} (drawing {}, light {} \
+         allowed)\n",
+        or_dash(check.rmse, rmse_text),
+        check.max.unwrap_or(f64::NAN),
+        check.n_pixels,
+        check.frame.unwrap_or_default(),
+        or_dash(check.drawing, |d| format!(
+            "{:.1e}, {} of {} pixels beyond their bounds",
+            d.rms, d.n_beyond, d.n_shown
+        )),
+        of(check.light),
+    )
+}

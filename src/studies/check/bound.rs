@@ -1,0 +1,95 @@
+//! How far a right picture may be from its reference.
+
+use glam::{DVec2, DVec3};
+
+use crate::model::scene::{Impostors, Scene};
+use crate::reference::picture::{Emitters, FrameReference, PixelShares, Pixels, drawn_by_settings};
+use crate::timing::check::DrawingCheck;
+
+/// Share of the first reflection by which a device's may differ. Transmittance through the density
+/// grid, which the reference has too, errs by rounding alone: by up to some 10⁻⁵.
+const FIRST: f64 = 3e-5;
+/// The same of surfaces in the shade of clouds: the reference has the closed form in place of the
+/// grid, whose cells blur the shadows' edges.
+const FIRST_SHADED: f64 = 0.02;
+/// Share of the second reflection: the sum over facets differs from the integral over areas. Over
+/// random rooms it does by 1 %, and by up to 5 % in extreme ones (docs/reference/measured.md).
+const SECOND: f64 = 0.05;
+
+/// Share of the shown pixels that may be beyond their bounds: the bounds hold for all blobs but the
+/// narrowest.
+const BEYOND: f64 = 0.01;
+/// The same where blobs are drawn in a smaller picture or from impostors, whose bounds are those of
+/// a smooth picture.
+const BEYOND_WHERE_SMOOTH: f64 = 0.1;
+
+/// Returns what the numbers of a picture say beside those in f64, `as_set`, and their bounds.
+pub fn drawing(
+    scene: &Scene,
+    rgba: &[[f64; 4]],
+    as_set: &[[f64; 4]],
+    bounds: &[[f64; 4]],
+) -> DrawingCheck {
+    let off = super::differences(rgba, as_set);
+    let is_shown = |k: &usize| rgba[*k] != [0.0; 4] || as_set[*k] != [0.0; 4];
+    let shown: Vec<usize> = (0..rgba.len()).filter(is_shown).collect();
+    // NaN is beyond every bound.
+    let is_beyond = |k: &&usize| (0..4).any(|i| !(off[**k][i].abs() <= bounds[**k][i]));
+    let share = if reach(scene) > 0.0 { BEYOND_WHERE_SMOOTH } else { BEYOND };
+    DrawingCheck {
+        rms: super::rms(&off),
+        bound: super::rms(bounds),
+        n_shown: shown.len(),
+        n_beyond: shown.iter().filter(is_beyond).count(),
+        most_beyond: (share * shown.len() as f64) as usize,
+    }
+}
+
+/// Returns the pixels that a pixel of a smaller picture, or of an impostor, stands for, to one side.
+fn reach(scene: &Scene) -> f64 {
+    let of_impostors = match scene.draw.impostors {
+        Impostors::Off => 0.0,
+        _ => scene.draw.impostor_error.ceil(),
+    };
+    f64::from(scene.draw.resolution.divisor() - 1) + of_impostors
+}
+
+/// Returns by how much each number of a picture may differ because blobs are drawn in a smaller
+/// picture or from impostors, beside rounding: by as much as the picture changes over the pixels
+/// that such a pixel stands for.
+pub fn allowed(
+    scene: &Scene,
+    frame: &FrameReference,
+    (emitters, radiance): (&Emitters, &[DVec3]),
+    pixels: &Pixels,
+    as_set: &[[f64; 4]],
+) -> Vec<[f64; 4]> {
+    let reach = reach(scene);
+    let mut allowed = vec![[0.0; 4]; as_set.len()];
+    if reach == 0.0 {
+        return allowed;
+    }
+    for direction in [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y] {
+        let shift = reach * direction;
+        let (found, _) = drawn_by_settings(scene, frame, (emitters, radiance), pixels, shift);
+        for ((most, here), there) in allowed.iter_mut().zip(as_set).zip(&found) {
+            for k in 0..4 {
+                most[k] = f64::max(most[k], (here[k] - there[k]).abs());
+            }
+        }
+    }
+    allowed
+}
+
+/// Returns the greatest root mean square difference of a right light, in the picture.
+pub fn light(scene: &Scene, shares: &[PixelShares], by_device: &[[DVec3; 2]]) -> f64 {
+    let is_shaded = scene.n_particles() > 0;
+    let n_shaded = if is_shaded { scene.n_surface_facets() as usize } else { 0 };
+    let allowed = |(i, [first, second]): (usize, &[DVec3; 2])| {
+        let share = if i < n_shaded { FIRST_SHADED } else { FIRST };
+        share * first.abs() + SECOND * second.abs()
+    };
+    let light: Vec<DVec3> = by_device.iter().enumerate().map(allowed).collect();
+    let pixel = |s: &PixelShares| PixelShares { alpha: 0.0, ..s.clone() }.color(&light);
+    super::rms(&shares.iter().map(pixel).collect::<Vec<_>>())
+}

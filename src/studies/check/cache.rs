@@ -1,0 +1,63 @@
+//! Keeps the light of a frame in f64 on disk, by the hash of everything that it depends on.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::light::Light;
+use crate::io::atomic::write_atomic;
+use crate::io::input_file;
+use crate::model::scene::Scene;
+use crate::reference::picture::{Pixels, ReferenceKind};
+use crate::studies::reference_cache::{digest, hash_of};
+
+/// Largest file: 24 bytes a facet and 40 a second reflection.
+const LARGEST_FILE: u64 = 512 << 20;
+/// Bytes of the SHA-256 in hex that a file begins with, of all that follows.
+const N_DIGEST: usize = 64;
+
+/// Returns the file of a scene without approximations, at a time.
+pub fn path(folder: &Path, scene: &Scene, time_s: f64, pixels: &Pixels) -> PathBuf {
+    folder.join(format!("{}.light", hash_of(ReferenceKind::Thin, scene, time_s, pixels)))
+}
+
+/// Reads a file; none if it is not there or damaged. *Shape*: little-endian f64, the number of
+/// facets, three numbers a facet, then five a second reflection.
+pub fn read(path: &Path, n_facets: u64) -> Option<Light> {
+    let bytes = input_file::read(path, LARGEST_FILE).ok()?;
+    let (head, numbers) = bytes.split_at_checked(N_DIGEST)?;
+    if digest(numbers).as_bytes() != head {
+        return None;
+    }
+    let value = |b: &[u8]| b.try_into().map(f64::from_le_bytes).ok();
+    let values: Vec<f64> = numbers.chunks_exact(8).map(value).collect::<Option<_>>()?;
+    let (n, rest) = values.split_first()?;
+    let n = *n as usize;
+    if n != 0 && n as u64 != n_facets {
+        return None;
+    }
+    let (first, second) = rest.split_at_checked(3 * n)?;
+    let first = first.chunks_exact(3).map(DVec3::from_slice).collect();
+    let second: BTreeMap<u32, (DVec3, f64)> = second
+        .chunks_exact(5)
+        .map(|v| (v[0] as u32, (DVec3::from_slice(&v[1..4]), v[4])))
+        .collect();
+    Some(Light { first, second })
+}
+
+/// Writes a file. One that cannot be written only costs time.
+pub fn write(path: &Path, light: &Light) {
+    let first = light.first.iter().flat_map(|l| l.to_array());
+    let second =
+        light.second.iter().flat_map(|(i, (l, error))| [f64::from(*i), l.x, l.y, l.z, *error]);
+    let numbers = std::iter::once(light.first.len() as f64).chain(first).chain(second);
+    let bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
+    let _ = path.parent().map(fs::create_dir_all);
+    let _ = write_atomic(path, |file| {
+        file.write_all(digest(&bytes).as_bytes())?;
+        file.write_all(&bytes)
+    });
+}

@@ -1,0 +1,174 @@
+//! The light of a frame in f64: all of it where time allows, else that of some facets.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+
+use crate::model::philox::{philox4x32_10, uniform};
+use crate::reference::parallel::parallel_map;
+use crate::reference::picture::{FrameReference, PixelShares, SecondOf};
+
+/// Second word of the Philox key: a check shares no random numbers with pixels and paths.
+const KEY: u32 = 0x6368_6b73;
+/// Facets whose second reflection is computed at a time.
+const N_AT_ONCE: usize = 16;
+/// Pixels that are computed whatever the time.
+const N_LEAST: usize = 32;
+
+/// The facets whose second reflection is needed.
+#[derive(Debug, Clone, Default)]
+pub struct Plan {
+    /// All facets that the pixels show.
+    seen: BTreeSet<u32>,
+    /// Pixels and two of their facets each, drawn by their share; in an order that spreads the
+    /// first ones over the picture.
+    drawn: Vec<(usize, [u32; 2])>,
+}
+
+impl Plan {
+    /// Draws facets of the pixels that have `shares`.
+    pub fn new(shares: &[PixelShares]) -> Plan {
+        let seen = shares.iter().flat_map(|s| s.of.iter().map(|(i, _)| *i)).collect();
+        let draw = |k: usize| {
+            let words = philox4x32_10([0, KEY], [k as u32, 0, 0, 0]);
+            let of = &shares[k].of;
+            let whole = whole(&shares[k]);
+            let pick = |word: u32| {
+                let mut left = uniform(word) * whole;
+                let found = of.iter().find(|(_, share)| {
+                    left -= share;
+                    left < 0.0
+                });
+                found.or(of.last()).map(|(i, _)| *i)
+            };
+            Some((words[2], k, [pick(words[0])?, pick(words[1])?]))
+        };
+        let mut drawn: Vec<(u32, usize, [u32; 2])> = (0..shares.len()).filter_map(draw).collect();
+        drawn.sort_unstable();
+        Plan { seen, drawn: drawn.into_iter().map(|(_, k, facets)| (k, facets)).collect() }
+    }
+
+    /// Returns whether `light` has all facets that are seen.
+    pub fn is_whole(&self, light: &Light) -> bool {
+        self.seen.iter().all(|i| light.second.contains_key(i))
+    }
+}
+
+fn whole(shares: &PixelShares) -> f64 {
+    shares.of.iter().map(|(_, share)| share).sum()
+}
+
+/// The light of a frame in f64; without any, that of the device is taken as right.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Light {
+    /// First reflection of every facet.
+    pub first: Vec<DVec3>,
+    /// Second reflection of some facets, with its estimated error.
+    pub second: BTreeMap<u32, (DVec3, f64)>,
+}
+
+impl Light {
+    /// Computes the light that `plan` needs: the second reflection of all facets that are seen if
+    /// that fits into `budget`, else of those of as many pixels as do.
+    pub fn compute(
+        frame: &FrameReference,
+        plan: &Plan,
+        second: &SecondOf<'_>,
+        budget: Duration,
+    ) -> Light {
+        let mut light = Light { first: frame.radiance.clone(), second: BTreeMap::new() };
+        let begin = Instant::now();
+        let n_least = N_LEAST.min(plan.drawn.len());
+        light.add(second, plan.drawn[..n_least].iter().flat_map(|(_, facets)| *facets));
+        let each_s = begin.elapsed().as_secs_f64() / light.second.len().max(1) as f64;
+        let n_left = plan.seen.len() - light.second.len();
+        if each_s * n_left as f64 <= budget.as_secs_f64() {
+            light.add(second, plan.seen.iter().copied());
+            return light;
+        }
+        for pixels in plan.drawn[n_least..].chunks(N_AT_ONCE / 2) {
+            if begin.elapsed() > budget {
+                break;
+            }
+            light.add(second, pixels.iter().flat_map(|(_, facets)| *facets));
+        }
+        light
+    }
+
+    fn add(&mut self, second: &SecondOf<'_>, facets: impl Iterator<Item = u32>) {
+        let new: BTreeSet<u32> = facets.filter(|i| !self.second.contains_key(i)).collect();
+        let new: Vec<u32> = new.into_iter().collect();
+        let found = parallel_map(new.len(), |k| {
+            let found = second(new[k] as usize);
+            (new[k], (found.radiance, found.error))
+        });
+        self.second.extend(found);
+    }
+
+    /// Returns the number of facets whose second reflection is known.
+    pub fn n_second(&self) -> usize {
+        self.second.len()
+    }
+
+    /// Returns the root mean square of the estimated errors.
+    pub fn own_error(&self) -> f64 {
+        let n = self.second.len().max(1) as f64;
+        (self.second.values().map(|(_, error)| error * error).sum::<f64>() / n).sqrt()
+    }
+}
+
+/// Two independent estimates of a pixel's difference by its light, equal if it is known; none if
+/// neither of its facets was computed.
+pub type Found = Option<[[f64; 4]; 2]>;
+
+/// Returns the differences by light of all pixels. `by_device` has the first and second reflection
+/// of every facet.
+pub fn compare(
+    shares: &[PixelShares],
+    plan: &Plan,
+    by_device: &[[DVec3; 2]],
+    light: &Light,
+) -> Vec<Found> {
+    let first: Vec<DVec3> =
+        by_device.iter().zip(&light.first).map(|(device, first)| device[0] - first).collect();
+    let second =
+        |i: u32| Some(by_device.get(i as usize)?[1] - light.second.get(&i).map(|(l, _)| *l)?);
+    let pixel = |off: DVec3| off.extend(0.0).to_array();
+    // Without light nothing differs.
+    let of_first = |s: &PixelShares| match first.is_empty() {
+        true => DVec3::ZERO,
+        false => s.of.iter().map(|&(i, share)| share * first[i as usize]).sum(),
+    };
+    if plan.is_whole(light) {
+        let whole = |s: &PixelShares| {
+            let of_second = s.of.iter().filter_map(|&(i, share)| Some(share * second(i)?));
+            let off = pixel(of_first(s) + of_second.sum::<DVec3>());
+            Some([off, off])
+        };
+        return shares.iter().map(whole).collect();
+    }
+    let mut found: Vec<Found> = vec![None; shares.len()];
+    for (k, s) in shares.iter().enumerate().filter(|(_, s)| s.of.is_empty()) {
+        let off = pixel(of_first(s));
+        found[k] = Some([off, off]);
+    }
+    for &(k, [a, b]) in &plan.drawn {
+        let (of_first, whole) = (of_first(&shares[k]), whole(&shares[k]));
+        let estimate = |i: u32| Some(pixel(of_first + whole * second(i)?));
+        found[k] = estimate(a).zip(estimate(b)).map(|(a, b)| [a, b]);
+    }
+    found
+}
+
+/// Returns the root mean square difference by light.
+pub fn rms(found: &[Found]) -> f64 {
+    let products: Vec<f64> = found
+        .iter()
+        .flatten()
+        .map(|[a, b]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / 4.0)
+        .collect();
+    let mean = products.iter().sum::<f64>() / products.len().max(1) as f64;
+    // The mean of few products can be below 0. NaN stays, since it is no right light.
+    if mean < 0.0 { 0.0 } else { mean.sqrt() }
+}

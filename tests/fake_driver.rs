@@ -60,7 +60,8 @@ struct Job {
 }
 
 const RENDER: Job = Job { line: "render s.toml -q -o {}/a.png" };
-const BENCH: Job = Job { line: "bench s.toml -q --frames 3 --warmup 0 --out {}/run" };
+/// Without the check, which leaves out what has passed before.
+const BENCH: Job = Job { line: "bench s.toml -q --frames 3 --warmup 0 --no-check --out {}/run" };
 
 /// One fault in one run.
 struct Fault {
@@ -489,4 +490,24 @@ fn the_list_of_devices_is_clear_on_every_machine() {
     assert_eq!(ended.status.code(), Some(DEVICE), "{}", ended.stderr);
     assert!(ended.stderr.starts_with("error: Vulkan: vkCreateDevice: "), "{}", ended.stderr);
     assert_eq!(ended.names(), [""; 0]);
+}
+
+#[test]
+fn a_bench_on_a_driver_that_leaves_work_out_is_refused() {
+    let driver = FakeDriver::new();
+    let bench = "bench s.toml -q --frames 3 --warmup 0 --threading serial --no-saved --repeat 1";
+    // A driver that executes nothing, one that stops, one that drops a frame in the middle.
+    for drop in ["1:1", "9:1", "8:1000000"] {
+        let ended = driver.run(bench, &[("NIMBUS_FAKE_DROP", drop)]);
+        let error = ended.stderr.trim_end();
+        assert_eq!(ended.status.code(), Some(1), "{drop}: {error}");
+        assert!(error.contains("the device's picture is wrong: the driver said that"), "{error}");
+        assert!(error.contains("did not execute"), "{error}");
+    }
+    let unchecked =
+        driver.run(&format!("{bench} --no-check --json"), &[("NIMBUS_FAKE_DROP", "1:1")]);
+    assert!(unchecked.status.success(), "{}", unchecked.stderr);
+    let run: Value = serde_json::from_str(&unchecked.stdout).expect("JSON");
+    assert_eq!(run["cases"][0]["check"]["verdict"], "not_checked");
+    assert_eq!(run["cases"][0]["check"]["reason"], "--no-check");
 }

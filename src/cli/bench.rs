@@ -166,7 +166,9 @@ fn bench_scene(
         (Some(_), Some(stage)) => stage.device.read_clocks(N_CLOCK_READINGS)?,
         _ => Vec::new(),
     };
-    let wrong = bench_check::wrong(&outcome, &recorder.cases);
+    let missed = stage.as_ref().map_or((0, 0), |stage| stage.device.executed());
+    let wrong = bench_check::not_executed(&recorder.args, missed)
+        .or_else(|| bench_check::wrong(&outcome, &recorder.cases));
     let is_cut = outcome.interrupted || failure.is_some();
     let run = recorder.record(&outcome, &later, is_cut)?;
     runs.lock().unwrap_or_else(PoisonError::into_inner).push(run);

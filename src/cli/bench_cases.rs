@@ -73,7 +73,7 @@ pub fn plan(args: &BenchArgs) -> BenchPlan {
         n_rounds: args.repeat,
         hash_frames: args.hash_frames,
         pictures: args.out.is_some(),
-        checked: (!args.no_check).then_some(checked_pixels),
+        checked: (!args.no_check).then_some(|w, h| checked_pixels(w, h).at),
     }
 }
 

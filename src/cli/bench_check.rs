@@ -4,10 +4,14 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use super::args::BenchArgs;
 use super::bench_record::Recorder;
+use super::bench_stages;
 use super::output::or_dash;
 use super::progress::progress;
+use super::scene::device_choice;
 use crate::error::Error;
+use crate::io::console::say;
 use crate::measure::figure::Figure;
 use crate::studies::check::{CheckPlan, check};
 use crate::studies::reference_cache;
@@ -33,7 +37,7 @@ pub fn run(recorder: &Recorder, timed: Duration, stop: &AtomicBool, outcome: &Mu
     let folder = reference_cache::default_folder();
     let budget = timed.mul_f64(SHARE / drawn.len().max(1) as f64).max(LEAST);
     let plan = CheckPlan { budget, folder: folder.as_deref() };
-    let bar = progress(drawn.len() as u64, "check", args.options.quiet);
+    let bar = progress(drawn.len() as u64 + 1, "check", args.options.quiet);
     for picture in drawn {
         let found = match stop.load(Ordering::Relaxed) {
             true => Check::none("Ctrl-C came before the check"),
@@ -51,6 +55,13 @@ pub fn run(recorder: &Recorder, timed: Duration, stop: &AtomicBool, outcome: &Mu
             checks.insert(picture.i_case, found);
         }
     }
+    if !stop.load(Ordering::Relaxed) {
+        let stages = bench_stages::run(&device_choice(&args.options), &recorder.info, stop, &|| ());
+        blocks::lock(outcome).stages = stages.unwrap_or_else(|error| {
+            say!("warning: the device's stages could not be checked: {error}");
+            None
+        });
+    }
 }
 
 /// Returns a reason with the loop whose picture is wrong.
@@ -58,9 +69,29 @@ fn named(check: &Check, loop_name: &str, reason: String) -> String {
     if check.is_wrong() { format!("loop {loop_name}: {reason}") } else { reason }
 }
 
-/// Returns the error that a bench ends with whose picture is wrong; none if no picture is.
+/// Returns the error that a bench ends with whose device did not execute all of its commands, `n` of
+/// them, of which it `missed` some; none without a check.
+pub fn not_executed(args: &BenchArgs, (n, missed): (u64, u64)) -> Option<Error> {
+    (missed > 0 && !args.no_check).then(|| Error::Check {
+        what: format!(
+            "the device's picture is wrong: the driver said that {n} submissions were done, and did \
+             not execute {missed} of them; their times are of no use"
+        ),
+    })
+}
+
+/// Returns the error that a bench ends with whose picture or stages are wrong; none if they are
+/// right.
 pub fn wrong(outcome: &Outcome, cases: &[Case]) -> Option<Error> {
-    let (i, check) = outcome.checks.iter().find(|(_, check)| check.is_wrong())?;
+    let Some((i, check)) = outcome.checks.iter().find(|(_, check)| check.is_wrong()) else {
+        let stages = outcome.stages.as_ref().filter(|stages| !stages.failed.is_empty())?;
+        let what = format!(
+            "the device's picture is wrong, in this scene by less than its bounds: these stages \
+             are wrong: {}; `nimbus stress` tells by how much",
+            stages.failed.join(", ")
+        );
+        return Some(Error::Check { what });
+    };
     let n = outcome.checks.values().filter(|check| check.is_wrong()).count();
     let name = cases.get(*i).map(Case::name).unwrap_or_default();
     let place = if name.is_empty() { String::new() } else { format!("{name}: ") };

@@ -128,6 +128,7 @@ impl Recorder {
             clocks: self.clocks,
             block_order: outcome.block_order(),
             cases: outcome.cases(&self.cases, &self.plan),
+            stages: outcome.stages.clone(),
             chosen: outcome.chosen.clone(),
             parts: Vec::new(),
             interrupted: is_cut,

@@ -9,6 +9,7 @@ mod bench_check;
 mod bench_plot;
 mod bench_record;
 mod bench_remarks;
+mod bench_stages;
 mod bench_table;
 mod clock_locks;
 mod compare;

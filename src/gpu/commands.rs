@@ -10,6 +10,7 @@ use super::call::Call;
 use super::descriptors::DescriptorPools;
 use super::device::{Device, Owned, SharedDevice};
 use super::rate::Pace;
+use super::stamp::Stamp;
 use super::timer::{ScopeTime, Timer};
 use crate::error::Result;
 
@@ -40,6 +41,7 @@ pub struct Commands {
     labels: Vec<&'static str>,
     pub(super) descriptors: DescriptorPools,
     pub(super) timer: Timer,
+    pub(super) stamp: Stamp,
     /// The value that the semaphore has after the last submission.
     value: u64,
     semaphore: Arc<Owned<vk::Semaphore>>,
@@ -98,6 +100,7 @@ impl Commands {
     pub fn new(device: &Device, name: &str) -> Result<Commands> {
         let shared = device.shared();
         let timer = Timer::new(device, name, MAX_SCOPES)?;
+        let stamp = Stamp::new(device, name)?;
         let pool = shared.command_pool(name)?;
         let semaphore = Arc::new(shared.semaphore(name, vk::SemaphoreType::TIMELINE)?);
         let descriptors = DescriptorPools::new(shared);
@@ -112,6 +115,7 @@ impl Commands {
             labels: vec![],
             descriptors,
             timer,
+            stamp,
             value: 0,
             semaphore,
             name,
@@ -273,6 +277,7 @@ impl Commands {
     /// The device is lost or taken for hung, or a guard band is broken.
     pub fn wait(&mut self) -> Result<Vec<ScopeTime>> {
         self.last_submission().wait()?;
+        self.stamp.count()?;
         if let Some(guards) = &self.shared.guards {
             guards.check(&self.name)?;
         }

@@ -18,6 +18,7 @@ use super::limits::Limits;
 use super::lowered::LoweredLimits;
 use super::over_limit::OverLimit;
 use super::pass_times::PassTimes;
+use super::stamp::Executed;
 use super::statistics::{PipelineReport, Reports};
 use crate::error::{Error, Result};
 
@@ -66,6 +67,8 @@ pub(super) struct SharedDevice {
     pub over_limit: OverLimit,
     /// The way in which the times of passes are taken.
     pub pass_times: PassTimes,
+    /// Submissions that ended.
+    pub executed: Executed,
     /// Whether the device may be at work for ever, so that nothing that it may use can be freed.
     is_abandoned: AtomicBool,
     /// Reports on new pipelines, where they are wanted.
@@ -142,12 +145,19 @@ impl Device {
             max_submit_ns: max_submit_ms.map(|ms| 1e6 * ms),
             over_limit: OverLimit::default(),
             pass_times: options.pass_times,
+            executed: Executed::default(),
             is_abandoned: AtomicBool::new(false),
             reports: options.reports_pipelines.then(|| Reports::new(statistics)),
             faults,
             instance: instance.clone(),
         });
         Ok(Device { shared, info })
+    }
+
+    /// Returns the number of submissions that have ended, and of those that were not executed,
+    /// although the driver said that they were done.
+    pub fn executed(&self) -> (u64, u64) {
+        self.shared.executed.counts()
     }
 
     /// Returns the properties of the device.

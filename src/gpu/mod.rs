@@ -39,6 +39,7 @@ mod rate;
 mod recorder;
 mod reflect;
 mod shader;
+mod stamp;
 mod statistics;
 #[cfg(feature = "window")]
 mod surface;

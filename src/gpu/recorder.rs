@@ -68,6 +68,8 @@ impl Commands {
         let (uses, scope, i_scope) = (Uses::default(), "", None);
         f(&mut Recorder { commands: self, uses, barriers, scope, i_scope })?;
         self.timer.copy(self.buffer());
+        let buffer = self.buffer();
+        self.stamp.write(buffer);
         self.end()
     }
 

@@ -32,6 +32,15 @@ impl Sources {
         Sources(texts.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect())
     }
 
+    /// Returns the SHA-256 of all names and texts, in hex.
+    pub fn digest(&self) -> String {
+        let mut hasher = Sha256::new();
+        for (name, text) in &self.0 {
+            hasher.update(format!("{name}\0{}\0{text}", text.len()));
+        }
+        hex(&hasher.finalize())
+    }
+
     /// Replaces texts by those that `dir` holds, for `--shaders DIR`.
     ///
     /// # Errors

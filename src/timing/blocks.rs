@@ -8,13 +8,12 @@ use sha2::{Digest, Sha256};
 
 use super::attachments::CasePicture;
 use super::cases::{Case, Loop};
-use super::check::{Check, DevicePicture};
+use super::check::{Check, DevicePicture, Stages};
 use crate::error::{Error, Result};
 use crate::frame::{Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
 use crate::gpu::hex;
 use crate::io::image::display_bytes;
 use crate::model::scene::{Draw, LightingMode, Scene};
-use crate::reference::picture::Pixels;
 
 /// How many frames a bench runs, and what it keeps of them.
 #[derive(Debug, Clone, Copy)]
@@ -27,10 +26,13 @@ pub struct BenchPlan {
     pub hash_frames: bool,
     /// Whether the last frame of every case is read back, after all its blocks.
     pub pictures: bool,
-    /// Returns the pixels of a film whose numbers are kept of the last frame of every block, to be
-    /// checked; none without a check.
-    pub checked: Option<fn(u32, u32) -> Pixels>,
+    /// Returns the pixels [column, row] of a film whose numbers are kept of the last frame of every
+    /// block, to be checked; none without a check.
+    pub checked: Option<PixelsOf>,
 }
+
+/// Returns pixels of a film of some width and height.
+pub type PixelsOf = fn(u32, u32) -> Vec<[u32; 2]>;
 
 /// One frame of one block.
 #[derive(Debug, Clone)]
@@ -77,6 +79,8 @@ pub struct Outcome {
     pub counts: BTreeMap<usize, Counts>,
     /// The last frames of the blocks, to be checked; one of several with the same bytes.
     pub drawn: Vec<DevicePicture>,
+    /// What was found about the device's stages, if it was asked for.
+    pub stages: Option<Stages>,
     /// What checks found, by case.
     pub checks: BTreeMap<usize, Check>,
     /// Whether Ctrl-C came before the end.
@@ -238,7 +242,7 @@ fn keep_drawn(
     stage: &mut Stage,
     outcome: &Mutex<Outcome>,
     &NextBlock { i_case, of, .. }: &NextBlock,
-    (pixels, hash): (fn(u32, u32) -> Pixels, &str),
+    (pixels, hash): (PixelsOf, &str),
 ) -> Result<()> {
     let (times, is_known) = {
         let outcome = lock(outcome);
@@ -249,11 +253,11 @@ fn keep_drawn(
     let film = stage.scene.film;
     let pixels = pixels(film.width, film.height);
     let rgba = stage.renderer.image()?;
-    let at = |&at: &[u32; 2]| {
-        let pixel = &rgba[4 * pixels.index(at)..][..4];
+    let at = |&[i, j]: &[u32; 2]| {
+        let pixel = &rgba[4 * (j as usize * film.width as usize + i as usize)..][..4];
         [0, 1, 2, 3].map(|k| f64::from(pixel[k]))
     };
-    let rgba = pixels.at.iter().map(at).collect();
+    let rgba = pixels.iter().map(at).collect();
     let light = match stage.scene.lighting.mode {
         LightingMode::None => vec![],
         _ => stage.renderer.facets(&stage.device)?.1.iter().map(|l| [l.first, l.second]).collect(),

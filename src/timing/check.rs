@@ -28,6 +28,19 @@ pub struct DevicePicture {
     pub light: Vec<[[f32; 3]; 2]>,
 }
 
+/// The stages of pictures, checked with values at the limits of the accepted input.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Stages {
+    /// Cases of `nimbus stress` that were run.
+    pub n_cases: usize,
+    /// Names of those that failed.
+    pub failed: Vec<String>,
+    /// Time that they took, in seconds.
+    pub seconds: f64,
+    /// Whether they had passed on this device, with these shaders, before.
+    pub from_cache: bool,
+}
+
 /// The answer of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::check::Check;
+use super::check::{Check, Stages};
 use super::json::ResultFile;
 use super::machine::{Clocks, Cpu, Device};
 use super::names::{Setting, case_name, loop_name, mode_name, sweep_text};
@@ -44,6 +44,9 @@ pub struct Run {
     pub block_order: Vec<Block>,
     /// One case for each phase and point of the sweep, in order; a scene with neither has one.
     pub cases: Vec<Case>,
+    /// The stages of pictures on this device; null if they were not checked.
+    #[serde(default)]
+    pub stages: Option<Stages>,
     /// The settings that "auto" chose in each case, with the times and errors that decided.
     #[serde(default)]
     pub chosen: Vec<String>,

@@ -13,6 +13,8 @@
  *                            still alive when its device is destroyed or the process exits
  *   NIMBUS_FAKE_COUNTS       file that gets the number of each call when the process exits
  *   NIMBUS_FAKE_LABELS       file that gets a line for each begin and end of a label of commands
+ *   NIMBUS_FAKE_DROP         FIRST:EVERY: the submission FIRST, from 1, and from there on each EVERY-th
+ *                            one ends without having executed its commands
  *   NIMBUS_FAKE_TELLS        1: the device tells why it was lost (fault_info.h)
  *
  * After DEVICE_LOST every call in the table CALLS fails with it. HANG stands for a device that
@@ -226,6 +228,19 @@ static int32_t fault(int call, long n) {
     return atomic_load(&is_lost) ? DEVICE_LOST : SUCCESS;
 }
 
+/* The layout of VkSubmitInfo2: its size, and the place of the number of command buffers. */
+#define SUBMIT_INFO_SIZE 64
+#define SUBMIT_INFO_N_COMMANDS 32
+
+/* Whether NIMBUS_FAKE_DROP=FIRST:EVERY asks that this submission, from 1, executes no commands. */
+static int is_dropped(long long n) {
+    const char *drop = getenv("NIMBUS_FAKE_DROP");
+    long long first, every;
+    if (!drop) return 0;
+    if (sscanf(drop, "%lld:%lld", &first, &every) != 2) die("NIMBUS_FAKE_DROP");
+    return n >= first && (n - first) % every == 0;
+}
+
 static int32_t answer(int call, Word a, Word b, Word c, Word d, Word e, Word f) {
     int32_t failed = fault(call, 1 + atomic_fetch_add(&n_calls[call], 1));
     if (failed) {
@@ -254,6 +269,12 @@ static int32_t answer(int call, Word a, Word b, Word c, Word d, Word e, Word f) 
     int32_t result;
     if (call == CALL_QueueSubmit2) {
         pthread_mutex_lock(&submitting);
+        char submit[SUBMIT_INFO_SIZE];
+        if (b == 1 && is_dropped(n_calls[call])) {
+            memcpy(submit, (void *)c, sizeof submit);
+            memset(submit + SUBMIT_INFO_N_COMMANDS, 0, 4);
+            c = (Word)submit;
+        }
         result = atomic_load(&is_lost) ? DEVICE_LOST : reals[call](a, b, c, d, e, f);
         pthread_mutex_unlock(&submitting);
     } else {

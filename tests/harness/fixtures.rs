@@ -52,12 +52,13 @@ impl Fixtures {
     pub fn new() -> Fixtures {
         let folder = || tempfile::tempdir().expect("a folder");
         let fixtures = Fixtures { dir: folder(), cache: folder() };
-        // Compiling shaders takes most of the time of a first run, so that all tests share a cache
-        // of shaders, which has them by content.
-        let spirv = Path::new(env!("CARGO_TARGET_TMPDIR")).join("spirv");
-        fs::create_dir_all(&spirv).expect("room");
-        let link = fixtures.cache.path().join("spirv");
-        std::os::unix::fs::symlink(spirv, link).expect("room");
+        // Compiling shaders takes most of the time of a first run, and checking the device's stages
+        // some of it, so that all tests share caches of both, which have them by content.
+        for name in ["spirv", "stages"] {
+            let shared = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+            fs::create_dir_all(&shared).expect("room");
+            std::os::unix::fs::symlink(shared, fixtures.cache.path().join(name)).expect("room");
+        }
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let at = |name: &str| fixtures.dir.path().join(name);
         fs::write(at("s.toml"), SCENE).expect("room");

@@ -131,7 +131,8 @@ impl<'a> Drawing<'a> {
             None => vec![None; self.shares.len()],
         };
         let is_light_checked = is_lit && light.is_some();
-        let light_bound = is_light_checked.then(|| bound::light(exact, &self.shares, &by_device));
+        let light_bound = is_light_checked
+            .then(|| bound::light((exact, device.time_s), &self.shares, &by_device));
         let off = differences(&device.rgba, &drawn);
         let samples: Vec<Samples> = light_found
             .iter()

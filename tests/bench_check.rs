@@ -1,0 +1,159 @@
+//! bench compares what it timed with its reference in f64: right pictures of all kinds pass, every
+//! faulty shader is found, and the error is that of `nimbus error`.
+
+#[path = "harness/faults.rs"]
+mod faults;
+#[path = "harness/program.rs"]
+mod program;
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use faults::FAULTS;
+use program::{nimbus, run, scenes};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Few small frames.
+const SHORT: [&str; 11] = [
+    "--frames",
+    "2",
+    "--warmup",
+    "1",
+    "--repeat",
+    "1",
+    "--threading",
+    "serial",
+    "--no-saved",
+    "-q",
+    "--json",
+];
+const SMALL: [&str; 2] = ["--size", "96x72"];
+/// Without the rounding of half floats small errors show.
+const SINGLE: [&str; 2] = ["--set", "film.format='rgba32f'"];
+
+fn bench(args: &[&str]) -> (Output, Option<Value>) {
+    let output = run(&[&["bench"], args, &SHORT].concat());
+    let json = serde_json::from_slice(&output.stdout).ok();
+    (output, json)
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn right_pictures_of_all_kinds_pass() {
+    let mut all: Vec<Vec<String>> = scenes()
+        .iter()
+        .map(|path| vec![path.display().to_string(), SMALL[0].into(), SMALL[1].into()])
+        .collect();
+    for (scene, settings) in [
+        ("cubes-554", &["draw.path='sprites'", "draw.chunks=8"][..]),
+        ("cubes-554", &["draw.resolution=0.5"]),
+        ("cumulus", &["draw.resolution=0.25"]),
+        ("flyby", &["draw.impostors='on'"]),
+        ("ground", &["film.format='rgba8'", "lighting.gather='tree'"]),
+        ("supercell", &["draw.smallest=1.0", "draw.threshold=1e-3"]),
+        ("study-both", &["lighting.mode='none'"]),
+        ("threads", &["film.format='rgba32f'", "draw.sort_bits=32"]),
+        ("static", &["film.format='rgba32f'", "lighting.summation='pairwise'"]),
+    ] {
+        let mut args = vec![format!("scenes/{scene}.toml"), "--size".into(), "160x120".into()];
+        args.extend(settings.iter().flat_map(|s| ["--set".to_owned(), (*s).to_owned()]));
+        all.push(args);
+    }
+    for args in all {
+        let args: Vec<&str> = args.iter().map(String::as_str).collect();
+        let (output, json) = bench(&args);
+        assert!(output.status.success(), "{args:?}: {}", stderr(&output));
+        for case in json.expect("JSON")["cases"].as_array().expect("cases") {
+            let check = &case["check"];
+            assert_eq!(check["verdict"], "right", "{args:?}: {check}");
+            let rmse = check["rmse"]["value"].as_f64().expect("a number");
+            let magnitude = check["magnitude"].as_f64().expect("a number");
+            assert!(rmse < 0.2 * magnitude, "{args:?}: {check}");
+            println!("{args:?}: RMSE {rmse:.2e} of {magnitude:.2}, {}", check["seconds"]);
+        }
+    }
+}
+
+/// The bench that finds a fault that the stages do not show.
+fn finder(what: &str) -> &'static [&'static str] {
+    match what {
+        "a slot's phase is ignored"
+        | "no fade-out at the end of life"
+        | "a wave's phase is ignored" => &["scenes/puff.toml"],
+        "wrong sort key of negative depths" | "optical depth used as opacity" => {
+            &["scenes/cubes-554.toml", "--set", "draw.path='sprites'", "--set", "draw.sort_bits=32"]
+        }
+        "growth is ignored" => {
+            &["scenes/cubes-554.toml", "--set", "cloud.0.grow_to=2", "--set", "time.start_s=60"]
+        }
+        _ => &["scenes/cubes-554.toml"],
+    }
+}
+
+#[test]
+fn every_faulty_shader_is_found() {
+    let mut missed = vec![];
+    for (what, file, from, to, _) in FAULTS {
+        let dir = TempDir::new().expect("a folder");
+        let text = fs::read_to_string(Path::new("shaders").join(file)).expect("a shader");
+        assert!(text.contains(from), "{file}");
+        let path = dir.path().join(file);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("room");
+        fs::write(&path, text.replace(from, to)).expect("room");
+        let shaders = ["--shaders", dir.path().to_str().expect("UTF-8")];
+        let (output, json) = bench(&[finder(what), &SMALL, &SINGLE, &shaders].concat());
+        let error = stderr(&output);
+        let is_told = error.contains("the device's picture is wrong");
+        println!("{what}: {:?} {error}", output.status.code());
+        if output.status.code() != Some(1) || !is_told || json.is_none() {
+            missed.push(*what);
+        }
+    }
+    assert!(missed.is_empty(), "not found: {missed:?}");
+}
+
+#[test]
+fn the_error_is_that_of_nimbus_error() {
+    for scene in ["cubes-554", "rectangles", "study-both", "ground", "threads"] {
+        let file = format!("scenes/{scene}.toml");
+        let size = ["--size", "200x150"];
+        let (output, json) = bench(&[&[&file[..]], &size[..]].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        let of_bench = json.expect("JSON")["cases"][0]["check"].clone();
+        let error = run(&[
+            &["error", &file, "--against", "thin", "--knob", "draw.sort_bits=32", "--frame", "1"],
+            &["--rounds", "1", "--frames", "1", "--pixels", "4096", "--json", "-q"],
+            &size[..],
+        ]
+        .concat());
+        assert!(error.status.success(), "{}", stderr(&error));
+        let study: Value = serde_json::from_slice(&error.stdout).expect("JSON");
+        let of_error = study["configurations"]
+            .as_array()
+            .and_then(|all| {
+                all.iter().find(|c| c["settings"].as_array().is_some_and(Vec::is_empty))
+            })
+            .expect("the scene itself")["error"]["rmse"]
+            .clone();
+        let ends = |of: &Value| ["low", "high"].map(|end| of[end].as_f64().expect("a number"));
+        let ([low, high], [low_too, high_too]) = (ends(&of_bench["rmse"]), ends(&of_error));
+        println!("{scene}: {} against {of_error}", of_bench["rmse"]);
+        assert!(low <= high_too && low_too <= high, "{scene}: {of_bench} against {of_error}");
+    }
+}
+
+#[test]
+fn without_a_check_the_results_say_so() {
+    let mut command = nimbus(&["bench", "scenes/hello.toml", "--size", "64x48", "--no-check"]);
+    let output = command.args(&SHORT[..10]).output().expect("the program runs");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        output.status.success() && text.contains("NOT CHECKED against f64: --no-check"),
+        "{text}"
+    );
+}

@@ -234,20 +234,16 @@ fn messages(scene: &str, barriers: Barriers) -> String {
 
 #[test]
 fn every_missing_barrier_is_found() {
-    const CASES: [(&str, &str); 6] = [
-        ("hello", "grid"),
-        ("hello", "transmit"),
-        ("hello", "first"),
-        ("hello", "second"),
-        ("hello", "sort"),
-        ("materials", "contract"),
-    ];
+    // Those that both the layer of Vulkan 1.3.239 and that of 1.4.309 see. The newer one does not
+    // see all that the older one does, such as those of contract and cull.
+    const CASES: [&str; 8] =
+        ["place", "grid", "facets", "transmit", "first", "second", "sort", "tiles"];
     for scene in ["hello", "materials"] {
         assert_eq!(messages(scene, Barriers::Placed), "", "{scene}");
     }
-    for (scene, pass) in CASES {
-        let found = messages(scene, Barriers::OmittedIn(pass));
-        assert!(found.contains("HAZARD"), "{scene}, {pass}: {found:?}");
+    for pass in CASES {
+        let found = messages("hello", Barriers::OmittedIn(pass));
+        assert!(found.contains("HAZARD"), "{pass}: {found:?}");
     }
 }
 

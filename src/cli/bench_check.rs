@@ -7,18 +7,15 @@ use std::time::Duration;
 use super::args::BenchArgs;
 use super::bench_record::Recorder;
 use super::bench_stages;
-use super::output::or_dash;
 use super::progress::progress;
 use super::scene::device_choice;
 use crate::error::Error;
 use crate::io::console::say;
-use crate::measure::figure::Figure;
 use crate::studies::check::{CheckPlan, check};
 use crate::studies::reference_cache;
 use crate::timing::blocks::{self, Outcome};
 use crate::timing::cases::Case;
-use crate::timing::check::{Bounded, Check, CheckVerdict};
-use crate::timing::records;
+use crate::timing::check::Check;
 
 /// Share of a bench's time for the second reflection in f64.
 const SHARE: f64 = 0.05;
@@ -69,13 +66,13 @@ fn named(check: &Check, loop_name: &str, reason: String) -> String {
     if check.is_wrong() { format!("loop {loop_name}: {reason}") } else { reason }
 }
 
-/// Returns the error that a bench ends with whose device did not execute all of its commands, `n` of
-/// them, of which it `missed` some; none without a check.
+/// Returns the error that a bench ends with whose device did not execute all of `n` submissions,
+/// but `missed` some; none without a check.
 pub fn not_executed(args: &BenchArgs, (n, missed): (u64, u64)) -> Option<Error> {
     (missed > 0 && !args.no_check).then(|| Error::Check {
         what: format!(
-            "the device's picture is wrong: the driver said that {n} submissions were done, and did \
-             not execute {missed} of them; their times are of no use"
+            "the device's picture is wrong: the driver said that {n} submissions were done, and \
+             did not execute {missed} of them; their times are of no use"
         ),
     })
 }
@@ -102,39 +99,4 @@ pub fn wrong(outcome: &Outcome, cases: &[Case]) -> Option<Error> {
          stress` looks for the stage that is wrong"
     );
     Some(Error::Check { what })
-}
-
-/// Returns an RMSE with its interval.
-pub fn rmse_text(rmse: Figure) -> String {
-    let interval = rmse.low.zip(rmse.high);
-    let interval = interval.map(|(low, high)| format!(" ({low:.1e} to {high:.1e})"));
-    format!("{:.2e}{}", rmse.value, interval.unwrap_or_default())
-}
-
-/// Returns a line about the error of a case's picture.
-pub fn line(case: &records::Case) -> String {
-    let Some(check) = &case.check else { return String::new() };
-    let reason = check.reason.as_deref().unwrap_or_default();
-    if check.verdict == CheckVerdict::NotChecked {
-        return format!("error: NOT CHECKED against f64: {reason}\n");
-    }
-    let of = |of: Option<Bounded>| or_dash(of, |of| format!("{:.1e} of {:.1e}", of.rms, of.bound));
-    let verdict = match (check.is_wrong(), reason) {
-        (true, _) => format!("WRONG: {reason}"),
-        (false, "") => "right".to_owned(),
-        (false, _) => format!("right, but {reason}"),
-    };
-    format!(
-        "error: RMSE {} against f64, {:.2e} at most, over {} pixels of frame {}; {verdict} (drawing {}, light {} \
-         allowed)\n",
-        or_dash(check.rmse, rmse_text),
-        check.max.unwrap_or(f64::NAN),
-        check.n_pixels,
-        check.frame.unwrap_or_default(),
-        or_dash(check.drawing, |d| format!(
-            "{:.1e}, {} of {} pixels beyond their bounds",
-            d.rms, d.n_beyond, d.n_shown
-        )),
-        of(check.light),
-    )
 }

@@ -1,7 +1,10 @@
 //! The remarks above and below the tables of `nimbus bench`.
 
+use super::output::or_dash;
 use crate::gpu::PassTimes;
+use crate::measure::figure::Figure;
 use crate::timing::N_FRAMES_NEEDED;
+use crate::timing::check::{Bounded, CheckVerdict};
 use crate::timing::machine::Clocks;
 use crate::timing::overlap::Overlap;
 use crate::timing::records::{Case, Mode, Run, Skipping};
@@ -202,4 +205,45 @@ pub fn missing_lines(run: &Run) -> String {
         add("saved: - : the loop without skipping was not timed (--no-saved)".to_owned());
     }
     lines.into_iter().map(|line| line + "\n").collect()
+}
+
+/// Returns an RMSE with its interval.
+fn rmse_text(rmse: Figure) -> String {
+    let interval = rmse.low.zip(rmse.high);
+    let interval = interval.map(|(low, high)| format!(" ({low:.1e} to {high:.1e})"));
+    format!("{:.2e}{}", rmse.value, interval.unwrap_or_default())
+}
+
+/// Returns two lines about the error of a case's picture: how far it is from its reference, and
+/// whether that is right.
+pub fn error_lines(case: &Case) -> String {
+    let Some(check) = &case.check else { return String::new() };
+    let reason = check.reason.as_deref().unwrap_or_default();
+    if check.verdict == CheckVerdict::NotChecked {
+        return format!("error: NOT CHECKED against f64: {reason}\n");
+    }
+    let settings = check.settings_rms.filter(|rms| *rms > 0.0);
+    let settings = settings.map(|rms| format!("; the settings of `draw` make {rms:.1e} of it"));
+    let mut out = format!(
+        "error: RMSE {} against f64, at most {}, over {} pixels of frame {}{}\n",
+        or_dash(check.rmse, rmse_text),
+        or_dash(check.max, |max| format!("{max:.1e}")),
+        check.n_pixels,
+        or_dash(check.frame, |frame| frame.to_string()),
+        settings.unwrap_or_default(),
+    );
+    if check.is_wrong() {
+        return out + &format!("THE PICTURE IS WRONG: {reason}\n");
+    }
+    let drawing = check.drawing.map(|d| {
+        let (rms, n, most) = (d.rms, d.n_beyond, d.most_beyond);
+        format!("drawing off by {rms:.1e}, {n} pixels beyond rounding of {most} allowed")
+    });
+    let light = check
+        .light
+        .map(|Bounded { rms, bound }| format!("light off by {rms:.1e} of {bound:.1e} allowed"));
+    let reason = Some(reason.to_owned()).filter(|reason| !reason.is_empty());
+    let parts: Vec<String> = [drawing, light, reason].into_iter().flatten().collect();
+    out += &format!("the picture is right: {}\n", parts.join("; "));
+    out
 }

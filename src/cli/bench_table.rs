@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
-use super::bench_check;
 use super::bench_remarks::{
-    clocks_line, drawn_line, empty_line, latency_line, missing_lines, ms, overlap_lines,
-    skipping_line, spread_lines, still_line, still_lines,
+    clocks_line, drawn_line, empty_line, error_lines, latency_line, missing_lines, ms,
+    overlap_lines, skipping_line, spread_lines, still_line, still_lines,
 };
 use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
@@ -90,7 +89,7 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
 
 /// Returns what skipping saved, and the remarks on the last frames.
 fn last_frame_lines(case: &Case, same: Option<bool>) -> String {
-    let mut out = bench_check::line(case);
+    let mut out = error_lines(case);
     out += &case.skipping.as_ref().map_or(String::new(), skipping_line);
     out += &case.counts.map_or(String::new(), |counts| format!("last frame: {}\n", counts.text()));
     out += match same {

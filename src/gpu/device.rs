@@ -11,6 +11,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::call::Call;
 use super::device_info::DeviceInfo;
+use super::executed::Executed;
 use super::fault;
 use super::guard::Guards;
 use super::instance::Instance;
@@ -18,7 +19,6 @@ use super::limits::Limits;
 use super::lowered::LoweredLimits;
 use super::over_limit::OverLimit;
 use super::pass_times::PassTimes;
-use super::stamp::Executed;
 use super::statistics::{PipelineReport, Reports};
 use crate::error::{Error, Result};
 
@@ -381,7 +381,7 @@ fn create(
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(info.limits.has_int64)
         .shader_float64(info.limits.has_float64)
-        // A read far beyond the end must not end the process before the bands are checked.
+        // A read far beyond the end must not end the process.
         .robust_buffer_access(options.guard);
     let mut create = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)

@@ -17,6 +17,7 @@ mod device;
 mod device_info;
 mod draw_pipeline;
 mod draws;
+mod executed;
 mod fault;
 mod guard;
 mod host_clock;

@@ -32,13 +32,14 @@ impl Sources {
         Sources(texts.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect())
     }
 
+    /// Returns the text of a shader or of a file that shaders include.
+    pub fn text(&self, name: &str) -> Option<&str> {
+        self.0.get(name).map(String::as_str)
+    }
+
     /// Returns the SHA-256 of all names and texts, in hex.
     pub fn digest(&self) -> String {
-        let mut hasher = Sha256::new();
-        for (name, text) in &self.0 {
-            hasher.update(format!("{name}\0{}\0{text}", text.len()));
-        }
-        hex(&hasher.finalize())
+        hex(&Sha256::digest(format!("{:?}", self.0)))
     }
 
     /// Replaces texts by those that `dir` holds, for `--shaders DIR`.

@@ -2,7 +2,6 @@
 //! has not executed them, is noticed.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use ash::vk;
 
@@ -12,20 +11,6 @@ use crate::error::Result;
 
 /// Odd and without a pattern, so that no number is 0 or what memory holds by chance.
 const STEP: u32 = 0x9e37_79b9;
-
-/// The numbers of submissions that ended.
-#[derive(Debug, Default)]
-pub(super) struct Executed {
-    n: AtomicU64,
-    n_missed: AtomicU64,
-}
-
-impl Executed {
-    /// Returns the number of submissions that ended, and of those that did nothing.
-    pub fn counts(&self) -> (u64, u64) {
-        (self.n.load(Ordering::Relaxed), self.n_missed.load(Ordering::Relaxed))
-    }
-}
 
 /// The number of the last submission of a command buffer.
 pub(super) struct Stamp {
@@ -51,11 +36,7 @@ impl Stamp {
     /// Counts a submission that has ended.
     pub fn count(&self) -> Result<()> {
         let word: Vec<u32> = self.word.read(1)?;
-        let Executed { n, n_missed } = &self.shared.executed;
-        n.fetch_add(1, Ordering::Relaxed);
-        if word != [self.number] {
-            n_missed.fetch_add(1, Ordering::Relaxed);
-        }
+        self.shared.executed.add(word == [self.number]);
         Ok(())
     }
 }

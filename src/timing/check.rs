@@ -88,8 +88,8 @@ pub struct Check {
     pub frame: Option<u32>,
     /// Pixels that were compared.
     pub n_pixels: usize,
-    /// Root mean square difference from the reference "thin" of `nimbus error`: the scene's light in
-    /// f64, drawn without the approximations of `draw`. With its 95 % interval over parts of the
+    /// Root mean square difference from the reference "thin" of `nimbus error`: the scene's light
+    /// in f64, drawn without the approximations of `draw`. Its 95 % interval is over parts of the
     /// picture.
     pub rmse: Option<Figure>,
     /// Greatest difference of a number.
@@ -100,8 +100,8 @@ pub struct Check {
     pub drawing: Option<DrawingCheck>,
     /// The change that the scene's settings of `draw` make, in f64.
     pub settings_rms: Option<f64>,
-    /// Difference of the light from that in f64, in the picture; null if nothing is lit, or the light
-    /// has no reference. `rmse` is then that of the drawing.
+    /// Difference of the light from that in f64, in the picture; null if nothing is lit, or the
+    /// light has no reference. `rmse` is then that of the drawing.
     pub light: Option<Bounded>,
     /// Facets whose second reflection was computed in f64.
     pub n_second: usize,

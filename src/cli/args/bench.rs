@@ -22,8 +22,8 @@ const FRAMES: &str = "the records of all frames are kept in memory";
     Draw the frame times here, and as SVG files beside the results:\n  \
     nimbus bench scenes/threads.toml --plot --out run\n\n\
     Each [[phase]] of a scene is timed by itself; --set and --sweep apply to all of them.\n\n\
-    Exit codes: 0 done; 1 the device's picture is wrong; 2 bad input; 3 device or driver; 130 interrupted, what was \
-    finished is kept.")]
+    Exit codes: 0 done; 1 the device's picture is wrong; 2 bad input; 3 device or driver; \
+    130 interrupted, what was finished is kept.")]
 pub struct BenchArgs {
     /// Scene files, timed one after the other
     #[arg(required = true)]

@@ -181,10 +181,10 @@ const INTERPOLATED: f64 = 1e-5;
 const N_ROUNDINGS: f64 = 8.0;
 /// Error of 1 − e^{−τ}.
 const ONE_MINUS_EXP: f64 = 1e-6;
-/// Relative error of a texture's factor, e to the power of at most some 8: some 100 roundings of f32
-/// in the place and the sum.
+/// Relative error of a texture's factor, e to the power of at most some 8: some 100 roundings of
+/// f32 in the place and the sum.
 const TEXTURED: f64 = 1e-4;
-/// Share of the blobs that are narrower than the one whose σ bounds the effect of an error of place.
+/// Share of the blobs that are narrower than the one whose σ bounds the effect of errors of place.
 const NARROWER: f64 = 0.01;
 
 /// Returns the rounding of a device that draws `blobs`. The error of a particle's place relative to

@@ -56,7 +56,7 @@ pub(super) fn drawn_blobs(scene: &Scene, frame: &FrameReference) -> (Vec<Blob>, 
     (blobs, order)
 }
 
-/// Returns the order in which a device draws `blobs`, the first of [`drawn_blobs`], by the keys that
+/// Returns the order in which a device draws `blobs`, those of [`drawn_blobs`], by the keys that
 /// `draw.sort_bits` asks for.
 pub(super) fn set_order(scene: &Scene, frame: &FrameReference, blobs: &[Blob]) -> Vec<u32> {
     let (_, exact) = drawn_blobs(scene, frame);

@@ -177,7 +177,20 @@ fn parts(run: &Run) -> Markup {
 /// Text of a cell for a case in which nothing moves.
 const NOT_GIVEN: &str = "not given";
 
-/// Returns the cases, with the gain from overlap and from skipping.
+/// Returns the error of a case's picture, or why there is none.
+fn error(case: &Case) -> Cell {
+    let Some(check) = &case.check else { return text("—") };
+    let reason = check.reason.as_deref().unwrap_or_default();
+    let rmse = check.rmse.map(|r| with_interval(r.value, r.low, r.high));
+    text(&match (check.is_wrong(), rmse) {
+        (true, _) => format!("WRONG: {reason}"),
+        (false, Some(rmse)) if reason.is_empty() => rmse,
+        (false, Some(rmse)) => format!("{rmse}; {reason}"),
+        (false, None) => format!("not checked: {reason}"),
+    })
+}
+
+/// Returns the cases, with the error of their pictures and the gain from overlap and from skipping.
 fn cases(run: &Run) -> Markup {
     let row = |case: &Case| {
         let ratio = case.ratio.map(|r| with_interval(r.parallel_by_serial, r.low, r.high));
@@ -191,6 +204,7 @@ fn cases(run: &Run) -> Markup {
             text(&case_name(case)),
             count(case.particles as usize),
             text(&format!("{}×{}", case.width, case.height)),
+            error(case),
             ratio,
             bound,
             ms(skipping.map(|s| s.gpu_ms)),
@@ -206,13 +220,15 @@ fn cases(run: &Run) -> Markup {
         "case",
         "particles",
         "pixels",
+        "RMSE against f64",
         "parallel / serial",
         "best of overlap, ms",
         "GPU mean, ms",
         "without skipping, ms",
         "same picture, to the byte",
     ];
-    let caption = "The cases, with the gain from overlap and from skipping";
+    let caption =
+        "The cases, with the error of their pictures and the gain from overlap and from skipping";
     html! {
         (table(caption, &header, run.cases.iter().map(row)))
         @if run.cases.iter().any(Case::is_still) { p class="why" { (NOT_GIVEN) ": " (NO_RATIO) } }

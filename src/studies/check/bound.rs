@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::numbers::{differences, rms};
 use crate::model::scene::{Impostors, Scene};
 use crate::model::surface::Surface;
 use crate::reference::picture::{Emitters, FrameReference, PixelShares, Pixels, drawn_by_settings};
@@ -21,9 +22,6 @@ const SECOND: f64 = 0.05;
 /// Share of the shown pixels that may be beyond their bounds: the bounds hold for all blobs but the
 /// narrowest.
 const BEYOND: f64 = 0.01;
-/// The same where blobs are drawn in a smaller picture or from impostors, whose bounds are those of
-/// a smooth picture.
-const BEYOND_WHERE_SMOOTH: f64 = 0.1;
 /// Half of the pixels of a smaller picture along a side that a pixel is made from, weighted.
 const TAPS: f64 = 1.5;
 
@@ -34,22 +32,24 @@ pub fn drawing(
     as_set: &[[f64; 4]],
     bounds: &[[f64; 4]],
 ) -> DrawingCheck {
-    let off = super::differences(rgba, as_set);
+    let off = differences(rgba, as_set);
     let is_shown = |k: &usize| rgba[*k] != [0.0; 4] || as_set[*k] != [0.0; 4];
     let shown: Vec<usize> = (0..rgba.len()).filter(is_shown).collect();
     // NaN is beyond every bound.
     let is_beyond = |k: &&usize| (0..4).any(|i| !(off[**k][i].abs() <= bounds[**k][i]));
-    let share = if reach(scene) > 0.0 { BEYOND_WHERE_SMOOTH } else { BEYOND };
+    // The bounds of a smaller picture and of impostors are those of a smooth picture, so that they
+    // hold in the mean only.
+    let share = if reach(scene) > 0.0 { 1.0 } else { BEYOND };
     DrawingCheck {
-        rms: super::rms(&off),
-        bound: super::rms(bounds),
+        rms: rms(&off),
+        bound: rms(bounds),
         n_shown: shown.len(),
         n_beyond: shown.iter().filter(is_beyond).count(),
         most_beyond: (share * shown.len() as f64) as usize,
     }
 }
 
-/// Returns the pixels that a pixel of a smaller picture, or of an impostor, stands for, to one side.
+/// Returns how many pixels to one side a pixel of a smaller picture, or of an impostor, stands for.
 fn reach(scene: &Scene) -> f64 {
     let of_impostors = match scene.draw.impostors {
         Impostors::Off => 0.0,
@@ -108,5 +108,5 @@ pub fn light(
         |([first, second], share): (&[DVec3; 2], f64)| share * first.abs() + SECOND * second.abs();
     let light: Vec<DVec3> = by_device.iter().zip(shares_of_first).map(allowed).collect();
     let pixel = |s: &PixelShares| PixelShares { alpha: 0.0, ..s.clone() }.color(&light);
-    super::rms(&shares.iter().map(pixel).collect::<Vec<_>>())
+    rms(&shares.iter().map(pixel).collect::<Vec<_>>())
 }

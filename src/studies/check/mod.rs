@@ -12,6 +12,7 @@
 mod bound;
 mod cache;
 mod light;
+mod numbers;
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -19,6 +20,7 @@ use std::time::{Duration, Instant};
 use glam::{DVec2, DVec3};
 
 use self::light::{Light, Plan};
+use self::numbers::{differences, rms, sums};
 use super::picture_error::{Samples, magnitude, rmse_of};
 use crate::error::Result;
 use crate::model::scene::{LightingMode, Scene};
@@ -187,17 +189,8 @@ fn reason(check: &Check) -> Option<String> {
             d.n_beyond, d.n_shown, d.most_beyond, d.rms
         )
     });
-    beyond(&check.light, "its light differs from that in f64").or(of_drawing)
-}
-
-fn differences(a: &[[f64; 4]], b: &[[f64; 4]]) -> Vec<[f64; 4]> {
-    a.iter().zip(b).map(|(a, b)| std::array::from_fn(|k| a[k] - b[k])).collect()
-}
-
-fn sums(a: &[[f64; 4]], b: &[[f64; 4]]) -> Vec<[f64; 4]> {
-    a.iter().zip(b).map(|(a, b)| std::array::from_fn(|k| a[k] + b[k])).collect()
-}
-
-fn rms(values: &[[f64; 4]]) -> f64 {
-    magnitude(values)
+    let is_rough = check.drawing.map(|d| Bounded { rms: d.rms, bound: d.bound });
+    beyond(&check.light, "its light differs from that in f64")
+        .or(of_drawing)
+        .or_else(|| beyond(&is_rough, "it differs from its light drawn in f64"))
 }

@@ -85,16 +85,25 @@ pub fn pixel_shares(
         let sprites = Sprites { blobs: &blobs, radiance: &[], order: &order, factor };
         sprites::shares_at(&view, &raster, &opaque, &sprites)
     });
-    let pixel = |(found, (opaque, behind)): (sprites::Shares, (&OpaquePixel, Vec<(u32, f64)>))| {
-        let of_blobs =
-            found.blobs.iter().map(|&(j, share)| (emitters.of_particle[j as usize], share));
-        let of_solids = behind.iter().map(|&(i, share)| (i, share * found.behind));
-        PixelShares {
-            of: of_solids.chain(of_blobs).filter(|(_, share)| *share != 0.0).collect(),
-            alpha: 1.0 - found.behind * (1.0 - opaque.color[3]),
-        }
-    };
-    found.into_iter().zip(opaque.iter().zip(behind)).map(pixel).collect()
+    let all = found.iter().zip(&opaque).zip(behind);
+    all.map(|((found, opaque), behind)| pixel_of(emitters, found, opaque, &behind)).collect()
+}
+
+/// Returns the shares of a pixel in which blobs have the shares `found`, over an opaque one with
+/// the shares `behind`.
+fn pixel_of(
+    emitters: &Emitters,
+    found: &sprites::Shares,
+    opaque: &OpaquePixel,
+    behind: &[(u32, f64)],
+) -> PixelShares {
+    let of_blob = |&(j, share): &(u32, f64)| (emitters.of_particle[j as usize], share);
+    let of_solids = behind.iter().map(|&(i, share)| (i, share * found.behind));
+    let all = of_solids.chain(found.blobs.iter().map(of_blob));
+    PixelShares {
+        of: all.filter(|(_, share)| *share != 0.0).collect(),
+        alpha: 1.0 - found.behind * (1.0 - opaque.color[3]),
+    }
 }
 
 /// Returns the opaque background of every pixel, without colours, and the shares of facets in it.

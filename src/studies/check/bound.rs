@@ -36,7 +36,7 @@ pub fn drawing(
     let is_shown = |k: &usize| rgba[*k] != [0.0; 4] || as_set[*k] != [0.0; 4];
     let shown: Vec<usize> = (0..rgba.len()).filter(is_shown).collect();
     // NaN is beyond every bound.
-    let is_beyond = |k: &&usize| (0..4).any(|i| !(off[**k][i].abs() <= bounds[**k][i]));
+    let is_within = |k: &usize| (0..4).all(|i| off[*k][i].abs() <= bounds[*k][i]);
     // The bounds of a smaller picture and of impostors are those of a smooth picture, so that they
     // hold in the mean only.
     let share = if reach(scene) > 0.0 { 1.0 } else { BEYOND };
@@ -44,7 +44,7 @@ pub fn drawing(
         rms: rms(&off),
         bound: rms(bounds),
         n_shown: shown.len(),
-        n_beyond: shown.iter().filter(is_beyond).count(),
+        n_beyond: shown.iter().filter(|k| !is_within(k)).count(),
         most_beyond: (share * shown.len() as f64) as usize,
     }
 }

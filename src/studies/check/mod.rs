@@ -178,7 +178,8 @@ fn reason(check: &Check) -> Option<String> {
     }
     let beyond = |of: &Option<Bounded>, what: &str| {
         // NaN is beyond every bound.
-        let wrong = of.filter(|of| !(of.rms <= of.bound));
+        let is_right = |of: &Bounded| of.rms <= of.bound;
+        let wrong = of.filter(|of| !is_right(of));
         wrong.map(|of| format!("{what} by {:.2e}, and {:.2e} is right", of.rms, of.bound))
     };
     let of_drawing = check.drawing.filter(|d| d.n_beyond > d.most_beyond);

@@ -105,6 +105,11 @@ impl<'a> AreaScene<'a> {
         scene
     }
 
+    /// Returns L1 of every disc.
+    pub fn disc_radiance(&self) -> &[DVec3] {
+        &self.disc_radiance
+    }
+
     fn lit_regions(&self, rectangle: &Rectangle) -> Vec<LitRegion> {
         let mut regions = vec![LitRegion { polygon: WHOLE.to_vec(), lit: Vec::new() }];
         for (i_light, light) in self.lights.iter().enumerate() {

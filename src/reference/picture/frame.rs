@@ -52,6 +52,10 @@ pub struct FrameReference {
     pub second: Vec<DVec3>,
     /// Estimated error of `second`, greatest channel.
     pub second_error: Vec<f64>,
+    /// Greatest of three channels of Σ A |L1 − L1'| / Σ A L1 over the facets of ground and clouds,
+    /// L1 in closed form and L1' through the density grid; 0 unless the lighting mode is
+    /// "two-reflection".
+    pub grid_error: f64,
 }
 
 impl FrameReference {
@@ -142,6 +146,7 @@ impl FrameReference {
             indirect: vec![],
             second: vec![],
             second_error: vec![],
+            grid_error: 0.0,
         })
     }
 
@@ -257,8 +262,20 @@ impl FrameReference {
         self.irradiance.splice(0..0, irradiance);
         self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, flat.len()));
         self.facets.splice(0..0, flat);
+        self.grid_error = self.error_of_grid(area_scene.disc_radiance());
         let accuracy = Accuracy::relative(SECOND_ACCURACY);
         take(self, &|i| area_scene.second(&receivers[i].0, receivers[i].1, &accuracy))
+    }
+
+    /// Returns [`FrameReference::grid_error`]. `closed` is L1 of the last facets, in closed form.
+    fn error_of_grid(&self, closed: &[DVec3]) -> f64 {
+        let n_before = self.facets.len() - closed.len();
+        let facets = self.facets[n_before..].iter().zip(&self.radiance[n_before..]).zip(closed);
+        let (off, all) = facets.fold((DVec3::ZERO, DVec3::ZERO), |(off, all), ((f, grid), l)| {
+            (off + f.area * (*l - *grid).abs(), all + f.area * *l)
+        });
+        let shares = [0, 1, 2].map(|k| if all[k] > 0.0 { off[k] / all[k] } else { 0.0 });
+        shares.into_iter().fold(0.0, f64::max)
     }
 
     /// Returns L1 + L2 of facet `i` toward the eye.

@@ -25,7 +25,7 @@ pub fn path(folder: &Path, scene: &Scene, time_s: f64, pixels: &Pixels) -> PathB
 }
 
 /// Reads a file; none if it is not there or damaged. *Shape*: little-endian f64, the number of
-/// facets, three numbers a facet, then five a second reflection.
+/// facets, the grid's error, three numbers a facet, then five a second reflection.
 pub fn read(path: &Path, n_facets: u64) -> Option<Light> {
     let bytes = input_file::read(path, LARGEST_FILE).ok()?;
     let (head, numbers) = bytes.split_at_checked(N_DIGEST)?;
@@ -34,8 +34,8 @@ pub fn read(path: &Path, n_facets: u64) -> Option<Light> {
     }
     let value = |b: &[u8]| b.try_into().map(f64::from_le_bytes).ok();
     let values: Vec<f64> = numbers.chunks_exact(8).map(value).collect::<Option<_>>()?;
-    let (n, rest) = values.split_first()?;
-    let n = *n as usize;
+    let ([n, grid_error], rest) = values.split_first_chunk()?;
+    let (n, grid_error) = (*n as usize, *grid_error);
     if n != 0 && n as u64 != n_facets {
         return None;
     }
@@ -45,7 +45,7 @@ pub fn read(path: &Path, n_facets: u64) -> Option<Light> {
         .chunks_exact(5)
         .map(|v| (v[0] as u32, (DVec3::from_slice(&v[1..4]), v[4])))
         .collect();
-    Some(Light { first, second })
+    Some(Light { first, second, grid_error })
 }
 
 /// Writes a file. One that cannot be written only costs time.
@@ -53,7 +53,8 @@ pub fn write(path: &Path, light: &Light) {
     let first = light.first.iter().flat_map(|l| l.to_array());
     let second =
         light.second.iter().flat_map(|(i, (l, error))| [f64::from(*i), l.x, l.y, l.z, *error]);
-    let numbers = std::iter::once(light.first.len() as f64).chain(first).chain(second);
+    let head = [light.first.len() as f64, light.grid_error];
+    let numbers = head.into_iter().chain(first).chain(second);
     let bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
     let _ = path.parent().map(fs::create_dir_all);
     let _ = write_atomic(path, |file| {

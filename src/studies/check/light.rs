@@ -66,6 +66,8 @@ pub struct Light {
     pub first: Vec<DVec3>,
     /// Second reflection of some facets, with its estimated error.
     pub second: BTreeMap<u32, (DVec3, f64)>,
+    /// The frame's [`FrameReference::grid_error`].
+    pub grid_error: f64,
 }
 
 impl Light {
@@ -77,7 +79,8 @@ impl Light {
         second: &SecondOf<'_>,
         budget: Duration,
     ) -> Light {
-        let mut light = Light { first: frame.radiance.clone(), second: BTreeMap::new() };
+        let (first, grid_error) = (frame.radiance.clone(), frame.grid_error);
+        let mut light = Light { first, second: BTreeMap::new(), grid_error };
         let begin = Instant::now();
         let n_least = N_LEAST.min(plan.drawn.len());
         light.add(second, plan.drawn[..n_least].iter().flat_map(|(_, facets)| *facets));

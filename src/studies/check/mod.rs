@@ -132,9 +132,10 @@ impl<'a> Drawing<'a> {
             Some(light) => light::compare(&self.shares, &self.plan, &by_device, light),
             None => vec![None; self.shares.len()],
         };
-        let is_light_checked = is_lit && light.is_some();
-        let light_bound = is_light_checked
-            .then(|| bound::light((exact, device.time_s), &self.shares, &by_device));
+        let light_bound = light.filter(|_| is_lit).map(|light| {
+            let of = (exact, device.time_s, light.grid_error);
+            bound::light(of, &self.shares, &by_device)
+        });
         let off = differences(&device.rgba, &drawn);
         let samples: Vec<Samples> = light_found
             .iter()

@@ -6,7 +6,9 @@ use std::fs;
 
 use nimbus::io::scene_file::load;
 use nimbus::model::scene::Scene;
-use nimbus::reference::picture::{Pixels, Reference, ReferenceKind};
+use nimbus::reference::picture::{
+    Emitters, FrameReference, Pixels, Reference, ReferenceKind, pixel_shares,
+};
 
 fn scene(text: &str, points: &str) -> Scene {
     let dir = tempfile::tempdir().unwrap();
@@ -152,4 +154,25 @@ fn light_through_a_finer_grid_comes_nearer_to_the_closed_form() {
     let found = [8, 16, 32].map(rmse);
     assert!(found[0] > 2.5 * found[1] && found[1] > 2.0 * found[2] && found[2] > 0.0, "{found:?}");
     assert!(found[2] < 5e-3, "{found:?}");
+}
+
+#[test]
+fn a_picture_is_the_sum_of_its_facets_shares() {
+    for (file, n_pixels) in [("hello", 300), ("study-light", 300), ("static", 300), ("puff", 60)] {
+        let path = format!("scenes/{file}.toml");
+        let scene = load(path.as_ref(), &["lighting.grid=16".to_owned()], None).unwrap().scene;
+        let scene = &ReferenceKind::without_approximations(&scene);
+        let pixels = Pixels::sample(scene.film.width, scene.film.height, n_pixels);
+        let drawn = ReferenceKind::Thin.render(scene, 0.0, &pixels, &|_, _| ()).unwrap().rgba;
+        let frame = FrameReference::new(scene, 0.0).unwrap();
+        let radiance = Emitters::radiance(scene, &frame);
+        let shares = pixel_shares(scene, &frame, &Emitters::new(scene, &frame), &pixels);
+        for (k, (drawn, shares)) in drawn.iter().zip(&shares).enumerate() {
+            let summed = shares.color(&radiance);
+            let off = (0..4).map(|i| (drawn[i] - summed[i]).abs()).fold(0.0, f64::max);
+            // Some hundred layers of f64.
+            assert!(off < 1e-12, "{file}, pixel {k}: {drawn:?} {summed:?}");
+        }
+        assert!(shares.iter().any(|s| s.of.len() > 3), "{file}");
+    }
 }

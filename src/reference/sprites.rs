@@ -295,6 +295,30 @@ mod tests {
     };
 
     #[test]
+    fn shares_are_those_of_opacities_near_before_far() {
+        // α = ½ of both blobs: the near one has ½, the far one ½ of what is left, the background
+        // the rest.
+        let kappa = std::f64::consts::LN_2 / (SQRT_TAU * 0.25);
+        let at = |z: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
+        let blobs = [at(2.0), at(4.0)];
+        let sprites = Sprites { blobs: &blobs, radiance: &[], order: &[1, 0], factor: None };
+        let of = |depth: f64| {
+            let raster = Raster { first: [0, 0], n_columns: 1, cell: 1, at: &[[0, 0]] };
+            let behind = OpaquePixel { depth, ..OpaquePixel::EMPTY };
+            shares_at(&VIEW, &raster, &[behind], &sprites).remove(0)
+        };
+        let is = |found: Shares, blobs: &[(u32, f64)], behind: f64| {
+            let same = |(a, b): (&(u32, f64), &(u32, f64))| a.0 == b.0 && (a.1 - b.1).abs() < 1e-15;
+            found.blobs.len() == blobs.len()
+                && found.blobs.iter().zip(blobs).all(same)
+                && (found.behind - behind).abs() < 1e-15
+        };
+        assert!(is(of(5.0), &[(1, 0.25), (0, 0.5)], 0.25));
+        // An opaque pixel between them hides the far one.
+        assert!(is(of(3.0), &[(0, 0.5)], 0.5) && is(of(1.0), &[], 1.0));
+    }
+
+    #[test]
     fn the_background_shows_through_and_hides() {
         // α = 1 − e^{−ln 2} = ½ through the centres; colours (1, 0, 0) at depth 2 and (0, 1, 0) at
         // depth 4.

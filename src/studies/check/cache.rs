@@ -62,3 +62,28 @@ pub fn write(path: &Path, light: &Light) {
         file.write_all(&bytes)
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_is_read_back_and_a_damaged_file_is_not() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.light");
+        let second = BTreeMap::from([(1, (DVec3::new(0.1, -2.0, 1e-300), 1e-7))]);
+        let first = vec![DVec3::ONE, DVec3::new(f64::MAX, 0.3, 0.4)];
+        let light = Light { first, second, grid_error: 0.25 };
+        write(&path, &light);
+        assert_eq!(read(&path, 2), Some(light));
+        // Of another scene, cut off, and with a flipped bit.
+        assert_eq!(read(&path, 3), None);
+        let mut bytes = fs::read(&path).unwrap();
+        fs::write(&path, &bytes[..bytes.len() - 8]).unwrap();
+        assert_eq!(read(&path, 2), None);
+        let n = bytes.len();
+        bytes[n - 3] ^= 1;
+        fs::write(&path, &bytes).unwrap();
+        assert_eq!((read(&path, 2), read(&dir.path().join("none"), 2)), (None, None));
+    }
+}

@@ -175,3 +175,63 @@ pub fn rms(found: &[Found]) -> f64 {
     // The mean of few products can be below 0. NaN stays, since it is no right light.
     if mean < 0.0 { 0.0 } else { mean.sqrt() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pixels of four facets each with uneven shares, and the light of a device and in f64.
+    fn pixels(n: u32) -> (Vec<PixelShares>, Vec<[DVec3; 2]>, Light) {
+        let share = |k: u32| (0..4).map(move |i| ((k + i) % 50, 0.1 + 0.2 * f64::from(i)));
+        let shares = (0..n).map(|k| PixelShares { of: share(k).collect(), alpha: 1.0 }).collect();
+        let value = |i: u32, f: f64| DVec3::splat((f64::from(i) * f).sin());
+        let by_device = (0..50).map(|i| [value(i, 0.3), value(i, 0.7)]).collect();
+        let first = (0..50).map(|i| value(i, 0.3) + 0.01).collect();
+        let second = (0..50).map(|i| (i, (value(i, 0.7) + 0.05 * value(i, 1.3), 1e-6))).collect();
+        (shares, by_device, Light { first, second, grid_error: 0.0 })
+    }
+
+    /// Mean square over the first three numbers of four.
+    fn mean_square(of: impl Iterator<Item = DVec3>) -> f64 {
+        let (n, sum) = of.fold((0, 0.0), |(n, sum), v| (n + 1, sum + v.length_squared() / 4.0));
+        sum / f64::from(n)
+    }
+
+    #[test]
+    fn drawn_facets_estimate_the_square_of_the_whole_difference() {
+        let (shares, by_device, light) = pixels(20_000);
+        let plan = Plan::new(&shares);
+        assert!(plan.is_whole(&light));
+        let off = |i: usize| {
+            let [first, second] = by_device[i];
+            first + second - light.first[i] - light.second[&(i as u32)].0
+        };
+        let exact = mean_square(
+            shares.iter().map(|s| s.of.iter().map(|&(i, share)| share * off(i as usize)).sum()),
+        );
+        let whole = rms(&compare(&shares, &plan, &by_device, &light)).powi(2);
+        assert!((whole - exact).abs() < 1e-12 * exact, "{whole} {exact}");
+        // A facet that no pixel has drawn makes the light incomplete without changing the samples.
+        let mut partial = plan.clone();
+        partial.seen.insert(999);
+        let found = compare(&shares, &partial, &by_device, &light);
+        assert!(!partial.is_whole(&light) && found.iter().all(Option::is_some));
+        let sampled = rms(&found).powi(2);
+        assert!((sampled - exact).abs() < 0.05 * exact, "{sampled} {exact}");
+        // The square of one estimate would have its variance in it.
+        let biased = mean_square(found.iter().flatten().map(|[a, _]| DVec3::from_slice(&a[..3])));
+        assert!(biased > 1.2 * exact, "{biased} {exact}");
+    }
+
+    #[test]
+    fn facets_that_were_not_computed_leave_their_pixels_out() {
+        let (shares, by_device, mut light) = pixels(100);
+        let plan = Plan::new(&shares);
+        light.second.retain(|i, _| *i < 25);
+        let n_found = compare(&shares, &plan, &by_device, &light).iter().flatten().count();
+        assert!(n_found > 20 && n_found < 80, "{n_found}");
+        // Light that is no number is no right light.
+        light.first[3] = DVec3::NAN;
+        assert!(rms(&compare(&shares, &plan, &by_device, &light)).is_nan());
+    }
+}

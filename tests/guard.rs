@@ -234,8 +234,8 @@ fn messages(scene: &str, barriers: Barriers) -> String {
 
 #[test]
 fn every_missing_barrier_is_found() {
-    // Those that both the layer of Vulkan 1.3.239 and that of 1.4.309 see. The newer one does not
-    // see all that the older one does, such as those of contract and cull.
+    // The layers of Vulkan 1.3.239 and 1.4.309 both see these. The newer one does not see those of
+    // contract and cull.
     const CASES: [&str; 8] =
         ["place", "grid", "facets", "transmit", "first", "second", "sort", "tiles"];
     for scene in ["hello", "materials"] {

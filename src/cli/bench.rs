@@ -151,7 +151,10 @@ fn bench_scene(
     }
     let begin = Instant::now();
     let ended = time(stage, &recorder, context.stop, &outcome);
-    bench_check::run(&recorder, begin.elapsed(), context.stop, &outcome);
+    // After a failure the device may be lost or hung.
+    if ended.failure.is_none() {
+        bench_check::run(&recorder, begin.elapsed(), context.stop, &outcome);
+    }
     keeping.finish();
     let outcome = std::mem::take(&mut *blocks::lock(&outcome));
     let Finished { stage, failure } = ended;

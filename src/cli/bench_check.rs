@@ -53,7 +53,7 @@ pub fn run(recorder: &Recorder, timed: Duration, stop: &AtomicBool, outcome: &Mu
         }
     }
     if !stop.load(Ordering::Relaxed) {
-        let stages = bench_stages::run(&device_choice(&args.options), &recorder.info, stop, &|| ());
+        let stages = bench_stages::run(&device_choice(&args.options), &recorder.info, stop);
         blocks::lock(outcome).stages = stages.unwrap_or_else(|error| {
             say!("warning: the device's stages could not be checked: {error}");
             None
@@ -66,8 +66,8 @@ fn named(check: &Check, loop_name: &str, reason: String) -> String {
     if check.is_wrong() { format!("loop {loop_name}: {reason}") } else { reason }
 }
 
-/// Returns the error that a bench ends with whose device did not execute all of `n` submissions,
-/// but `missed` some; none without a check.
+/// Returns the error of a bench whose device left out `missed` of `n` submissions; none if it left
+/// out none, or without a check.
 pub fn not_executed(args: &BenchArgs, (n, missed): (u64, u64)) -> Option<Error> {
     (missed > 0 && !args.no_check).then(|| Error::Check {
         what: format!(
@@ -77,8 +77,7 @@ pub fn not_executed(args: &BenchArgs, (n, missed): (u64, u64)) -> Option<Error> 
     })
 }
 
-/// Returns the error that a bench ends with whose picture or stages are wrong; none if they are
-/// right.
+/// Returns the error of a bench whose picture or stages are wrong; none if they are right.
 pub fn wrong(outcome: &Outcome, cases: &[Case]) -> Option<Error> {
     let Some((i, check)) = outcome.checks.iter().find(|(_, check)| check.is_wrong()) else {
         let stages = outcome.stages.as_ref().filter(|stages| !stages.failed.is_empty())?;

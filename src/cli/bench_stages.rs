@@ -1,7 +1,6 @@
-//! Checks the stages that a picture is made of, beside the picture: an error that one scene hides
-//! would show in another one.
+//! Checks the stages that make a picture, beside the picture: one scene may hide an error that
+//! another one shows.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -12,7 +11,7 @@ use crate::error::Result;
 use crate::frame::DeviceChoice;
 use crate::gpu::{DeviceInfo, cache_folder, hex};
 use crate::io::atomic::write_atomic;
-use crate::stress::{Case, StressContext, Verdict, cases};
+use crate::stress::{Case, StressContext, cases};
 use crate::timing::check::Stages;
 use crate::timing::machine;
 
@@ -25,12 +24,7 @@ const STAGES: [&str; 4] = ["functions/", "brdf/", "generation/", "transport/sum"
 ///
 /// # Errors
 /// Fails if the device cannot be opened again or is lost.
-pub fn run(
-    choice: &DeviceChoice,
-    info: &DeviceInfo,
-    stop: &AtomicBool,
-    tick: &dyn Fn(),
-) -> Result<Option<Stages>> {
+pub fn run(choice: &DeviceChoice, info: &DeviceInfo, stop: &AtomicBool) -> Result<Option<Stages>> {
     let begin = Instant::now();
     let is_stage = |case: &Case| STAGES.iter().any(|stage| case.name.starts_with(stage));
     let chosen: Vec<Case> = cases().into_iter().filter(is_stage).collect();
@@ -46,19 +40,17 @@ pub fn run(
         return Ok(Some(done(vec![], true)));
     }
     let mut context = StressContext::open(choice)?;
-    let mut verdicts: BTreeMap<String, Verdict> = BTreeMap::new();
+    let mut failed = Vec::new();
     for case in &chosen {
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
         }
         let outcome = case.run(&mut context);
-        verdicts.insert(outcome.name, outcome.verdict);
-        tick();
+        if outcome.verdict.is_bad() {
+            failed.push(outcome.name);
+        }
     }
     context.close()?;
-    let is_bad = |v: &Verdict| matches!(v, Verdict::Failed | Verdict::Broken);
-    let failed: Vec<String> =
-        verdicts.into_iter().filter(|(_, v)| is_bad(v)).map(|(name, _)| name).collect();
     if let (true, Some(mark)) = (failed.is_empty(), mark) {
         // A mark that cannot be written only costs time.
         let _ = mark.parent().map(fs::create_dir_all);

@@ -236,7 +236,7 @@ fn word(verdict: Verdict) -> &'static str {
 
 /// Fails if a case failed.
 fn judged(cases: &[Outcome]) -> Result<()> {
-    let bad = cases.iter().filter(|o| matches!(o.verdict, Verdict::Failed | Verdict::Broken));
+    let bad = cases.iter().filter(|o| o.verdict.is_bad());
     let bad: Vec<&str> = bad.map(|o| o.name.as_str()).collect();
     if bad.is_empty() {
         return Ok(());

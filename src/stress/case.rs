@@ -186,6 +186,13 @@ pub enum Verdict {
     NotHere,
 }
 
+impl Verdict {
+    /// Returns whether the device, or the case itself, is at fault.
+    pub fn is_bad(self) -> bool {
+        matches!(self, Verdict::Failed | Verdict::Broken)
+    }
+}
+
 /// A case that was run, with its result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {

@@ -57,8 +57,8 @@ pub fn picture_error(
     Some(PictureError { rmse, max: whole.max_abs, relmse: whole.rel_mse, is_resolved })
 }
 
-/// What is known of the difference of one pixel: that of its drawing, and two independent estimates
-/// of that of its light, if there are any.
+/// The difference of one pixel by its drawing, and two independent estimates of the difference by
+/// its light, if there are any.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Samples {
     drawing: [f64; 4],

@@ -79,9 +79,9 @@ pub struct Outcome {
     pub counts: BTreeMap<usize, Counts>,
     /// The last frames of the blocks, to be checked; one of several with the same bytes.
     pub drawn: Vec<DevicePicture>,
-    /// What was found about the device's stages, if it was asked for.
+    /// The check of the device's stages, if it was asked for.
     pub stages: Option<Stages>,
-    /// What checks found, by case.
+    /// The checks of pictures, by case.
     pub checks: BTreeMap<usize, Check>,
     /// Whether Ctrl-C came before the end.
     pub interrupted: bool,

@@ -1,4 +1,4 @@
-//! What was found about the picture that a bench timed.
+//! The records of a check: are the pictures that a bench timed right?
 
 use std::sync::Arc;
 
@@ -71,9 +71,9 @@ pub struct DrawingCheck {
     pub bound: f64,
     /// Pixels that show something.
     pub n_shown: usize,
-    /// Those of which a number differs by more than its bound.
+    /// Shown pixels of which a number differs by more than its bound.
     pub n_beyond: usize,
-    /// Most of them that are right.
+    /// The greatest number of such pixels in a right picture.
     pub most_beyond: usize,
 }
 
@@ -82,7 +82,7 @@ pub struct DrawingCheck {
 pub struct Check {
     /// The answer.
     pub verdict: CheckVerdict,
-    /// What is wrong, or why nothing, or not the light, was checked.
+    /// The fault of a wrong picture; or why a picture, or its light, was not checked.
     pub reason: Option<String>,
     /// Number of the frame, the last of a block; null if nothing was checked.
     pub frame: Option<u32>,

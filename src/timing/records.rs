@@ -110,7 +110,7 @@ pub struct Case {
     /// moves, the one without skipping. Null if that loop has no timed frame.
     #[serde(default)]
     pub figure: Option<String>,
-    /// What was found about its pictures. Null in results of versions that did not check them.
+    /// The check of its pictures. Null in results of versions that did not check them.
     #[serde(default)]
     pub check: Option<Check>,
 }

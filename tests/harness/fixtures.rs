@@ -52,8 +52,8 @@ impl Fixtures {
     pub fn new() -> Fixtures {
         let folder = || tempfile::tempdir().expect("a folder");
         let fixtures = Fixtures { dir: folder(), cache: folder() };
-        // Compiling shaders takes most of the time of a first run, and checking the device's stages
-        // some of it, so that all tests share caches of both, which have them by content.
+        // A first run compiles shaders and checks the device's stages, which takes most of its
+        // time. All tests share the caches of both, which keep them by content.
         for name in ["spirv", "stages"] {
             let shared = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
             fs::create_dir_all(&shared).expect("room");

@@ -7,11 +7,11 @@ use super::error_estimate::{ErrorEstimate, root_mean_square};
 use super::frame::FrameReference;
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
-use super::sprites::{drawn_blobs, with_textures};
+use super::sprites::{drawn_blobs, raster, with_textures};
 use crate::model::scene::Scene;
 use crate::reference::composite::OpaquePixel;
 use crate::reference::parallel::parallel_map;
-use crate::reference::sprites::{self, Raster, Sprites};
+use crate::reference::sprites::{self, Sprites};
 use crate::reference::view::View;
 use crate::reference::volume::{Pixel, Volume};
 
@@ -104,8 +104,7 @@ fn thin(
     on_progress: OnProgress,
 ) -> Vec<[f64; 4]> {
     let (blobs, order) = drawn_blobs(scene, frame);
-    let Pixels { tile, cell, ref at, .. } = *pixels;
-    let raster = Raster { first: [tile.left, tile.top], n_columns: pixels.n_columns(), cell, at };
+    let raster = raster(pixels);
     with_textures(scene, frame, view, |factor| {
         let sprites = Sprites { blobs: &blobs, radiance, order: &order, factor };
         let on_row = |n| on_progress(RenderStage::Drawing, n);

@@ -7,13 +7,13 @@ use super::background::{solid_radiance, view};
 use super::frame::FrameReference;
 use super::local_scene;
 use super::pixels::Pixels;
-use super::sprites::{drawn_blobs, set_order, with_textures};
+use super::sprites::{drawn_blobs, raster, set_order, with_textures};
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::terrain::Terrain;
 use crate::reference::Blob;
 use crate::reference::composite::{OpaquePixel, Rounding};
 use crate::reference::parallel::parallel_map;
-use crate::reference::sprites::{self, Bounded, Raster, Sprites};
+use crate::reference::sprites::{self, Bounded, Sprites};
 use crate::reference::view::View;
 use crate::reference::{surfaces, terrain};
 
@@ -79,8 +79,7 @@ pub fn pixel_shares(
     let view = view(scene, frame);
     let (opaque, behind) = solid_shares(scene, frame, &view, pixels);
     let (blobs, order) = drawn_blobs(scene, frame);
-    let Pixels { tile, cell, ref at, .. } = *pixels;
-    let raster = Raster { first: [tile.left, tile.top], n_columns: pixels.n_columns(), cell, at };
+    let raster = raster(pixels);
     let found = with_textures(scene, frame, &view, |factor| {
         let sprites = Sprites { blobs: &blobs, radiance: &[], order: &order, factor };
         sprites::shares_at(&view, &raster, &opaque, &sprites)
@@ -149,9 +148,9 @@ fn solid_shares(
     seen.into_iter().unzip()
 }
 
-/// Returns the picture of `pixels`, moved by `shift` pixels to the right and down, with the drawing
-/// settings of `scene` where emitters have `radiance`; and by how much a device's picture may
-/// differ because of rounding.
+/// Returns the picture of `pixels` with the drawing settings of `scene` where emitters have
+/// `radiance`, and by how much a device's picture may differ because of rounding. `shift` moves the
+/// pixels to the right and down.
 pub fn drawn_by_settings(
     scene: &Scene,
     frame: &FrameReference,
@@ -174,8 +173,7 @@ pub fn drawn_by_settings(
     }
     let order = set_order(scene, frame, &blobs);
     let radiance = emitters.of_particles(radiance);
-    let Pixels { tile, cell, ref at, .. } = *pixels;
-    let raster = Raster { first: [tile.left, tile.top], n_columns: pixels.n_columns(), cell, at };
+    let raster = raster(pixels);
     with_textures(scene, frame, &view, |factor| {
         let sprites = Sprites { blobs: &blobs, radiance: &radiance, order: &order, factor };
         sprites::render_over_at(&view, &raster, &opaque, &sprites, &rounding)

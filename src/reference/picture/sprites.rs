@@ -3,14 +3,21 @@
 use glam::DVec3;
 
 use super::frame::FrameReference;
+use super::pixels::Pixels;
 use crate::model::cloud::Group;
 use crate::model::count::MIN_DRAWN;
 use crate::model::frame_state::FrameState;
 use crate::model::scene::Scene;
-use crate::reference::sprites::Factor;
+use crate::reference::sprites::{Factor, Raster};
 use crate::reference::texture::{Pool, SplatTexture, Textured};
 use crate::reference::view::View;
 use crate::reference::{Blob, count, place, sort};
+
+/// Returns the pixels as sprites are drawn into them.
+pub(super) fn raster(pixels: &Pixels) -> Raster<'_> {
+    let Pixels { tile, cell, ref at, .. } = *pixels;
+    Raster { first: [tile.left, tile.top], n_columns: pixels.n_columns(), cell, at }
+}
 
 /// Calls `take` with the factor of textures on optical depths; `None` if no cloud is textured.
 pub(super) fn with_textures<T>(

@@ -1,13 +1,15 @@
 //! Compares the pictures that a bench timed with their reference in f64, within seconds.
 //!
 //! The reference is "thin" ([`crate::reference::picture::ReferenceKind`]). A picture is linear in
-//! the radiance of its facets, so its difference from the reference is the sum of two: the drawing,
-//! which is the difference from the device's own light drawn in f64, and the light, which is that
-//! of the device less that in f64, drawn in f64. The first costs little. The second needs the
-//! second reflection of every facet that is seen, which may take hours; where it would, two facets
-//! of a pixel are drawn at random by their share in it. The product of the two estimates has the
-//! square of the difference as its mean, so that the root mean square has no bias from the few
-//! samples.
+//! the radiance of its facets, so its difference from the reference is the sum of two:
+//!
+//! - the drawing: the picture less the device's own light, drawn in f64. It costs little.
+//! - the light: the device's light less that in f64, both drawn in f64. It needs the second
+//!   reflection of every facet that is seen, which may take hours.
+//!
+//! Where time is short, the light is estimated. Two facets of a pixel are picked at random, each
+//! with its share in the pixel as probability, and give two estimates of the difference. The mean
+//! of their product is the square of the difference, so that the root mean square is unbiased.
 
 mod bound;
 mod cache;
@@ -21,7 +23,7 @@ use glam::{DVec2, DVec3};
 
 use self::light::{Light, Plan};
 use self::numbers::{differences, rms, sums};
-use super::picture_error::{Samples, magnitude, rmse_of};
+use super::picture_error::{Samples, rmse_of};
 use crate::error::Result;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::picture::{
@@ -110,7 +112,8 @@ impl<'a> Drawing<'a> {
         Drawing { device, exact, frame, pixels, emitters, shares, plan }
     }
 
-    /// Compares the picture with the frame in `light`, without one with that in the device's light.
+    /// Compares the picture with the frame in `light`. Without one, the device's light counts as
+    /// right.
     fn compare(&self, light: Option<&Light>) -> Check {
         let Drawing { device, exact, frame, pixels, .. } = *self;
         let is_lit = exact.lighting.mode != LightingMode::None;
@@ -155,7 +158,7 @@ impl<'a> Drawing<'a> {
             frame: Some(device.i_frame),
             n_pixels: pixels.at.len(),
             max: Some(samples.iter().map(Samples::greatest).fold(0.0, f64::max)),
-            magnitude: Some(magnitude(&reference)),
+            magnitude: Some(rms(&reference)),
             drawing: Some(drawing),
             settings_rms: Some(settings_rms),
             light: light_bound.map(|bound| Bounded { rms: light_rms, bound }),
@@ -167,6 +170,13 @@ impl<'a> Drawing<'a> {
         check.reason = reason(&check);
         if check.reason.is_some() {
             check.verdict = CheckVerdict::Wrong;
+        }
+        // JSON has neither NaN nor infinity.
+        let is_finite = |rms: f64, bound: f64| rms.is_finite() && bound.is_finite();
+        check.drawing = check.drawing.filter(|d| is_finite(d.rms, d.bound));
+        check.light = check.light.filter(|l| is_finite(l.rms, l.bound));
+        for of in [&mut check.max, &mut check.magnitude, &mut check.settings_rms] {
+            *of = of.filter(|v| v.is_finite());
         }
         check
     }

@@ -1,7 +1,7 @@
 //! Studies of run time against error.
 //!
-//! An [`error`] study draws and times every setting of a scene's knobs. A [`ledger`] lists the error
-//! of every approximation, each against the next better picture. Both measure pictures by
+//! An [`error`] study draws and times every setting of a scene's knobs. A [`ledger`] lists the
+//! error of every approximation, each against the next better picture. Both measure pictures by
 //! [`picture_error`] against references in f64, which [`reference_cache`] keeps between runs, and
 //! begin their records with [`provenance`]. A [`check`] compares the pictures that a bench timed.
 

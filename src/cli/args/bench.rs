@@ -86,7 +86,7 @@ pub struct BenchArgs {
     /// Replace existing results
     #[arg(long)]
     pub force: bool,
-    /// Do not check whether the device's pictures are right; the results say that nothing was checked
+    /// Do not check whether the device's pictures are right; the results then say so
     #[arg(long)]
     pub no_check: bool,
     /// Print run.json instead of the table

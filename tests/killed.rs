@@ -75,7 +75,7 @@ fn generation(folder: &Path) -> Result<u32, String> {
     if recorded.run != run(k) {
         return Err(format!("run.json is not that of generation {k}"));
     }
-    let times = &recorded.modes[0].measures[0].ms;
+    let times = recorded.modes[0].measures[0].ms();
     match times.iter().find(|ms| **ms != f64::from(k)) {
         Some(other) => Err(format!("run.json of generation {k} beside frames of {other}")),
         None if times.len() == n_rows(k) as usize => Ok(k),

@@ -13,7 +13,8 @@ use nimbus::measure::zones::{Collected, Zones};
 use nimbus::model::scene::Threading;
 use nimbus::timing::blocks::{self, BenchPlan, Sample};
 use nimbus::timing::cases::{LoopChoice, cases};
-use nimbus::timing::trace;
+use nimbus::timing::schedule::Rounds;
+use nimbus::timing::{running, trace};
 use serde_json::Value;
 use tracing_subscriber::layer::SubscriberExt;
 
@@ -35,10 +36,11 @@ fn benched(zones: &Zones) -> (Vec<Sample>, Stage, Collected) {
     let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
     let stage = Stage::new(cases[0].scene.clone(), &choice, false).expect("a stage");
     zones.take();
+    let rounds = Rounds::Fixed(1);
     let plan =
-        BenchPlan { n_warm_up: 0, n_rounds: 1, hash_frames: false, pictures: false, checked: None };
+        BenchPlan { n_warm_up: 0, rounds, hash_frames: false, pictures: false, checked: None };
     let outcome = Mutex::default();
-    let ran = blocks::run(stage, &cases, &plan, &AtomicBool::new(false), &outcome, &mut || {});
+    let ran = running::run(stage, &cases, &plan, &AtomicBool::new(false), &outcome, &mut |_| {});
     assert_eq!(ran.failure, None);
     let samples = std::mem::take(&mut blocks::lock(&outcome).samples);
     (samples, ran.stage.expect("a stage"), zones.take())

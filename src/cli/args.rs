@@ -24,7 +24,7 @@ pub use farm::{
 pub use farm_plan::{CalibrateArgs, FormatArg, PlanArgs, Span};
 pub use inspect::{BasisArg, InspectArgs};
 pub use render::RenderArgs;
-pub use results::{CompareArgs, ReportArgs};
+pub use results::{CompareArgs, HistoryArgs, ReportArgs};
 pub use scene::{DevicesArgs, SceneArgs};
 pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs};
@@ -84,16 +84,18 @@ pub enum Command {
     ///
     /// For two results folders: the medians of A and B, their ratio B / A with a 95 % interval, and
     /// a verdict, for every loop that both ran and for frame, game step, render step, GPU and each
-    /// pass. "faster" and "slower" mean that the interval excludes 1. "no difference found" means
-    /// that it contains 1, which is not the same as "equal": with more frames it gets narrower.
+    /// pass; and the errors of their pictures. "the same" means that the whole interval lies within
+    /// --margin, "faster" and "slower" that it lies beyond. "undecided" means that it crosses the
+    /// margin; the table says how many more frames would decide. For more than two folders: a
+    /// matrix of the frame times, each run against each.
     ///
     /// Only `frame` is the headline. The other rows are not corrected for many comparisons: of
-    /// twenty that are equal, one will seem to differ.
+    /// twenty, one will be beyond its interval.
     ///
-    /// The interval (block bootstrap over the frames of frames.csv, which draws runs of √n
-    /// neighbours together) covers the noise within the two runs. It does not cover what changes
-    /// from one start to the next, such as other programs on the machine. To see that, time A twice
-    /// and compare the two.
+    /// Intervals compare blocks of frames where there are eight or more (bench --precision, or
+    /// --repeat 8), and else runs of √n neighbouring frames (block bootstrap). They cover the noise
+    /// within the runs. They do not cover what changes from one start to the next, such as other
+    /// programs on the machine. To see that, time A twice and compare the two.
     ///
     /// For two pictures of one size and kind (.exr or .png), A being the reference: RMSE, greatest
     /// difference, relMSE and PSNR of the stored numbers (linear in an EXR, sRGB in 0..1 in a PNG),
@@ -101,6 +103,15 @@ pub enum Command {
     /// map). Pixels that are not finite in either picture are counted and left out; for SSIM and
     /// FLIP they are black in both.
     Compare(CompareArgs),
+    /// Find where frame times or errors changed in a series of results
+    ///
+    /// The runs are ordered by the revisions that they measured. A change is a step of the median
+    /// frame time, or of the error, beyond the noise between runs: with three runs or more on each
+    /// side, and so great that a series without a change shows one like it once in a thousand. Each
+    /// has an interval of its size, and the runs that it may lie between. One slow run is no
+    /// change. Of runs with 0.5 % noise between them, a step of 3 % is found with the third run
+    /// after it.
+    History(HistoryArgs),
     /// Measure run time against error over a scene's knobs: how much error does a millisecond buy?
     ///
     /// Every configuration of the knobs is drawn once and compared with a reference in f64. All are

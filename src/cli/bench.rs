@@ -20,10 +20,11 @@ use crate::frame::{Stage, limits};
 use crate::io::console::say;
 use crate::io::result_folder::Existing;
 use crate::measure::zones::Zones;
-use crate::timing::blocks::{self, Finished, Outcome};
+use crate::timing::blocks::{self, Outcome};
 use crate::timing::cases::Case;
 use crate::timing::machine;
 use crate::timing::results::open_results;
+use crate::timing::running::{self, Event, Finished};
 
 /// Readings of the device's clock and the host's, before the frames and again after them.
 const N_CLOCK_READINGS: usize = 8;
@@ -189,9 +190,12 @@ fn time(
     outcome: &Mutex<Outcome>,
 ) -> Finished {
     let Recorder { args, path, cases, plan, .. } = recorder;
-    let n_frames = blocks::n_frames_total(cases, plan);
+    let n_frames = blocks::n_frames_at_least(cases, plan);
     let bar = progress(n_frames, &path.display().to_string(), args.options.quiet);
-    let ended = blocks::run(stage, cases, plan, stop, outcome, &mut || bar.advance());
+    let ended = running::run(stage, cases, plan, stop, outcome, &mut |event| match event {
+        Event::Frame => bar.advance(),
+        Event::More(n) => bar.add_parts(n),
+    });
     drop(bar);
     ended
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::time::Duration;
 
 use super::args::{BenchArgs, SceneArgs, Span, ThreadingArg};
 use super::scene::{load, load_at, warnings};
@@ -15,6 +16,8 @@ use crate::timing::cases::{Case, LoopChoice, cases};
 use crate::timing::limits::{SceneMemory, check_bench, check_cases};
 use crate::timing::names::sweep_text;
 use crate::timing::parts::numbers;
+use crate::timing::precision::Precision;
+use crate::timing::schedule::Rounds;
 use crate::timing::sweep::{Axis, SIZE_KEY, points};
 
 /// The cases of a scene, and its own record.
@@ -69,12 +72,18 @@ pub fn bench_cases(args: &BenchArgs, path: &Path, options: &SceneArgs) -> Result
 /// Returns the blocks that the arguments ask for.
 pub fn plan(args: &BenchArgs) -> BenchPlan {
     BenchPlan {
-        n_warm_up: args.warmup,
-        n_rounds: args.repeat,
+        n_warm_up: args.n_warm_up(),
+        rounds: precision(args).map_or(Rounds::Fixed(args.repeat), Rounds::Until),
         hash_frames: args.hash_frames,
         pictures: args.out.is_some(),
         checked: (!args.no_check).then_some(|w, h| checked_pixels(w, h).at),
     }
+}
+
+/// Returns the precision that the arguments ask for.
+pub fn precision(args: &BenchArgs) -> Option<Precision> {
+    let limit = Duration::from_secs_f64(args.time_limit);
+    args.precision.map(|wanted| Precision { wanted, seed: args.seed, limit })
 }
 
 /// Returns the cases of `--part` after the first of all; all cases without `--part`.
@@ -96,9 +105,13 @@ pub fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Workload)> {
     let [scene] = &args.scenes[..] else {
         return Err(Error::usage(format!("expected one scene, found {}", args.scenes.len())));
     };
+    if args.precision.is_some() {
+        let what = "--precision: the cases of a farm have a number of blocks; use --repeat";
+        return Err(Error::usage(what));
+    }
     let quiet = SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
     let cases = bench_cases(args, scene, &quiet)?.cases;
-    let workload = bench_workload(&cases, args.warmup, args.repeat)?;
+    let workload = bench_workload(&cases, args.n_warm_up(), args.repeat)?;
     Ok((cases.iter().map(Case::name).collect(), workload))
 }
 

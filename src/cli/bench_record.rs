@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use clap::ColorChoice;
 
 use super::args::BenchArgs;
+use super::bench_cases::precision;
 use super::output::{SharedFolder, lock_folder};
 use super::{bench_plot, bench_table, output};
 use crate::error::{Error, Result};
@@ -19,7 +20,7 @@ use crate::timing::cases::Case;
 use crate::timing::frame_rows::FrameTable;
 use crate::timing::json::ResultFile;
 use crate::timing::machine::{self, Clocks};
-use crate::timing::records::Run;
+use crate::timing::records::{PrecisionRecord, Run};
 use crate::timing::results::write_results;
 use crate::timing::trace;
 
@@ -132,6 +133,11 @@ impl Recorder {
             chosen: outcome.chosen.clone(),
             parts: Vec::new(),
             interrupted: is_cut,
+            precision: precision(&self.args).map(|asked| PrecisionRecord {
+                wanted: asked.wanted,
+                seed: asked.seed,
+                limit_s: asked.limit.as_secs_f64(),
+            }),
         }
     }
 

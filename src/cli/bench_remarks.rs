@@ -3,11 +3,13 @@
 use super::output::or_dash;
 use crate::gpu::PassTimes;
 use crate::measure::figure::Figure;
+use crate::measure::stats::extremes;
 use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::check::{Bounded, CheckVerdict};
 use crate::timing::machine::Clocks;
 use crate::timing::overlap::Overlap;
-use crate::timing::records::{Case, Mode, Run, Skipping};
+use crate::timing::precision::Limit;
+use crate::timing::records::{Case, Mode, PrecisionRecord, Run, Skipping};
 use crate::timing::still::{NO_RATIO, StillRemark, empty_frames_text};
 
 /// Returns a time in ms with three decimals.
@@ -205,6 +207,41 @@ pub fn missing_lines(run: &Run) -> String {
         add("saved: - : the loop without skipping was not timed (--no-saved)".to_owned());
     }
     lines.into_iter().map(|line| line + "\n").collect()
+}
+
+/// Returns how narrow the intervals are, if a precision was asked for.
+pub fn precision_lines(run: &Run) -> String {
+    let Some(PrecisionRecord { wanted, limit_s, .. }) = run.precision else { return String::new() };
+    let percent = |share: f64| format!("±{:.2} %", 100.0 * share);
+    let asked = percent(wanted);
+    let cases = || run.cases.iter().filter_map(|case| Some((case, case.precision?)));
+    let mut out = String::new();
+    for (case, reached) in cases().filter(|(_, reached)| reached.ended_by.is_some()) {
+        let name =
+            if case.name().is_empty() { String::new() } else { format!("{}: ", case.name()) };
+        let (found, rounds) = (or_dash(reached.half_width, percent), reached.rounds);
+        let why = match reached.ended_by {
+            Some(Limit::Memory) => "more frames would not fit in memory".to_owned(),
+            _ => format!("further rounds would take longer than --time-limit {limit_s}"),
+        };
+        out += &format!(
+            "{name}PRECISION NOT REACHED: {found} after {rounds} rounds, {asked} wanted; {why}\n"
+        );
+    }
+    let reached = cases().filter(|(_, reached)| reached.ended_by.is_none());
+    let widest = reached.clone().filter_map(|(_, r)| r.half_width).reduce(f64::max);
+    if let Some(widest) = widest {
+        let rounds = reached.map(|(_, r)| r.rounds);
+        let rounds = match extremes(rounds.map(f64::from)) {
+            Some((least, most)) if least < most => format!("{least} to {most} rounds"),
+            Some((_, most)) => format!("{most} rounds"),
+            None => "no round".to_owned(),
+        };
+        let widest = percent(widest);
+        out +=
+            &format!("precision: intervals of {widest} at most after {rounds}, {asked} wanted\n");
+    }
+    out
 }
 
 /// Returns an RMSE with its interval.

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use super::bench_remarks::{
     clocks_line, drawn_line, empty_line, error_lines, latency_line, missing_lines, ms,
-    overlap_lines, skipping_line, spread_lines, still_line, still_lines,
+    overlap_lines, precision_lines, skipping_line, spread_lines, still_line, still_lines,
 };
 use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
 use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::names::loop_name;
-use crate::timing::records::{Block, Case, Measured, Mode, Ratio, Run};
+use crate::timing::records::{Block, Case, Measured, Mode, PrecisionRecord, Ratio, Run};
 use crate::timing::still::skipped_text;
 
 /// Returns the whole text. `same` says for each case whether the last frames of its blocks have the
@@ -54,7 +54,7 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
             "{n_same} of {n_told} cases gave the same last frame in all their blocks, to the byte\n"
         );
     }
-    out + &missing_lines(run) + &clocks_line(&run.clocks)
+    out + &precision_lines(run) + &missing_lines(run) + &clocks_line(&run.clocks)
 }
 
 const DIFFER: &str = "THE LAST FRAMES DIFFER between the blocks\n";
@@ -112,6 +112,16 @@ fn blocks_line(run: &Run) -> String {
         }
     }
     let n = order.len();
+    if let Some(PrecisionRecord { seed, .. }) = run.precision {
+        let cases = if run.cases.len() > 1 {
+            format!("{} cases, ", run.cases.len())
+        } else {
+            String::new()
+        };
+        return format!(
+            "{cases}{n} blocks in random order (--seed {seed}), a part of the frames each"
+        );
+    }
     let n_rounds = n / kinds.len().max(1);
     // A steady drift cancels over a round and its reverse; an odd number of rounds leaves one over.
     let is_balanced = n_rounds.is_multiple_of(2) && n == n_rounds * kinds.len();

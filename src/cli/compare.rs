@@ -1,23 +1,25 @@
 //! `nimbus compare A B`.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::{Value, json};
 
 use super::args::CompareArgs;
-use super::compare_pictures;
 use super::output::{self, or_dash};
+use super::{compare_matrix, compare_pictures};
 use crate::error::{Error, Result};
-use crate::measure::bootstrap::Bootstrap;
+use crate::measure::bootstrap::{Bootstrap, Interval};
 use crate::timing::compare::{
-    Comparison, HEADLINE, MeasureComparison, ModeComparison, few_frames_remark,
+    Comparison, HEADLINE, MeasureComparison, ModeComparison, SizeComparison, few_frames_remark,
 };
 use crate::timing::difference::{Condition, Difference};
 use crate::timing::records::Run;
 use crate::timing::results::{BenchResults, read_results};
+use crate::timing::verdict::Verdict;
 
 /// Version of the output of `--json`. A change of a key or of its meaning raises it.
-const REPORT_SCHEMA: u32 = 2;
+const REPORT_SCHEMA: u32 = 3;
 
 /// Runs `nimbus compare`.
 ///
@@ -27,14 +29,12 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if compare_pictures::has_pictures(args)? {
         return compare_pictures::run(args);
     }
-    let (a, b) = (read_results(&args.a)?, read_results(&args.b)?);
-    let found = Comparison::new(&a, &b);
-    let is_allowed = |d: &&Difference| args.allow.contains(&d.kind);
-    let (allowed, refused): (Vec<&Difference>, Vec<&Difference>) =
-        found.differences.iter().partition(is_allowed);
-    if !refused.is_empty() {
-        return Err(Error::usage(refusal(args, &refused)));
+    if !args.more.is_empty() {
+        return compare_matrix::run(args);
     }
+    let (a, b) = (read_results(&args.a)?, read_results(&args.b)?);
+    let found = Comparison::new(&a, &b, args.margin);
+    let allowed = allowed(args, [&args.a, &args.b], &found.differences)?;
     if found.modes.is_empty() {
         let ran = |of: &BenchResults| {
             of.modes.iter().map(|m| m.name.clone()).collect::<Vec<_>>().join(", ")
@@ -47,20 +47,39 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     let sides = [(&*args.a, &a.run), (&*args.b, &b.run)];
     if !args.json {
-        return output::text(&text(sides, &allowed, &found));
+        return output::text(&text(sides, &allowed, &found, args.margin));
     }
     let [a, b] = sides.map(|(folder, run)| side(folder, run));
     output::object(&json!({
         "schema": REPORT_SCHEMA, "a": a, "b": b, "allowed": allowed,
+        "margin": args.margin,
         "n_resamples": Bootstrap::default().n_resamples,
         // The measure that decides. The others are not corrected for multiple comparisons.
         "headline": HEADLINE,
-        "modes": found.modes, "remarks": found.remarks,
+        "modes": found.modes, "errors": found.errors, "remarks": found.remarks,
     }))
 }
 
+/// Returns the differences of two runs if all of them are allowed.
+///
+/// # Errors
+/// Fails if one is not.
+pub fn allowed<'a>(
+    args: &CompareArgs,
+    folders: [&Path; 2],
+    differences: &'a [Difference],
+) -> Result<Vec<&'a Difference>> {
+    let is_allowed = |d: &&Difference| args.allow.contains(&d.kind);
+    let (allowed, refused): (Vec<&Difference>, Vec<&Difference>) =
+        differences.iter().partition(is_allowed);
+    if !refused.is_empty() {
+        return Err(Error::usage(refusal(args, folders, &refused)));
+    }
+    Ok(allowed)
+}
+
 /// Returns what identifies a compared run.
-fn side(folder: &Path, run: &Run) -> Value {
+pub fn side(folder: &Path, run: &Run) -> Value {
     json!({
         "folder": folder.display().to_string(), "date": run.date, "nimbus": run.nimbus,
         "revision": run.revision,
@@ -70,7 +89,7 @@ fn side(folder: &Path, run: &Run) -> Value {
 }
 
 /// Returns the message about conditions that differ, with the flag that accepts them.
-fn refusal(args: &CompareArgs, refused: &[&Difference]) -> String {
+fn refusal(args: &CompareArgs, [a, b]: [&Path; 2], refused: &[&Difference]) -> String {
     let is_named =
         |kind: &Condition| args.allow.contains(kind) || refused.iter().any(|d| d.kind == *kind);
     let flag = Condition::ALL.into_iter().filter(is_named).map(Condition::name);
@@ -78,8 +97,8 @@ fn refusal(args: &CompareArgs, refused: &[&Difference]) -> String {
     let mut what = format!(
         "{} and {} were measured under different conditions; --allow {flag} compares them all the \
          same",
-        args.a.display(),
-        args.b.display()
+        a.display(),
+        b.display()
     );
     for difference in refused {
         what += &format!("\n  {}", line(difference));
@@ -87,17 +106,28 @@ fn refusal(args: &CompareArgs, refused: &[&Difference]) -> String {
     what
 }
 
-fn line(d: &Difference) -> String {
+/// Returns a difference in words.
+pub fn line(d: &Difference) -> String {
     format!("{}, {}: A {}, B {}", d.kind.name(), d.what, d.a, d.b)
 }
 
+/// Returns the line that names a compared run.
+pub fn side_line(name: &str, folder: &Path, run: &Run) -> String {
+    let (folder, Run { date, nimbus, revision, device, .. }) = (folder.display(), run);
+    let device = format!("{} ({})", device.name, device.driver);
+    format!("{name}  {folder}, {date}, nimbus {nimbus} {revision}, {device}\n")
+}
+
 /// Returns the tables for people.
-fn text(sides: [(&Path, &Run); 2], allowed: &[&Difference], found: &Comparison) -> String {
+fn text(
+    sides: [(&Path, &Run); 2],
+    allowed: &[&Difference],
+    found: &Comparison,
+    margin: f64,
+) -> String {
     let mut out = String::new();
     for (name, (folder, run)) in ["A", "B"].into_iter().zip(sides) {
-        let (folder, Run { date, nimbus, revision, device, .. }) = (folder.display(), run);
-        let device = format!("{} ({})", device.name, device.driver);
-        out += &format!("{name}  {folder}, {date}, nimbus {nimbus} {revision}, {device}\n");
+        out += &side_line(name, folder, run);
     }
     for difference in allowed {
         out += &format!("allowed to differ: {}\n", line(difference));
@@ -108,6 +138,9 @@ fn text(sides: [(&Path, &Run); 2], allowed: &[&Difference], found: &Comparison) 
     for mode in &found.modes {
         out += &format!("\n{}", output::table(&rows(mode)));
     }
+    if !found.errors.is_empty() {
+        out += &format!("\n{}", output::table(&error_rows(&found.errors)));
+    }
     out += &few_frames_remark(&found.modes).map_or(String::new(), |remark| remark + "\n");
     out.push('\n');
     for mode in &found.modes {
@@ -115,7 +148,21 @@ fn text(sides: [(&Path, &Run); 2], allowed: &[&Difference], found: &Comparison) 
             out += &format!("{} frame: {}\n", mode.name, sentence(headline));
         }
     }
-    out + &foot(&found.modes)
+    out + &foot(&found.modes, margin)
+}
+
+fn error_rows(errors: &[SizeComparison]) -> Vec<Vec<String>> {
+    let mut rows = output::header(["RMSE", "A", "B", "B / A", "95 % low", "high", "B is"]);
+    for e in errors {
+        let name = if e.name.is_empty() { "picture" } else { &e.name };
+        let mut row = vec![name.to_owned()];
+        row.extend([e.a, e.b].map(output::scientific));
+        let ends = [|r: Interval| r.estimate, |r: Interval| r.low, |r: Interval| r.high];
+        row.extend(ends.map(|of| or_dash(e.b_by_a, |r| format!("{:.3}", of(r)))));
+        row.push(e.verdict.text().to_owned());
+        rows.push(row);
+    }
+    rows
 }
 
 fn rows(mode: &ModeComparison) -> Vec<Vec<String>> {
@@ -134,14 +181,23 @@ fn rows(mode: &ModeComparison) -> Vec<Vec<String>> {
             number(m.b_by_a.map(|r| r.high)),
             m.n_a.to_string(),
             m.n_b.to_string(),
-            m.verdict.text().to_owned(),
+            verdict_text(m),
         ]);
     }
     rows
 }
 
+/// Returns the verdict in words, with the frames that would decide it.
+pub fn verdict_text(m: &MeasureComparison) -> String {
+    match (m.verdict, m.more_frames) {
+        (Verdict::Undecided, Some(n)) => format!("undecided; about {n} more frames would decide"),
+        (Verdict::Undecided, None) => "undecided: on the margin".to_owned(),
+        (verdict, _) => verdict.text().to_owned(),
+    }
+}
+
 fn sentence(m: &MeasureComparison) -> String {
-    let verdict = m.verdict.text();
+    let verdict = verdict_text(m);
     match m.b_by_a {
         Some(r) => {
             let (estimate, low, high) = (r.estimate, r.low, r.high);
@@ -149,25 +205,38 @@ fn sentence(m: &MeasureComparison) -> String {
                 "B takes {estimate:.3} of A's time (95 % interval {low:.3} to {high:.3}): {verdict}"
             )
         }
-        None => verdict.to_owned(),
+        None => verdict,
     }
 }
 
 /// Returns the note on how the intervals were computed and what they do not cover.
-fn foot(modes: &[ModeComparison]) -> String {
-    let mut lens: Vec<String> =
-        modes.iter().filter_map(|m| Some(m.headline()?.block_len.to_string())).collect();
-    if lens.windows(2).all(|w| w[0] == w[1]) {
-        lens.truncate(1);
+fn foot(modes: &[ModeComparison], margin: f64) -> String {
+    let lens: BTreeSet<Option<usize>> =
+        modes.iter().filter_map(|m| Some(m.headline()?.block_len)).collect();
+    let neighbours: Vec<String> = lens.iter().flatten().map(usize::to_string).collect();
+    let mut how = Vec::new();
+    if lens.contains(&None) {
+        how.push("blocks of frames compared with each other".to_owned());
     }
-    let lens = lens.join(" and ");
+    if !neighbours.is_empty() {
+        how.push(format!(
+            "block bootstrap, {} resamples, ⌈√n⌉ neighbouring frames drawn together (frame: {})",
+            Bootstrap::default().n_resamples,
+            neighbours.join(" and ")
+        ));
+    }
     format!(
-        "\nIntervals: block bootstrap, {} resamples, ⌈√n⌉ neighbouring frames drawn together \
-         (frame: {lens}).\n\
-        They cover the noise within the runs, not the changes from one start to the next. frame \
-        decides; the other\n\
-        rows are not corrected for many comparisons: of twenty equal ones, one will seem to \
-        differ.\n",
-        Bootstrap::default().n_resamples
+        "\nMargin: {}. Intervals: {}.\nThey cover the noise within the runs, not the changes from \
+         one start to the next. frame decides; the other\nrows are not corrected for many \
+         comparisons: of twenty, one will be beyond its interval.\n",
+        percent(margin),
+        how.join("; ")
     )
+}
+
+/// Returns a share as "1 %".
+pub fn percent(share: f64) -> String {
+    // Nine digits show every margin that was typed, and hide its rounding.
+    let digits = format!("{:.9}", 100.0 * share);
+    format!("{} %", digits.trim_end_matches('0').trim_end_matches('.'))
 }

@@ -50,6 +50,10 @@ pub fn has_pictures(args: &CompareArgs) -> Result<bool> {
         (true, true) if !args.allow.is_empty() => {
             Err(Error::usage("--allow is for results folders, not for pictures"))
         }
+        (true, true) if !args.more.is_empty() => {
+            let n = 2 + args.more.len();
+            Err(Error::usage(format!("expected two pictures, found {n} arguments")))
+        }
         (true, true) => Ok(true),
         (false, false) => {
             let is_set = args.output.is_some() || args.pixels_per_degree.is_some();

@@ -13,6 +13,7 @@ mod bench_stages;
 mod bench_table;
 mod clock_locks;
 mod compare;
+mod compare_matrix;
 mod compare_pictures;
 mod devices;
 #[cfg(feature = "window")]
@@ -24,6 +25,7 @@ mod farm;
 mod farm_jobs;
 mod farm_plan;
 mod farm_told;
+mod history;
 mod inspect;
 mod interrupt;
 mod kernels;
@@ -33,6 +35,7 @@ mod progress;
 mod render;
 mod render_reference;
 mod report;
+mod revisions;
 mod scene;
 mod stress;
 #[cfg(feature = "window")]
@@ -97,6 +100,7 @@ fn run(args: &Args, zones: Option<&Zones>) -> Result<()> {
             bench::run(a, &bench::Context { color, stop, zones })
         }
         Command::Compare(a) => compare::run(a),
+        Command::History(a) => history::run(a),
         Command::Error(a) => error::run(a, args.color),
         Command::Ledger(a) => ledger::run(a),
         Command::Report(a) => report::run(a),

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::random::SplitMix64;
 use super::stats::{finite, median_by_selection, percentile};
+use super::student::student_by_normal;
 
 /// An estimate and its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -156,22 +157,6 @@ impl Bootstrap {
             rows.extend((0..wanted).map(|i| (start + i) % n));
         }
     }
-}
-
-/// Returns the 97.5th percentile of Student's distribution divided by that of the normal one.
-///
-/// *Source*: Abramowitz and Stegun 26.7.5, accurate to 1 % from two degrees of freedom on and to
-/// 0.05 % from four.
-fn student_by_normal(degrees: f64) -> f64 {
-    const Z: f64 = 1.959_963_984_540_054;
-    let (z2, v) = (Z * Z, degrees);
-    let terms = [
-        (z2 + 1.0) / 4.0,
-        ((5.0 * z2 + 16.0) * z2 + 3.0) / 96.0,
-        (((3.0 * z2 + 19.0) * z2 + 17.0) * z2 - 15.0) / 384.0,
-        ((((79.0 * z2 + 776.0) * z2 + 1482.0) * z2 - 1920.0) * z2 - 945.0) / 92_160.0,
-    ];
-    1.0 + terms.iter().rev().fold(0.0, |sum, term| (sum + term) / v)
 }
 
 /// Returns the median of the finite `values` at `rows`; NaN for no row.

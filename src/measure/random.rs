@@ -1,9 +1,17 @@
-//! Pseudo-random numbers for resampling.
+//! Pseudo-random numbers for resampling and for random orders.
 
 /// The generator of Steele, Lea and Flood 2014.
 pub(crate) struct SplitMix64(pub(crate) u64);
 
 impl SplitMix64 {
+    /// Returns a generator whose numbers depend on all of `parts`.
+    pub(crate) fn of<const N: usize>(parts: [u64; N]) -> SplitMix64 {
+        parts.into_iter().fold(SplitMix64(0), |mut random, part| {
+            random.0 ^= part;
+            SplitMix64(random.next())
+        })
+    }
+
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -13,8 +21,15 @@ impl SplitMix64 {
     }
 
     /// Returns a uniform number in [0, n), the high half of a product; its bias is below n / 2⁶⁴.
-    pub(super) fn below(&mut self, n: usize) -> usize {
+    pub(crate) fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.next()) * n as u128) >> 64) as usize
+    }
+
+    /// Brings `items` into a random order (Fisher and Yates 1938).
+    pub(crate) fn shuffle<T>(&mut self, items: &mut [T]) {
+        for i in (1..items.len()).rev() {
+            items.swap(i, self.below(i + 1));
+        }
     }
 }
 
@@ -58,6 +73,20 @@ pub(crate) fn frame_times(
         median * (sd * state).exp() * (1.0 + late_by)
     };
     (0..n).map(|_| next()).collect()
+}
+
+/// Returns the times of a block, about 1: those of [`frame_times`] times a factor of the block,
+/// lognormal with standard deviation `of_block` of the logarithm.
+#[cfg(test)]
+pub(crate) fn block_times(
+    random: &mut SplitMix64,
+    n: usize,
+    sd: f64,
+    rho: f64,
+    of_block: f64,
+) -> Vec<f64> {
+    let median = (of_block * random.normal()).exp();
+    frame_times(random, n, median, sd, rho)
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
-//! Decides whether B is faster than A, measure by measure, from the times of single frames.
+//! Compares two results of a bench, measure by measure, from the times of single frames.
 //!
-//! The verdict depends on the ratio of the medians and its 95 % bootstrap interval: "faster" or
-//! "slower" if the interval excludes 1, else "no difference found", which does not mean "equal".
-//! Only `frame` is the headline; of twenty other measures of two equal runs one will seem to
-//! differ.
+//! A [`Verdict`] depends on the ratio of the medians and its 95 % interval. Only `frame` is the
+//! headline; of twenty other measures of two runs that differ by the margin one will have a wrong
+//! verdict.
 //!
 //! The interval covers the noise within each run, from frame to frame. It does not cover what
 //! changes from one start of the program to the next, such as memory layout or other processes. The
@@ -17,49 +16,22 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use super::difference::{Difference, differences, remarks};
-use super::intervals::{N_FRAMES_NEEDED, ratio_interval, spread_of_blocks};
+use super::intervals::{
+    N_FRAMES_NEEDED, Pairing, block_len, ratio_interval, spread_of_blocks, values,
+};
 use super::records::Mode;
 use super::results::{BenchResults, TimedMode};
-use crate::measure::bootstrap::{Bootstrap, Interval};
+use super::verdict::{Verdict, more_frames};
+use crate::measure::blocked::Block;
+use crate::measure::bootstrap::Interval;
 use crate::measure::stats::median;
+
+mod sizes;
+
+pub use sizes::SizeComparison;
 
 /// The measure that decides.
 pub const HEADLINE: &str = "frame";
-
-/// The answer for one measure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// B takes less time than A.
-    Faster,
-    /// B takes more time than A.
-    Slower,
-    /// The interval contains 1.
-    NoDifferenceFound,
-    /// A or B has fewer than [`N_FRAMES_NEEDED`] frames.
-    TooFewFrames,
-    /// A has no such time.
-    NotMeasuredInA,
-    /// B has no such time.
-    NotMeasuredInB,
-    /// A's median is 0, or is 0 in a resample, so that the ratio is not defined.
-    NoRatio,
-}
-
-impl Verdict {
-    /// Returns the verdict in words, which complete "B is …".
-    pub fn text(self) -> &'static str {
-        match self {
-            Verdict::Faster => "faster",
-            Verdict::Slower => "slower",
-            Verdict::NoDifferenceFound => "no difference found",
-            Verdict::TooFewFrames => "too few frames",
-            Verdict::NotMeasuredInA => "not measured in A",
-            Verdict::NotMeasuredInB => "not measured in B",
-            Verdict::NoRatio => "no ratio: A's median is 0, or may be",
-        }
-    }
-}
 
 /// One measure of one loop, in A and B.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -76,10 +48,13 @@ pub struct MeasureComparison {
     pub b_ms: Option<f64>,
     /// median(B) / median(A) and its 95 % interval.
     pub b_by_a: Option<Interval>,
-    /// Neighbouring frames that a resample draws together.
-    pub block_len: usize,
+    /// Neighbouring frames that a resample draws together; null if whole blocks are compared.
+    pub block_len: Option<usize>,
     /// The answer.
     pub verdict: Verdict,
+    /// About how many more frames of A and of B would decide; null if the verdict is no "undecided"
+    /// or the ratio lies on the margin.
+    pub more_frames: Option<u64>,
 }
 
 /// One loop of one case that both A and B ran.
@@ -105,22 +80,25 @@ pub struct Comparison {
     pub differences: Vec<Difference>,
     /// Every loop that both ran, but those that draw nothing.
     pub modes: Vec<ModeComparison>,
+    /// The errors of the pictures of every case that both checked.
+    pub errors: Vec<SizeComparison>,
     /// Remarks on the runs and their frames.
     pub remarks: Vec<String>,
 }
 
 impl Comparison {
-    /// Compares two results.
-    pub fn new(a: &BenchResults, b: &BenchResults) -> Comparison {
+    /// Compares two results. Ratios from 1/(1 + `margin`) to 1 + `margin` count as no difference.
+    pub fn new(a: &BenchResults, b: &BenchResults, margin: f64) -> Comparison {
         let left_out = left_out(a, b);
         let mut pairs = pairs(&a.modes, &b.modes);
         pairs.retain(|(of_a, _)| !left_out.contains(of_a.name.as_str()));
-        let modes = compare_modes(&pairs);
+        let modes = compare_modes(&pairs, margin);
         let mut remarks = remarks(&a.run, &b.run);
         remarks.extend(still_remark(a, b, &left_out));
         remarks.extend(frame_remarks(&a.modes, &b.modes));
         remarks.extend(steadiness_remarks(&pairs, &modes));
-        Comparison { differences: differences(&a.run, &b.run), modes, remarks }
+        let errors = sizes::errors(&a.run, &b.run, margin);
+        Comparison { differences: differences(&a.run, &b.run), modes, errors, remarks }
     }
 }
 
@@ -134,28 +112,49 @@ pub fn few_frames_remark(modes: &[ModeComparison]) -> Option<String> {
     })
 }
 
-/// Compares the times of one measure, in ms and in the order in which they were taken.
-fn compare(measure: &str, a: &[f64], b: &[f64]) -> MeasureComparison {
-    let n_least = a.len().min(b.len());
-    let interval = ratio_interval(b, a);
+/// The times of one measure of a loop.
+#[derive(Clone, Copy)]
+struct Times<'a> {
+    /// In ms, in the order in which they were taken.
+    blocks: &'a [Block],
+    /// The factor of their interval.
+    widening: f64,
+}
+
+impl<'a> Times<'a> {
+    fn of(mode: &'a TimedMode, name: &str) -> Times<'a> {
+        Times { blocks: mode.times(name), widening: mode.widening }
+    }
+
+    fn is_measured(self) -> bool {
+        self.blocks.iter().any(|block| !block.values.is_empty())
+    }
+}
+
+/// Compares the times of one measure.
+fn compare(measure: &str, a: Times<'_>, b: Times<'_>, margin: f64) -> MeasureComparison {
+    let [ms_a, ms_b] = [a, b].map(|of| values(of.blocks));
+    let n_least = ms_a.len().min(ms_b.len());
+    let widening = a.widening.max(b.widening);
+    let interval = ratio_interval(b.blocks, a.blocks, Pairing::None, widening);
     let verdict = match interval {
-        _ if a.is_empty() => Verdict::NotMeasuredInA,
-        _ if b.is_empty() => Verdict::NotMeasuredInB,
+        _ if ms_a.is_empty() => Verdict::NotMeasuredInA,
+        _ if ms_b.is_empty() => Verdict::NotMeasuredInB,
         _ if n_least < N_FRAMES_NEEDED => Verdict::TooFewFrames,
         None => Verdict::NoRatio,
-        Some(ratio) if ratio.high < 1.0 => Verdict::Faster,
-        Some(ratio) if ratio.low > 1.0 => Verdict::Slower,
-        Some(_) => Verdict::NoDifferenceFound,
+        Some(ratio) => Verdict::of(ratio, margin),
     };
+    let undecided = interval.filter(|_| verdict == Verdict::Undecided);
     MeasureComparison {
         measure: measure.to_owned(),
-        n_a: a.len(),
-        n_b: b.len(),
-        a_ms: median(a),
-        b_ms: median(b),
+        n_a: ms_a.len(),
+        n_b: ms_b.len(),
+        a_ms: median(&ms_a),
+        b_ms: median(&ms_b),
         b_by_a: interval,
-        block_len: Bootstrap::of_neighbours(n_least).block_len,
+        block_len: block_len(&[a.blocks, b.blocks]),
         verdict,
+        more_frames: undecided.and_then(|ratio| more_frames(ratio, n_least, margin)),
     }
 }
 
@@ -163,10 +162,10 @@ fn compare(measure: &str, a: &[f64], b: &[f64]) -> MeasureComparison {
 type Pair<'a> = (&'a TimedMode, &'a TimedMode);
 
 /// Compares every measure that either loop of a pair has, in A's order and then B's.
-fn compare_modes(pairs: &[Pair<'_>]) -> Vec<ModeComparison> {
+fn compare_modes(pairs: &[Pair<'_>], margin: f64) -> Vec<ModeComparison> {
     let compare = |(a, b): &Pair<'_>| ModeComparison {
         name: a.name.clone(),
-        measures: compare_measures(a, b),
+        measures: compare_measures(a, b, margin),
     };
     pairs.iter().map(compare).collect()
 }
@@ -216,14 +215,14 @@ fn still_remark(a: &BenchResults, b: &BenchResults, left_out: &BTreeSet<&str>) -
     (n > 0).then(|| format!("nothing moves in {n} of {n_all} cases: {what}"))
 }
 
-fn compare_measures(a: &TimedMode, b: &TimedMode) -> Vec<MeasureComparison> {
+fn compare_measures(a: &TimedMode, b: &TimedMode, margin: f64) -> Vec<MeasureComparison> {
     let mut names: Vec<&str> = a.measures.iter().map(|m| m.name.as_str()).collect();
     let only_b = b.measures.iter().map(|m| m.name.as_str()).filter(|name| !names.contains(name));
     names.extend(only_b.collect::<Vec<_>>());
-    let of = |name: &str| [a, b].map(|mode| mode.times(name));
+    let of = |name: &str| [a, b].map(|mode| Times::of(mode, name));
     let measured = names.into_iter().map(|name| (name, of(name)));
-    let measured = measured.filter(|(_, [a, b])| !a.is_empty() || !b.is_empty());
-    measured.map(|(name, [a, b])| compare(name, a, b)).collect()
+    let measured = measured.filter(|(_, [a, b])| a.is_measured() || b.is_measured());
+    measured.map(|(name, [a, b])| compare(name, a, b, margin)).collect()
 }
 
 /// Remarks on loops whose headline differs by no more than the blocks of A or B, which ran the same
@@ -231,10 +230,11 @@ fn compare_measures(a: &TimedMode, b: &TimedMode) -> Vec<MeasureComparison> {
 fn steadiness_remarks(pairs: &[Pair<'_>], compared: &[ModeComparison]) -> Vec<String> {
     let mut remarks = Vec::new();
     for (mode, (a, b)) in compared.iter().zip(pairs) {
-        let found = mode.headline().filter(|h| h.verdict != Verdict::NoDifferenceFound);
+        let is_found = |v| matches!(v, Verdict::Faster | Verdict::Slower);
+        let found = mode.headline().filter(|h| is_found(h.verdict));
         let Some(ratio) = found.and_then(|h| h.b_by_a) else { continue };
         for (name, of) in [("A", a), ("B", b)] {
-            let spread = spread_of_blocks(of.blocks.iter().map(Vec::as_slice));
+            let spread = spread_of_blocks(of.times(HEADLINE));
             if let Some(spread) = spread.filter(|spread| spread.ln() >= ratio.estimate.ln().abs()) {
                 let what = "as far as A and B, or further: the machine was not steady";
                 remarks.push(format!(
@@ -264,6 +264,36 @@ fn frame_remarks(a: &[TimedMode], b: &[TimedMode]) -> Vec<String> {
         remarks.push(format!("{}: A and B {what}", mode.name));
     }
     remarks
+}
+
+/// One loop that all of several runs have: every run compared with every other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoopMatrix {
+    /// Phase, sweep and loop in words.
+    pub name: String,
+    /// Row i, column j: run i compared with run j by the headline; null on the diagonal.
+    pub cells: Vec<Vec<Option<MeasureComparison>>>,
+}
+
+/// Compares every run with every other by the headline, in the loops that all have. Loops that draw
+/// nothing in one of them are left out if their case has another loop.
+pub fn matrix(runs: &[BenchResults], margin: f64) -> Vec<LoopMatrix> {
+    let Some(first) = runs.first() else { return Vec::new() };
+    let left_out: BTreeSet<&str> =
+        runs.iter().flat_map(|run| left_out(first, run).into_iter()).collect();
+    let of_name = |name: &str| -> Option<Vec<&TimedMode>> {
+        runs.iter().map(|run| run.modes.iter().find(|m| m.name == name)).collect()
+    };
+    let names = first.modes.iter().map(|m| m.name.as_str()).filter(|n| !left_out.contains(n));
+    let of_loop = |(name, modes): (&str, Vec<&TimedMode>)| {
+        let cell = |i: usize, j: usize| {
+            let [a, b] = [j, i].map(|k| Times::of(modes[k], HEADLINE));
+            (i != j).then(|| compare(HEADLINE, a, b, margin))
+        };
+        let row = |i: usize| (0..modes.len()).map(|j| cell(i, j)).collect();
+        LoopMatrix { name: name.to_owned(), cells: (0..modes.len()).map(row).collect() }
+    };
+    names.filter_map(|name| Some((name, of_name(name)?))).map(of_loop).collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Limits of a bench and of a study, checked before anything is allocated for it.
 
-use super::blocks::{BenchPlan, n_frames_total};
+use super::blocks::{BenchPlan, n_frames_at_least, n_rounds_at_least};
 use super::cases::Case;
 use crate::error::{Error, Result};
 use crate::io::text_file::RECORD_LIMIT;
@@ -87,9 +87,9 @@ impl SceneMemory {
 /// # Errors
 /// Fails if there are too many; the error says how many there may be.
 pub fn check_bench(cases: &[Case], plan: &BenchPlan) -> Result<()> {
-    let n_frames = n_frames_total(cases, plan);
+    let n_frames = n_frames_at_least(cases, plan);
     let n_loops: u64 = cases.iter().map(|case| case.loops.len() as u64).sum();
-    let n_blocks = n_loops.saturating_mul(u64::from(plan.n_rounds));
+    let n_blocks = n_loops.saturating_mul(u64::from(n_rounds_at_least(plan.rounds)));
     if n_frames > MOST_FRAMES || n_blocks > MOST_BLOCKS {
         return Err(Error::limit(format!(
             "{n_frames} frames in {n_blocks} blocks: the records of {MOST_FRAMES} frames, warm-up \

@@ -5,12 +5,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::blocks::{BenchPlan, Outcome, Sample};
 use super::cases::{Case, Loop};
 use super::frame_rows::{FrameRow, FrameTable};
-use super::intervals::{median_interval, ratio_interval, spread_of_blocks};
+use super::intervals::{Pairing, measured, ratio_interval, spread_of_blocks, values};
 use super::names::sweep_text;
 use super::overlap::{Overlap, SerialFrame};
+use super::precision::WIDENING;
 use super::records::{self, Measured, Mode, Pass as PassRecord, Ratio, Reason, Skipping};
 use crate::frame::FrameTimes;
 use crate::frame::plan::{Pass, Reason as PlanReason};
+use crate::measure::blocked::{Block, BlockedMedian};
+use crate::measure::bootstrap::Interval;
 use crate::measure::lows::Lows;
 use crate::measure::stats::{Summary, mean, median};
 use crate::model::scene::{Impostors, Simulate, Threading};
@@ -27,37 +30,42 @@ fn pass_ms(times: &FrameTimes, pass: Pass) -> Option<f64> {
 }
 
 /// The timed frames of one case in one loop.
-struct Timed<'a>(Vec<&'a Sample>);
+struct Timed<'a> {
+    samples: Vec<&'a Sample>,
+    /// The factor of intervals.
+    widening: f64,
+}
 
 impl Timed<'_> {
     fn frames(&self) -> impl Iterator<Item = &FrameTimes> {
-        self.0.iter().map(|s| &s.times)
+        self.samples.iter().map(|s| &s.times)
     }
 
     fn column(&self, of: impl Fn(&FrameTimes) -> Option<f64>) -> Vec<f64> {
         self.frames().filter_map(of).collect()
     }
 
-    fn frame_ms(&self) -> Vec<f64> {
-        self.column(|t| Some(t.frame_ms))
+    /// Returns a column by blocks, in the order in which they ran.
+    fn blocks(&self, of: impl Fn(&FrameTimes) -> Option<f64>) -> Vec<Block> {
+        let block = |block: &[&Sample]| Block {
+            start: 0,
+            stratum: block.first().map_or(0, |s| s.times.i_frame),
+            values: block.iter().filter_map(|s| of(&s.times)).collect(),
+        };
+        self.samples.chunk_by(|a, b| a.i_block == b.i_block).map(block).collect()
+    }
+
+    fn frame_ms(&self) -> Vec<Block> {
+        self.blocks(|t| Some(t.frame_ms))
     }
 
     fn measured(&self, of: impl Fn(&FrameTimes) -> Option<f64>) -> Option<Measured> {
-        let values = self.column(of);
-        // The widened interval can reach below 0, which no time does.
-        let (p50_low, p50_high) =
-            median_interval(&values).map(|i| (i.low.max(0.0), i.high)).unzip();
-        Summary::of(&values).map(|of| Measured { of, p50_low, p50_high })
+        measured(&self.blocks(of), self.widening)
     }
 
-    /// Returns the greatest median frame time of a block by the least.
-    fn block_spread(&self) -> Option<f64> {
-        let blocks: Vec<Vec<f64>> = self
-            .0
-            .chunk_by(|a, b| a.i_block == b.i_block)
-            .map(|block| block.iter().map(|s| s.times.frame_ms).collect())
-            .collect();
-        spread_of_blocks(blocks.iter().map(Vec::as_slice))
+    /// Returns whether at least half of the frames drew nothing.
+    fn is_mostly_empty(&self) -> bool {
+        2 * self.frames().filter(|t| t.plan.runs_nothing()).count() >= self.samples.len()
     }
 }
 
@@ -67,7 +75,42 @@ impl Outcome {
     }
 
     fn timed(&self, i_case: usize, of: Loop) -> Timed<'_> {
-        Timed(self.of_loop(i_case, of).filter(|s| !s.warm_up).collect())
+        let samples = self.of_loop(i_case, of).filter(|s| !s.warm_up).collect();
+        // Where a precision was asked for, the rule has chosen the number of rounds.
+        let widening = if self.reached.contains_key(&i_case) { WIDENING } else { 1.0 };
+        Timed { samples, widening }
+    }
+
+    /// Returns the intervals that a precision is asked of: those of the median frame time in every
+    /// loop that draws, and of the ratio of the two threadings. None if one is not known.
+    pub(super) fn intervals(
+        &self,
+        i_case: usize,
+        case: &Case,
+        widening: f64,
+    ) -> Option<Vec<Interval>> {
+        let timed = |of: Loop| {
+            let timed = Timed { widening, ..self.timed(i_case, of) };
+            (of, timed)
+        };
+        let drawing: Vec<(Loop, BlockedMedian)> = case
+            .loops
+            .iter()
+            .map(|of| timed(*of))
+            .filter(|(_, timed)| !timed.is_mostly_empty())
+            .map(|(of, timed)| Some((of, BlockedMedian::new(&timed.frame_ms())?)))
+            .collect::<Option<_>>()?;
+        let mut all: Vec<Interval> = drawing.iter().map(|(_, m)| m.interval(widening)).collect();
+        let skip = case.loops.iter().any(|of| of.skip);
+        let find = |threading| {
+            let found = drawing.iter().find(|(of, _)| *of == Loop { threading, skip });
+            found.map(|(_, median)| median)
+        };
+        if let (Some(serial), Some(parallel)) = (find(Threading::Serial), find(Threading::Parallel))
+        {
+            all.push(parallel.paired_ratio(serial, widening)?);
+        }
+        Some(all)
     }
 
     /// Returns the records of all cases, in order.
@@ -96,6 +139,7 @@ impl Outcome {
             skipping: unskipped.and_then(|unskipped| self.skipping(i, case, unskipped)),
             figure: None,
             check: self.checks.get(&i).cloned(),
+            precision: self.reached.get(&i).map(records::CasePrecision::new),
         };
         record.figure = record.figure_mode().map(Mode::name);
         record
@@ -133,6 +177,7 @@ impl Outcome {
             case: b.i_case,
             threading: b.of.threading.name().to_owned(),
             skip: b.of.skip,
+            start: 0,
         };
         self.blocks.iter().map(record).collect()
     }
@@ -155,11 +200,11 @@ impl Outcome {
             threading: of.threading.name().into(),
             skip: of.skip,
             simulate: if is_by_cpu { "cpu" } else { "gpu" }.into(),
-            frames: timed.0.len(),
+            frames: timed.samples.len(),
             warm_up: plan.n_warm_up as usize,
             blocks: blocks.len(),
             frame_ms: timed.measured(|t| Some(t.frame_ms)),
-            frame_lows: Lows::of(&timed.frame_ms()),
+            frame_lows: Lows::of(&values(&timed.frame_ms())),
             game_ms: timed.measured(|t| Some(t.game_ms)),
             record_ms: timed.measured(|t| Some(t.record_ms)),
             submit_ms: timed.measured(|t| Some(t.submit_ms)),
@@ -173,7 +218,7 @@ impl Outcome {
             impostors_reused: timed.frames().filter(|t| is_impostor_reused(t)).count(),
             passes: Pass::ALL.map(|p| pass_record(p, &timed, unskipped.as_ref())).to_vec(),
             image_hash: self.image_hash(i, of).map(str::to_owned),
-            block_spread: timed.block_spread(),
+            block_spread: spread_of_blocks(&timed.frame_ms()),
         }
     }
 
@@ -213,9 +258,11 @@ fn has_impostors(case: &Case) -> bool {
 
 /// Returns the ratio of the median frame times with its 95 % bootstrap interval.
 fn ratio(serial: &Timed<'_>, parallel: &Timed<'_>) -> Option<Ratio> {
-    let [serial, parallel] = [serial, parallel].map(Timed::frame_ms);
-    let (low, high) = ratio_interval(&parallel, &serial).map(|i| (i.low, i.high)).unzip();
-    let parallel_by_serial = median(&parallel)? / median(&serial).filter(|ms| *ms > 0.0)?;
+    let [serial_ms, parallel_ms] = [serial, parallel].map(Timed::frame_ms);
+    let interval = ratio_interval(&parallel_ms, &serial_ms, Pairing::Rounds, serial.widening);
+    let (low, high) = interval.map(|i| (i.low, i.high)).unzip();
+    let [serial, parallel] = [serial_ms, parallel_ms].map(|blocks| median(&values(&blocks)));
+    let parallel_by_serial = parallel? / serial.filter(|ms| *ms > 0.0)?;
     Some(Ratio { parallel_by_serial, low, high })
 }
 
@@ -226,7 +273,7 @@ fn overlap(serial: &Timed<'_>, parallel: Option<&Timed<'_>>) -> Option<Overlap> 
         render_ms: t.render_ms(),
     };
     let serial: Vec<SerialFrame> = serial.frames().map(frame).collect();
-    Overlap::of(&serial, &parallel.map_or(vec![], Timed::frame_ms))
+    Overlap::of(&serial, &parallel.map_or(vec![], |of| values(&of.frame_ms())))
 }
 
 /// Returns whether distant particles were shown from the impostors of an earlier frame.
@@ -255,7 +302,7 @@ fn reasons(all: impl Iterator<Item = String>) -> Vec<Reason> {
 /// Returns the record of a pass; `unskipped` are the frames of the loop that skips nothing.
 fn pass_record(pass: Pass, timed: &Timed<'_>, unskipped: Option<&Timed<'_>>) -> PassRecord {
     let total: f64 = timed.column(gpu_ms).iter().sum();
-    let n = timed.0.len();
+    let n = timed.samples.len();
     let column = |of: &Timed<'_>| of.column(|t| pass_ms(t, pass));
     let ms = column(timed);
     let reason = |t: &FrameTimes| t.plan.decision(pass).reason.to_string();

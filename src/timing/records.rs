@@ -9,6 +9,7 @@ use super::json::ResultFile;
 use super::machine::{Clocks, Cpu, Device};
 use super::names::{Setting, case_name, loop_name, mode_name, sweep_text};
 use super::overlap::Overlap;
+use super::precision::{Limit, Reached};
 use crate::frame::Counts;
 use crate::measure::lows::Lows;
 use crate::measure::stats::Summary;
@@ -55,6 +56,40 @@ pub struct Run {
     pub parts: Vec<PartRecord>,
     /// Whether Ctrl-C or an error came before the end; the record then holds what was finished.
     pub interrupted: bool,
+    /// The precision that was asked for, which decided the number of blocks; null if blocks were
+    /// counted.
+    #[serde(default)]
+    pub precision: Option<PrecisionRecord>,
+}
+
+/// The rule that decided how many blocks were timed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PrecisionRecord {
+    /// Half the width that every 95 % interval should have at most, relative to its estimate.
+    pub wanted: f64,
+    /// Seed of the random order of the blocks.
+    pub seed: u64,
+    /// Limit of time, in seconds.
+    pub limit_s: f64,
+}
+
+/// How narrow the intervals of a case are.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CasePrecision {
+    /// Half the width of the widest interval, relative to its estimate; null without an interval.
+    pub half_width: Option<f64>,
+    /// Rounds, each with a block of every loop.
+    pub rounds: u32,
+    /// What ended the case before its intervals were narrow enough: "time" or "memory"; null if
+    /// they are.
+    pub ended_by: Option<Limit>,
+}
+
+impl CasePrecision {
+    pub(super) fn new(reached: &Reached) -> CasePrecision {
+        let Reached { n_rounds: rounds, half_width, ended_by } = *reached;
+        CasePrecision { half_width, rounds, ended_by }
+    }
 }
 
 impl Run {
@@ -78,6 +113,14 @@ pub struct Block {
     pub threading: String,
     /// Whether frames skip passes.
     pub skip: bool,
+    /// Number of the start of the program that ran it; left out for the first.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub start: u32,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_first(start: &u32) -> bool {
+    *start == 0
 }
 
 /// The scene in one of its phases, at one point of the sweep.
@@ -113,6 +156,9 @@ pub struct Case {
     /// The check of its pictures. Null in results of versions that did not check them.
     #[serde(default)]
     pub check: Option<Check>,
+    /// How narrow its intervals are; null if blocks were counted.
+    #[serde(default)]
+    pub precision: Option<CasePrecision>,
 }
 
 impl Case {

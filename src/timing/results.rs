@@ -8,12 +8,15 @@ use std::path::{Path, PathBuf};
 
 use super::attachments::{self, Attachments};
 use super::frame_rows::{FRAMES_FILE, FrameRow, FrameTable, parse_frames, write_frames};
+use super::intervals::values;
 use super::json::{self, ResultFile};
 use super::names::{case_name, mode_name};
+use super::precision::WIDENING;
 use super::records::{Case, Mode, Run};
 use crate::error::{Error, Result};
 use crate::io::result_folder::{Existing, ResultFolder};
 use crate::io::text_file::{TABLE_LIMIT, read_result};
+use crate::measure::blocked::Block;
 
 /// File name of the record of a run.
 pub const RUN_FILE: &str = Run::FILE;
@@ -43,16 +46,16 @@ pub struct TimedMode {
     pub name: String,
     /// Frames of the scene, in the order in which they ran.
     pub frames: Vec<u32>,
-    /// Frame times in ms, block by block.
-    pub blocks: Vec<Vec<f64>>,
+    /// The factor of its intervals.
+    pub widening: f64,
     /// `frame`, `game`, `render`, `gpu`, then the passes in the order of the table.
     pub measures: Vec<Measure>,
 }
 
 impl TimedMode {
-    /// Returns the times of a measure in ms; empty if there is no such measure.
-    pub(super) fn times(&self, name: &str) -> &[f64] {
-        self.measures.iter().find(|m| m.name == name).map_or(&[], |m| &m.ms)
+    /// Returns the times of a measure in ms, block by block; empty if there is no such measure.
+    pub fn times(&self, name: &str) -> &[Block] {
+        self.measures.iter().find(|m| m.name == name).map_or(&[], |m| &m.blocks)
     }
 }
 
@@ -61,8 +64,16 @@ impl TimedMode {
 pub struct Measure {
     /// Name of the measure.
     pub name: String,
-    /// Times in ms, in the order in which they were taken, without the frames that have none.
-    pub ms: Vec<f64>,
+    /// Times in ms, in the order in which they were taken, without the frames that have none. The
+    /// stratum of a block is its first timed frame.
+    pub blocks: Vec<Block>,
+}
+
+impl Measure {
+    /// Returns the times of all blocks.
+    pub fn ms(&self) -> Vec<f64> {
+        values(&self.blocks)
+    }
 }
 
 /// Claims the folder for the results of a bench of `n_cases` before anything is measured.
@@ -134,7 +145,7 @@ pub fn parse_results(run: Run, text: &str, path: &Path) -> Result<BenchResults> 
 /// # Errors
 /// Fails if the frames are not those of the run.
 pub(super) fn join(run: Run, table: &FrameTable, path: &Path) -> Result<BenchResults> {
-    let mut by_name = timed_modes(table);
+    let mut by_name = timed_modes(&run, table);
     let mut modes = Vec::new();
     for (case, mode) in run.modes() {
         let name = mode.name_in(case);
@@ -144,7 +155,8 @@ pub(super) fn join(run: Run, table: &FrameTable, path: &Path) -> Result<BenchRes
             let what = format!("holds {n} timed {name} frames and {RUN_FILE} names {n_expected}");
             return Err(Error::io(path, format!("{what}: cut off, or another run's")));
         }
-        modes.extend(timed);
+        let widening = if case.precision.is_some() { WIDENING } else { 1.0 };
+        modes.extend(timed.map(|timed| TimedMode { widening, ..timed }));
     }
     match by_name.keys().next() {
         Some(other) => {
@@ -166,7 +178,7 @@ fn expected_in(folder: &Path) -> String {
 }
 
 /// Groups the timed frames by case and loop.
-fn timed_modes(table: &FrameTable) -> BTreeMap<String, TimedMode> {
+fn timed_modes(run: &Run, table: &FrameTable) -> BTreeMap<String, TimedMode> {
     let mut modes: BTreeMap<String, TimedMode> = BTreeMap::new();
     let mut last_blocks: BTreeMap<String, u32> = BTreeMap::new();
     for row in table.rows.iter().filter(|row| !row.warm_up) {
@@ -175,27 +187,27 @@ fn timed_modes(table: &FrameTable) -> BTreeMap<String, TimedMode> {
         let mode = modes.entry(name.clone()).or_insert_with(|| {
             let names = ["frame", "game", "render", "gpu"].into_iter();
             let names = names.chain(table.pass_names.iter().map(String::as_str));
-            let measure = |name: &str| Measure { name: name.to_owned(), ms: Vec::new() };
+            let measure = |name: &str| Measure { name: name.to_owned(), blocks: Vec::new() };
             let measures = names.map(measure).collect();
-            TimedMode { name: name.clone(), frames: Vec::new(), blocks: Vec::new(), measures }
+            TimedMode { name: name.clone(), frames: Vec::new(), widening: 1.0, measures }
         });
         if last_blocks.insert(name, row.block) != Some(row.block) {
-            mode.blocks.push(Vec::new());
+            let start = run.block_order.get(row.block as usize).map_or(0, |block| block.start);
+            let begin = || Block { start, stratum: row.frame, values: Vec::new() };
+            mode.measures.iter_mut().for_each(|measure| measure.blocks.push(begin()));
         }
         mode.frames.push(row.frame);
-        let times = times(row);
-        if let (Some(block), Some(ms)) = (mode.blocks.last_mut(), times[0]) {
-            block.push(ms);
-        }
-        for (measure, ms) in mode.measures.iter_mut().zip(times) {
-            measure.ms.extend(ms);
+        for (measure, ms) in mode.measures.iter_mut().zip(row_times(row)) {
+            if let Some(block) = measure.blocks.last_mut() {
+                block.values.extend(ms);
+            }
         }
     }
     modes
 }
 
 /// Returns the times of a frame in the order of [`TimedMode::measures`].
-fn times(row: &FrameRow) -> Vec<Option<f64>> {
+pub(super) fn row_times(row: &FrameRow) -> Vec<Option<f64>> {
     let render_ms = row.record_ms + row.submit_ms + row.wait_ms;
     let of_frame = [row.frame_ms, row.game_ms, render_ms].map(Some).into_iter();
     let times = of_frame.chain([row.gpu_ms]).chain(row.pass_ms.iter().copied());

@@ -36,7 +36,7 @@ fn results_of_bench_are_read_back_and_do_not_differ_from_themselves() {
         let summaries =
             [mode.frame_ms, mode.game_ms, mode.render_ms, mode.gpu_ms].map(|m| m.map(|m| m.of));
         for (measure, summary) in timed.measures.iter().zip(summaries) {
-            assert_eq!(Summary::of(&measure.ms), summary, "{}", measure.name);
+            assert_eq!(Summary::of(&measure.ms()), summary, "{}", measure.name);
         }
     }
     let out = out.to_str().expect("a UTF-8 path");

@@ -22,6 +22,7 @@ use nimbus::studies::ledger::records::Ledger;
 use nimbus::timing::compare::Comparison;
 use nimbus::timing::json;
 use nimbus::timing::results::parse_results;
+use nimbus::timing::verdict::MARGIN;
 use serde_json::Value;
 
 /// A folder that does not exist, so that no input reads files of the machine.
@@ -177,7 +178,7 @@ pub fn weather(bytes: &[u8]) -> std::result::Result<(), String> {
 /// does.
 fn show(results: Results) -> std::result::Result<(), String> {
     if let Results::Bench(recorded) = &results {
-        drop(Comparison::new(recorded, recorded));
+        drop(Comparison::new(recorded, recorded, MARGIN));
     }
     let source = |name: &str| Source {
         name: name.to_owned(),

@@ -51,7 +51,8 @@ pub fn mode(threading: &str, frames: usize, warm_up: usize) -> Mode {
 
 /// Returns a run of one case with a block per loop.
 pub fn run(modes: Vec<Mode>) -> Run {
-    let block = |m: &Mode| Block { case: 0, threading: m.threading.clone(), skip: m.skip };
+    let block =
+        |m: &Mode| Block { case: 0, threading: m.threading.clone(), skip: m.skip, start: 0 };
     Run {
         schema: Run::SCHEMA,
         nimbus: "0.1.0".to_owned(),
@@ -91,11 +92,13 @@ pub fn run(modes: Vec<Mode>) -> Run {
             counts: None,
             figure: None,
             check: None,
+            precision: None,
         }],
         stages: None,
         chosen: Vec::new(),
         parts: Vec::new(),
         interrupted: false,
+        precision: None,
     }
 }
 

@@ -6,7 +6,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 
 use super::farm_plan::{Span, parse_span};
 use super::scene::SceneArgs;
-use super::values::limited;
+use super::values::{limited, parse_precision, parse_time_limit};
 use crate::timing::limits::{MOST_BLOCKS, MOST_FRAMES};
 
 /// Why frames have a limit.
@@ -21,6 +21,8 @@ const FRAMES: &str = "the records of all frames are kept in memory";
     in any case, and its time is the figure.\n\n\
     Draw the frame times here, and as SVG files beside the results:\n  \
     nimbus bench scenes/threads.toml --plot --out run\n\n\
+    As many blocks as intervals of ±2 % need:\n  \
+    nimbus bench scenes/threads.toml --precision 2%\n\n\
     Each [[phase]] of a scene is timed by itself; --set and --sweep apply to all of them.\n\n\
     Exit codes: 0 done; 1 the device's picture is wrong; 2 bad input; 3 device or driver; \
     130 interrupted, what was finished is kept.")]
@@ -39,14 +41,10 @@ pub struct BenchArgs {
     /// Timed frames in a block [default: the scene's, or the phase's]
     #[arg(long, value_name = "N", value_parser = limited(1, MOST_FRAMES as u32, FRAMES))]
     pub frames: Option<u32>,
-    /// Warm-up frames at the start of every block, which are not counted
-    #[arg(
-        long,
-        value_name = "N",
-        default_value_t = 10,
-        value_parser = limited(0, MOST_FRAMES as u32, FRAMES)
-    )]
-    pub warmup: u32,
+    /// Warm-up frames at the start of every block, which are not counted [default: 10; with
+    /// --precision, whose blocks are short, 4]
+    #[arg(long, value_name = "N", value_parser = limited(0, MOST_FRAMES as u32, FRAMES))]
+    pub warmup: Option<u32>,
     /// Do not time the loop without skipping, unless nothing moves: takes less time, but `saved`
     /// stays unknown
     #[arg(long, conflicts_with = "no_skip")]
@@ -59,6 +57,28 @@ pub struct BenchArgs {
         value_parser = limited(1, MOST_BLOCKS as u32, "run.json lists every block")
     )]
     pub repeat: u32,
+    /// Add blocks until every 95 % interval reaches at most this far to each side: of the median
+    /// frame time of every loop, and of the ratio of the threadings. Blocks have a part of the
+    /// frames, in random order
+    #[arg(
+        long,
+        value_name = "PERCENT",
+        value_parser = parse_precision,
+        conflicts_with_all = ["repeat", "part"]
+    )]
+    pub precision: Option<f64>,
+    /// Seconds after which --precision gives up, and says so; every frame is timed once in any case
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 600.0,
+        requires = "precision",
+        value_parser = parse_time_limit
+    )]
+    pub time_limit: f64,
+    /// Seed of the order of blocks with --precision
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "precision")]
+    pub seed: u64,
     /// Time only these cases, counted from 0, after the first of all; for the nodes of a farm (one
     /// scene)
     #[arg(
@@ -95,6 +115,20 @@ pub struct BenchArgs {
     /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,
+}
+
+/// Warm-up frames of a block of all frames of a case.
+const WARM_UP: u32 = 10;
+/// Warm-up frames of a block of 12 frames or more. The block before was mostly of the same case, so
+/// that only the loop has to find its pace: two frames are on their way in the parallel loop.
+const WARM_UP_SHORT: u32 = 4;
+
+impl BenchArgs {
+    /// Returns the warm-up frames of every block.
+    pub fn n_warm_up(&self) -> u32 {
+        let default = if self.precision.is_some() { WARM_UP_SHORT } else { WARM_UP };
+        self.warmup.unwrap_or(default)
+    }
 }
 
 /// The loops that a bench times.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::values::{parse_density, parse_limit};
+use super::values::{parse_density, parse_limit, parse_margin};
 use crate::timing::difference::Condition;
 
 /// Arguments of `nimbus compare`.
@@ -14,6 +14,9 @@ use crate::timing::difference::Condition;
     nimbus bench scenes/threads.toml --set lighting.grid=32 --out after\n  \
     nimbus compare before after --allow scene\n\n\
     --allow build compares the results of two builds, --allow device those of two devices.\n\n\
+    Several runs, each with each, where differences up to 3 % do not matter:\n  \
+    nimbus bench scenes/threads.toml --set lighting.grid=16 --out coarse\n  \
+    nimbus compare before after coarse --allow scene --margin 3%\n\n\
     Two pictures:\n  \
     nimbus render scenes/hello.toml --reference thin -o thin.exr\n  \
     nimbus render scenes/hello.toml -o drawn.exr\n  \
@@ -27,6 +30,17 @@ pub struct CompareArgs {
     pub a: PathBuf,
     /// Results folder or picture that is compared with A
     pub b: PathBuf,
+    /// Further results folders: every run is then compared with every other
+    pub more: Vec<PathBuf>,
+    /// Difference that does not matter: within it B is the same, beyond it faster or slower
+    #[arg(
+        long,
+        value_name = "PERCENT",
+        default_value = "1%",
+        value_parser = parse_margin,
+        help_heading = "Results"
+    )]
+    pub margin: f64,
     /// Conditions that may differ between A and B; any other difference is refused
     #[arg(
         long,
@@ -79,6 +93,45 @@ pub struct ReportArgs {
     #[arg(long)]
     pub force: bool,
     /// No progress, and no line about what was written
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Arguments of `nimbus history`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Three nights and a page of them:\n  \
+    nimbus bench scenes/threads.toml --out night-1\n  \
+    nimbus bench scenes/threads.toml --out night-2\n  \
+    nimbus bench scenes/threads.toml --out night-3\n  \
+    nimbus history night-1 night-2 night-3 -o history.html\n\n\
+    Which revision brought the last change:\n  \
+    nimbus history night-* --bisect --repo .\n\n\
+    Exit codes: 0 read, whatever was found; 2 not comparable, or no results of nimbus bench.")]
+pub struct HistoryArgs {
+    /// Results folders (`nimbus bench --out DIR`)
+    #[arg(required = true, value_name = "DIR")]
+    pub runs: Vec<PathBuf>,
+    /// Conditions that may differ between runs, besides the build
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT,…")]
+    pub allow: Vec<Condition>,
+    /// Git checkout of the builds: orders the runs by revision. Without one that has all revisions
+    /// they are ordered by date
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub repo: PathBuf,
+    /// Say which revision to measure next, to find the one that brought the last change of a frame
+    /// time
+    #[arg(long)]
+    pub bisect: bool,
+    /// Page with charts: .html
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Replace an existing file
+    #[arg(long, requires = "output")]
+    pub force: bool,
+    /// Print JSON instead of the table
+    #[arg(long)]
+    pub json: bool,
+    /// No line about what was written
     #[arg(short, long)]
     pub quiet: bool,
 }

@@ -69,6 +69,31 @@ pub fn parse_positive(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| format!("expected a number above 0, found \"{text}\""))
 }
 
+/// Parses a share, as "1%" or "0.01", above 0 and at most a half.
+pub fn parse_precision(text: &str) -> Result<f64, String> {
+    let value = parse_share(text).filter(|v| *v > 0.0 && *v <= 0.5);
+    value.ok_or_else(|| format!("expected a share such as 1%, at most 50%, found \"{text}\""))
+}
+
+/// Parses a share, as "1%" or "0.01", from 0 to 1.
+pub fn parse_margin(text: &str) -> Result<f64, String> {
+    let value = parse_share(text).filter(|v| (0.0..=1.0).contains(v));
+    value.ok_or_else(|| format!("expected a share such as 1%, at most 100%, found \"{text}\""))
+}
+
+fn parse_share(text: &str) -> Option<f64> {
+    match text.trim().strip_suffix('%') {
+        Some(percent) => Some(percent.trim_end().parse::<f64>().ok()? / 100.0),
+        None => text.trim().parse().ok(),
+    }
+}
+
+/// Parses a limit of time in seconds, at most a month.
+pub fn parse_time_limit(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|v| (0.0..=2_592_000.0).contains(v));
+    value.ok_or_else(|| format!("expected seconds, from 0 to 2592000, found \"{text}\""))
+}
+
 /// Parses pixels a degree, for FLIP, whose filters have about as many pixels.
 pub fn parse_density(text: &str) -> Result<f64, String> {
     let value = text.parse::<f64>().ok().filter(|v| (1.0..=500.0).contains(v));
@@ -85,6 +110,18 @@ pub fn parse_limit(text: &str) -> Result<(String, f64), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn shares_are_parsed_with_and_without_percent() {
+        for (text, value) in [("1%", 0.01), ("0.02", 0.02), (" 2.5 % ", 0.025), ("50%", 0.5)] {
+            assert_eq!(parse_precision(text), Ok(value), "{text}");
+        }
+        assert_eq!((parse_margin("0"), parse_margin("100%")), (Ok(0.0), Ok(1.0)));
+        for wrong in ["0", "51%", "-1%", "nan", "inf%", "%", "", "1%%", "ten"] {
+            assert!(parse_precision(wrong).is_err(), "{wrong}");
+        }
+        assert!(parse_margin("101%").is_err() && parse_margin("-0.1").is_err());
+    }
 
     #[test]
     fn sizes_are_parsed() {

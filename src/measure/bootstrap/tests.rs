@@ -77,17 +77,6 @@ fn coverage_in_thousands_of_trials() {
 }
 
 #[test]
-fn student_s_percentiles_are_the_tabled_ones() {
-    // t at 97.5 %, from any table of it.
-    for (degrees, t, tolerance) in
-        [(2.0, 4.303, 1e-2), (4.0, 2.776, 5e-4), (10.0, 2.228, 5e-4), (28.0, 2.048, 5e-4)]
-    {
-        let got = 1.959_964 * student_by_normal(degrees);
-        assert!((got / t - 1.0_f64).abs() < tolerance, "{got} for {t}");
-    }
-}
-
-#[test]
 fn the_interval_is_widened_by_the_blocks_there_are() {
     // Nine blocks of four: √(9/8), and t of 8 degrees, 2.306. Two lists, 27 and 9 blocks: of the
     // shortest, 34 degrees.

@@ -10,6 +10,7 @@ use super::medium::{MUTED, glyph, series};
 use super::number::number;
 use super::plot_area::{Canvas, GridLines, PlotArea};
 use crate::measure::stats::percentile;
+use crate::timing::compare::HEADLINE;
 use crate::timing::frame_rows::FrameRow;
 use crate::timing::names::{loop_name, sweep_text};
 use crate::timing::results::BenchResults;
@@ -55,7 +56,9 @@ pub fn charts_of(results: &BenchResults) -> Vec<FrameChart> {
     for (case, mode, times) in results.timed().filter(|(case, mode, _)| !case.is_left_out(mode)) {
         let (sweep, name) = (sweep_text(&case.sweep), mode.name());
         let phase = case.phase.as_deref().unwrap_or_default();
-        for (frame, ms) in times.frames.iter().zip(times.blocks.iter().flatten()) {
+        for (frame, ms) in
+            times.frames.iter().zip(times.times(HEADLINE).iter().flat_map(|b| &b.values))
+        {
             add(&mut charts, [&sweep, phase, &name], *frame, *ms);
         }
     }

@@ -12,10 +12,11 @@ use crate::error::Result;
 use crate::report::charts::with_interval;
 use crate::timing::attachments::picture_file;
 use crate::timing::compare::{
-    Comparison, HEADLINE, MeasureComparison, ModeComparison, few_frames_remark,
+    Comparison, HEADLINE, MeasureComparison, ModeComparison, SizeComparison, few_frames_remark,
 };
 use crate::timing::difference::Difference;
 use crate::timing::results::BenchResults;
+use crate::timing::verdict::MARGIN;
 
 /// Returns the comparison of two results. Results of different kinds have none.
 ///
@@ -35,7 +36,7 @@ pub fn section(a: &Source, b: &Source) -> Result<Markup> {
 }
 
 fn benches(a: &BenchResults, b: &BenchResults, folders: [&Path; 2]) -> Result<Markup> {
-    let Comparison { differences, modes, remarks } = Comparison::new(a, b);
+    let Comparison { differences, modes, errors, remarks } = Comparison::new(a, b, MARGIN);
     Ok(html! {
         (differing(&differences))
         (remark_list(&remarks))
@@ -45,12 +46,13 @@ fn benches(a: &BenchResults, b: &BenchResults, folders: [&Path; 2]) -> Result<Ma
             (ratios(&modes))
             @if let Some(remark) = few_frames_remark(&modes) { p class="why" { (remark) } }
             p {
-                "The verdict is that of the measure " (HEADLINE) ". The intervals of the other \
-                measures are not corrected for multiple comparisons: of twenty equal measures \
-                about one appears to differ. The intervals include the noise within the runs, \
-                not the variation between starts of the program."
+                "The verdict is that of the measure " (HEADLINE) ". Ratios within a margin of 1 % \
+                are the same. The intervals of the other measures are not corrected for multiple \
+                comparisons: of twenty about one is beyond its interval. The intervals include the \
+                noise within the runs, not the variation between starts of the program."
             }
         }
+        @if !errors.is_empty() { (errors_table(&errors)) }
         (pictures_of(a, b, folders)?)
     })
 }
@@ -107,6 +109,22 @@ fn ratios(modes: &[ModeComparison]) -> Markup {
         "B is",
     ];
     table("Medians, their ratios and 95 % intervals", &header, rows)
+}
+
+fn errors_table(errors: &[SizeComparison]) -> Markup {
+    let row = |e: &SizeComparison| {
+        vec![
+            text(if e.name.is_empty() { "picture" } else { &e.name }),
+            value(Some(e.a)),
+            value(Some(e.b)),
+            value(e.b_by_a.map(|r| r.estimate)),
+            value(e.b_by_a.map(|r| r.low)),
+            value(e.b_by_a.map(|r| r.high)),
+            text(e.verdict.text()),
+        ]
+    };
+    let header = ["case", "A", "B", "B / A", "95 % low", "high", "B is"];
+    table("RMSE against f64, and its ratio", &header, errors.iter().map(row))
 }
 
 /// Compares the pictures of cases with equal names.

@@ -6,6 +6,7 @@ mod bench;
 mod comparison;
 mod error;
 mod figure;
+mod history;
 mod ledger;
 mod page;
 mod pictures;
@@ -13,4 +14,5 @@ mod provenance;
 pub mod source;
 mod table;
 
+pub use history::{HistoryRun, history_page};
 pub use page::page;

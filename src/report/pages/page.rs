@@ -39,6 +39,15 @@ pub fn page(sources: &[Source]) -> Result<String> {
         ));
     }
     let title = sources.iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ");
+    Ok(document("nimbus report", &title, &sections))
+}
+
+/// Returns the HTML of a page with its sections, each with its name, its anchor and its content.
+pub(super) fn document(
+    heading: &str,
+    title: &str,
+    sections: &[(String, String, Markup)],
+) -> String {
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -52,17 +61,17 @@ pub fn page(sources: &[Source]) -> Result<String> {
             }
             body {
                 header {
-                    h1 { "nimbus report" }
+                    h1 { (heading) }
                     @if sections.len() > 1 {
                         nav aria-label="Contents" { ul {
-                            @for (name, id, _) in &sections {
+                            @for (name, id, _) in sections {
                                 li { a href={ "#" (id) } { (name) } }
                             }
                         } }
                     }
                 }
                 main {
-                    @for (name, id, markup) in &sections {
+                    @for (name, id, markup) in sections {
                         section id=(id) aria-labelledby={ (id) "-title" } {
                             h2 id={ (id) "-title" } { (name) }
                             (markup)
@@ -75,7 +84,7 @@ pub fn page(sources: &[Source]) -> Result<String> {
             }
         }
     };
-    Ok(plain_markup(&markup.into_string()).into_owned())
+    plain_markup(&markup.into_string()).into_owned()
 }
 
 fn run_of(source: &Source) -> Option<&Run> {

@@ -87,7 +87,12 @@ fn part(range: Range<usize>) -> Part {
     let mut block_order = Vec::new();
     for round in 0..N_ROUNDS {
         let blocks = (0..numbers.len()).flat_map(|case| {
-            LOOPS.map(|threading| Block { case, threading: threading.to_owned(), skip: true })
+            LOOPS.map(|threading| Block {
+                case,
+                threading: threading.to_owned(),
+                skip: true,
+                start: 0,
+            })
         });
         let mut blocks: Vec<Block> = blocks.collect();
         if round % 2 == 1 {

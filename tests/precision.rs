@@ -1,5 +1,5 @@
-//! `nimbus bench --precision`: the blocks it runs, what it records, and how it says that a
-//! precision was not reached. Whether it was is up to the machine, so that only limits of 0 s have
+//! `nimbus bench --precision` and `--starts`: the blocks they run, what they record, and how bench says that
+//! a precision was not reached. Whether it was is up to the machine, so that only limits of 0 s have
 //! a number of rounds that is known.
 
 use std::collections::BTreeMap;
@@ -109,4 +109,43 @@ fn a_precision_needs_no_number_of_blocks() {
         assert!(code == 2 && stderr.contains(what), "{words:?}: {code} {stderr}");
     }
     assert!(!dir.path().join("refused").exists());
+}
+
+#[test]
+fn starts_are_processes_whose_frames_are_joined() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let three = ["--starts", "3", "--repeat", "1", "--warmup", "2"];
+    let (code, table, stderr) = bench(dir.path(), "a", &three);
+    assert_eq!(code, 0, "{stderr}");
+    assert!(stderr.contains("files, listed in"), "{stderr}");
+    assert!(!stderr.contains("as-start") && !stderr.contains("/tmp/.tmp"), "{stderr}");
+    let results = read_results(&dir.path().join("a")).expect("results");
+    let starts: Vec<u32> = results.run.block_order.iter().map(|b| b.start).collect();
+    assert_eq!(starts, [0, 0, 0, 1, 1, 1, 2, 2, 2]);
+    let case = &results.run.cases[0];
+    for (mode, timed) in case.modes.iter().zip(&results.modes) {
+        assert_eq!((mode.frames, mode.blocks, timed.frames.len()), (75, 3, 75));
+        let frame = mode.frame_ms.expect("times");
+        assert!(frame.p50_low.is_some_and(|low| low <= frame.of.p50), "{frame:?}");
+        // The medians of three starts span the interval of their median.
+        let of_starts = timed.times("frame").iter().map(|block| block.start).collect::<Vec<_>>();
+        assert_eq!(of_starts, [0, 1, 2]);
+        assert_eq!(mode.image_hash, case.modes[0].image_hash);
+        assert!(mode.passes.iter().all(|p| p.n_run + p.n_skipped == 75), "{:?}", mode.passes);
+    }
+    assert!(case.ratio.is_some_and(|ratio| ratio.low.is_some()), "{:?}", case.ratio);
+    assert!(dir.path().join("a/case-0.png").exists(), "the picture of the first start");
+    assert!(table.contains("the last frames of all blocks are the same"), "{table}");
+
+    // Two starts have no interval, and a faulty scene fails before any process.
+    let (code, table, _) = bench(dir.path(), "b", &["--starts", "2", "--repeat", "1"]);
+    assert!(code == 0 && table.contains("low, high: - "), "{table}");
+    let faulty = ["--starts", "2", "--set", "lighting.grid=-1"];
+    let (code, _, stderr) = bench(dir.path(), "c", &faulty);
+    assert!(code == 2 && stderr.contains("lighting.grid"), "{stderr}");
+    assert!(!dir.path().join("c").exists());
+    for words in [["--part", "0..1"], ["--trace", "t.json"]] {
+        let (code, _, stderr) = bench(dir.path(), "d", &[&["--starts", "2"][..], &words].concat());
+        assert!(code == 2 && stderr.contains("cannot be used with"), "{stderr}");
+    }
 }

@@ -9,12 +9,12 @@ use clap::ColorChoice;
 
 use super::args::{BenchArgs, SceneArgs};
 use super::bench_cases::{BenchCases, bench_cases, plan};
-use super::bench_check;
 use super::bench_record::{Recorder, Runs, print_json};
 use super::interrupt::{self, PATIENCE};
 use super::output::{SharedFolder, check_out, claim_file, lock_folder};
 use super::progress::progress;
 use super::scene::{device_choice, print_sizes};
+use super::{bench_check, bench_starts};
 use crate::error::{Error, Result};
 use crate::frame::{Stage, limits};
 use crate::io::console::say;
@@ -45,6 +45,17 @@ pub struct Context<'a> {
 /// Fails if the arguments or a scene are faulty, the device fails, or Ctrl-C came. Finished results
 /// are kept.
 pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
+    if let Some(folder) = &args.as_start {
+        return run_here(&bench_starts::of_start(args, folder), context);
+    }
+    if args.starts > 1 {
+        return bench_starts::run(args, context);
+    }
+    run_here(args, context)
+}
+
+/// Runs the benches of all scenes in this process.
+fn run_here(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
     let n_scenes = args.scenes.len();
     for (flag, is_set) in [("--part", args.part.is_some()), ("--trace", args.trace.is_some())] {
         if is_set && n_scenes > 1 {
@@ -77,7 +88,7 @@ pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
 
 /// Returns the results folder of every scene and refuses those that exist. A folder is made once
 /// its scene is ready to run.
-fn out_dirs(args: &BenchArgs) -> Result<Vec<Option<PathBuf>>> {
+pub fn out_dirs(args: &BenchArgs) -> Result<Vec<Option<PathBuf>>> {
     let Some(out) = &args.out else { return Ok(vec![None; args.scenes.len()]) };
     check_out(out, args.force)?;
     if args.scenes.len() == 1 {

@@ -20,7 +20,8 @@ use crate::timing::cases::Case;
 use crate::timing::frame_rows::FrameTable;
 use crate::timing::json::ResultFile;
 use crate::timing::machine::{self, Clocks};
-use crate::timing::records::{PrecisionRecord, Run};
+use crate::timing::precision::PrecisionRecord;
+use crate::timing::records::Run;
 use crate::timing::results::write_results;
 use crate::timing::trace;
 
@@ -70,7 +71,7 @@ impl Recorder {
         let table = if needs_table { outcome.table(cases) } else { FrameTable::default() };
         let written = self.write(&run, &table, outcome);
         // The tables appear even where the files cannot be written.
-        if !args.json {
+        if !args.json && args.as_start.is_none() {
             self.print(&run, outcome)?;
             if args.plot {
                 output::painted(&bench_plot::text(&run, &table.rows, self.color)?)?;
@@ -84,7 +85,9 @@ impl Recorder {
             trace::write(file, &outcome.samples, zones.as_ref(), clock)?;
         }
         let quiet = args.options.quiet;
-        if let Some(folder) = &*lock_folder(&self.folder) {
+        // Nobody looks into the folder of a start.
+        let folder = lock_folder(&self.folder);
+        if let Some(folder) = folder.as_ref().filter(|_| args.as_start.is_none()) {
             output::wrote_folder(folder, !run.interrupted, quiet);
         }
         if let Some(file) = &args.trace {

@@ -2,14 +2,15 @@
 
 use super::output::or_dash;
 use crate::gpu::PassTimes;
+use crate::measure::blocked::N_STARTS_NEEDED;
 use crate::measure::figure::Figure;
 use crate::measure::stats::extremes;
 use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::check::{Bounded, CheckVerdict};
 use crate::timing::machine::Clocks;
 use crate::timing::overlap::Overlap;
-use crate::timing::precision::Limit;
-use crate::timing::records::{Case, Mode, PrecisionRecord, Run, Skipping};
+use crate::timing::precision::{Limit, PrecisionRecord};
+use crate::timing::records::{Case, Mode, Run, Skipping};
 use crate::timing::still::{NO_RATIO, StillRemark, empty_frames_text};
 
 /// Returns a time in ms with three decimals.
@@ -192,7 +193,13 @@ pub fn missing_lines(run: &Run) -> String {
         if mode.frames == 0 {
             add(format!("{}: no timed frame: the run ended before", mode.name_in(case)));
         } else if lacks_interval(mode) && mode.frames >= N_FRAMES_NEEDED {
-            add("low, high: - : the times differ too much for an interval".to_owned());
+            let n_starts = run.n_starts();
+            let why = if (2..N_STARTS_NEEDED).contains(&n_starts) {
+                format!("an interval over starts needs {N_STARTS_NEEDED}, found {n_starts}")
+            } else {
+                "the times differ too much for an interval".to_owned()
+            };
+            add(format!("low, high: - : {why}"));
         }
         if mode.frames > 0 && mode.gpu_ms.is_none() {
             let why = match run.clocks.pass_times {

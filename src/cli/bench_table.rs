@@ -10,7 +10,8 @@ use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
 use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::names::loop_name;
-use crate::timing::records::{Block, Case, Measured, Mode, PrecisionRecord, Ratio, Run};
+use crate::timing::precision::PrecisionRecord;
+use crate::timing::records::{Block, Case, Measured, Mode, Ratio, Run};
 use crate::timing::still::skipped_text;
 
 /// Returns the whole text. `same` says for each case whether the last frames of its blocks have the
@@ -112,15 +113,20 @@ fn blocks_line(run: &Run) -> String {
         }
     }
     let n = order.len();
+    let cases = match run.cases.len() {
+        0 | 1 => String::new(),
+        n => format!("{n} cases, "),
+    };
+    let starts = match run.n_starts() {
+        0 | 1 => String::new(),
+        n => format!(" in {n} starts of the program"),
+    };
     if let Some(PrecisionRecord { seed, .. }) = run.precision {
-        let cases = if run.cases.len() > 1 {
-            format!("{} cases, ", run.cases.len())
-        } else {
-            String::new()
-        };
-        return format!(
-            "{cases}{n} blocks in random order (--seed {seed}), a part of the frames each"
-        );
+        let how = format!("in random order (--seed {seed}), a part of the frames each");
+        return format!("{cases}{n} blocks{starts} {how}");
+    }
+    if !starts.is_empty() {
+        return format!("{cases}{n} blocks{starts}");
     }
     let n_rounds = n / kinds.len().max(1);
     // A steady drift cancels over a round and its reverse; an odd number of rounds leaves one over.

@@ -10,6 +10,7 @@ mod bench_plot;
 mod bench_record;
 mod bench_remarks;
 mod bench_stages;
+mod bench_starts;
 mod bench_table;
 mod clock_locks;
 mod compare;

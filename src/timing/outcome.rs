@@ -139,7 +139,7 @@ impl Outcome {
             skipping: unskipped.and_then(|unskipped| self.skipping(i, case, unskipped)),
             figure: None,
             check: self.checks.get(&i).cloned(),
-            precision: self.reached.get(&i).map(records::CasePrecision::new),
+            precision: self.reached.get(&i).copied(),
         };
         record.figure = record.figure_mode().map(Mode::name);
         record

@@ -96,15 +96,26 @@ fn half_width(interval: Interval) -> f64 {
     }
 }
 
+/// The rule that decided how many blocks were timed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PrecisionRecord {
+    /// Half the width that every 95 % interval should have at most, relative to its estimate.
+    pub wanted: f64,
+    /// Seed of the random order of the blocks.
+    pub seed: u64,
+    /// Limit of time, in seconds.
+    pub limit_s: f64,
+}
+
 /// How narrow the intervals of a case are.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reached {
-    /// Rounds of the case.
-    pub n_rounds: u32,
-    /// Half the width of the widest interval, relative to its estimate; none without an interval.
+    /// Half the width of the widest interval, relative to its estimate; null without an interval.
     pub half_width: Option<f64>,
-    /// Why no further rounds followed although the interval is too wide; none if it is narrow
-    /// enough.
+    /// Rounds, each with a block of every loop.
+    pub rounds: u32,
+    /// What ended the case before its intervals were narrow enough: "time" or "memory"; null if
+    /// they are.
     pub ended_by: Option<Limit>,
 }
 

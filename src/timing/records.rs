@@ -1,6 +1,6 @@
 //! The types of `run.json`, which docs/reference/schemas/run.schema.json describes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use super::json::ResultFile;
 use super::machine::{Clocks, Cpu, Device};
 use super::names::{Setting, case_name, loop_name, mode_name, sweep_text};
 use super::overlap::Overlap;
-use super::precision::{Limit, Reached};
+use super::precision::{PrecisionRecord, Reached};
 use crate::frame::Counts;
 use crate::measure::lows::Lows;
 use crate::measure::stats::Summary;
@@ -62,37 +62,12 @@ pub struct Run {
     pub precision: Option<PrecisionRecord>,
 }
 
-/// The rule that decided how many blocks were timed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct PrecisionRecord {
-    /// Half the width that every 95 % interval should have at most, relative to its estimate.
-    pub wanted: f64,
-    /// Seed of the random order of the blocks.
-    pub seed: u64,
-    /// Limit of time, in seconds.
-    pub limit_s: f64,
-}
-
-/// How narrow the intervals of a case are.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct CasePrecision {
-    /// Half the width of the widest interval, relative to its estimate; null without an interval.
-    pub half_width: Option<f64>,
-    /// Rounds, each with a block of every loop.
-    pub rounds: u32,
-    /// What ended the case before its intervals were narrow enough: "time" or "memory"; null if
-    /// they are.
-    pub ended_by: Option<Limit>,
-}
-
-impl CasePrecision {
-    pub(super) fn new(reached: &Reached) -> CasePrecision {
-        let Reached { n_rounds: rounds, half_width, ended_by } = *reached;
-        CasePrecision { half_width, rounds, ended_by }
-    }
-}
-
 impl Run {
+    /// Returns the number of starts of the program that ran blocks.
+    pub fn n_starts(&self) -> usize {
+        self.block_order.iter().map(|block| block.start).collect::<BTreeSet<u32>>().len()
+    }
+
     /// Returns every loop with its case, in order.
     pub fn modes(&self) -> impl Iterator<Item = (&Case, &Mode)> {
         self.cases.iter().flat_map(|case| case.modes.iter().map(move |mode| (case, mode)))
@@ -158,7 +133,7 @@ pub struct Case {
     pub check: Option<Check>,
     /// How narrow its intervals are; null if blocks were counted.
     #[serde(default)]
-    pub precision: Option<CasePrecision>,
+    pub precision: Option<Reached>,
 }
 
 impl Case {

@@ -191,7 +191,7 @@ impl Bench<'_> {
             (self.on)(Event::More(of_cycle(next - n_rounds.max(floor.min(next)))));
             return false;
         }
-        let reached = Reached { n_rounds, half_width: look.widest, ended_by };
+        let reached = Reached { half_width: look.widest, rounds: n_rounds, ended_by };
         lock(self.outcome).reached.insert(i_case, reached);
         true
     }

@@ -12,6 +12,9 @@ use crate::timing::limits::{MOST_BLOCKS, MOST_FRAMES};
 /// Why frames have a limit.
 const FRAMES: &str = "the records of all frames are kept in memory";
 
+/// Most processes of `--starts`.
+const MOST_STARTS: u32 = 100;
+
 /// Arguments of `nimbus bench`.
 #[derive(Debug, Clone, ClapArgs)]
 #[command(after_help = "Time against particles and picture size:\n  \
@@ -79,6 +82,19 @@ pub struct BenchArgs {
     /// Seed of the order of blocks with --precision
     #[arg(long, value_name = "N", default_value_t = 0, requires = "precision")]
     pub seed: u64,
+    /// Run the bench in this many processes, one after the other, and compare their times: one start
+    /// of a program differs from the next by more than its frames tell. Intervals need three
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        conflicts_with_all = ["part", "trace"],
+        value_parser = limited(1, MOST_STARTS, "their frames are kept in memory together")
+    )]
+    pub starts: u32,
+    /// Folder of a start's results, which the process of `--starts` reads; replaces --out
+    #[arg(long, value_name = "DIR", hide = true)]
+    pub as_start: Option<PathBuf>,
     /// Time only these cases, counted from 0, after the first of all; for the nodes of a farm (one
     /// scene)
     #[arg(

@@ -1,0 +1,175 @@
+//! `nimbus bench --starts N`: the bench in several processes, one after the other.
+
+use std::ffi::{OsStr, OsString};
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::args::BenchArgs;
+use super::bench::{Context, out_dirs};
+use super::bench_cases::bench_cases;
+use super::bench_record::{Runs, print_json};
+use super::output::{self, wrote_folder};
+use super::progress::progress;
+use super::{bench_plot, bench_table};
+use crate::error::{Error, Result};
+use crate::farm::process::{self, IDLE_LIMIT};
+use crate::io::console::say;
+use crate::io::process_info::command_line;
+use crate::io::result_folder::Existing;
+use crate::io::text_file::{TABLE_LIMIT, read_result};
+use crate::timing::attachments::{Attachments, picture_file};
+use crate::timing::frame_rows::{FRAMES_FILE, parse_frames};
+use crate::timing::json;
+use crate::timing::results::{open_results, write_results};
+use crate::timing::starts::{Start, join};
+
+/// Returns the arguments of the process of one start, whose results go to `folder`.
+pub fn of_start(args: &BenchArgs, folder: &Path) -> BenchArgs {
+    let mut args = args.clone();
+    args.out = Some(folder.to_owned());
+    (args.starts, args.force, args.plot, args.json) = (1, false, false, false);
+    args
+}
+
+/// Runs the bench of every scene in `--starts` processes.
+///
+/// # Errors
+/// Fails if the arguments or a scene are faulty, a process fails, or Ctrl-C came. Starts that ended
+/// before are kept.
+pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
+    if args.scenes.len() > 1 {
+        let n = args.scenes.len();
+        return Err(Error::usage(format!("--starts takes one scene, found {n}")));
+    }
+    let out = out_dirs(args)?.into_iter().next().flatten();
+    let mut quiet = args.options.clone();
+    (quiet.quiet, quiet.verbose) = (true, false);
+    let n_cases = bench_cases(args, &args.scenes[0], &quiet)?.cases.len();
+    let mut folder = out
+        .map(|dir| open_results(&dir, Existing::new(args.force), n_cases, args.plot))
+        .transpose()?;
+    let places = tempfile::tempdir().map_err(|cause| Error::io(Path::new("--starts"), cause))?;
+    let bar = progress(u64::from(args.starts), "starts", args.options.quiet);
+    let mut starts = Vec::new();
+    let mut ended = Ok(());
+    for i in 0..args.starts {
+        let place = places.path().join(i.to_string());
+        ended = start(&place, context, i == 0 && !args.options.quiet);
+        // A start that was cut short has other frames than the others.
+        if ended.is_ok() || starts.is_empty() {
+            starts.extend(read(&place)?);
+        }
+        if ended.is_err() {
+            break;
+        }
+        bar.advance();
+    }
+    drop(bar);
+    if starts.is_empty() {
+        return ended;
+    }
+    let mut joined = join(&starts)?;
+    joined.run.command = command_line();
+    joined.run.interrupted |= ended.is_err();
+    let Start { run, table } = joined;
+    let written = folder.as_mut().map_or(Ok(()), |folder| {
+        let charts = if args.plot { bench_plot::files(&run, &table.rows)? } else { vec![] };
+        let copy = |i: usize| {
+            let from = places.path().join("0").join(picture_file(i));
+            from.exists().then(|| (picture_file(i), from))
+        };
+        let copies = (0..n_cases).filter_map(copy).collect();
+        write_results(folder, &run, &table, &Attachments { pictures: vec![], charts, copies })
+    });
+    // The tables appear even where the files cannot be written.
+    if !args.json {
+        let same: Vec<Option<bool>> = (0..n_cases).map(|i| same_pictures(&starts, i)).collect();
+        let text = bench_table::report(&args.scenes[0], &run, &same, args.options.verbose);
+        output::text(&text)?;
+        if args.plot {
+            output::painted(&bench_plot::text(&run, &table.rows, context.color)?)?;
+        }
+    }
+    written?;
+    if let Some(folder) = &folder {
+        wrote_folder(folder, !run.interrupted, args.options.quiet);
+    }
+    let runs: Runs = Arc::new(Mutex::new(vec![]));
+    runs.lock().unwrap_or_else(PoisonError::into_inner).push(run);
+    print_json(args, &runs)?;
+    ended
+}
+
+/// Returns whether the last frames of a case are the same in all loops and starts; None if fewer
+/// than two are known. With impostors only equal loops of the starts are compared.
+fn same_pictures(starts: &[Start], i_case: usize) -> Option<bool> {
+    let of = |start: &Start| -> Vec<Option<String>> {
+        start.run.cases[i_case].modes.iter().map(|mode| mode.image_hash.clone()).collect()
+    };
+    let all: Vec<Vec<Option<String>>> = starts.iter().map(of).collect();
+    let n_known = all.iter().flatten().flatten().count();
+    (n_known > 1).then(|| all.windows(2).all(|w| w[0] == w[1]))
+}
+
+/// Runs one start. It is told where its results go by an argument that follows the command's name;
+/// all other arguments are those of this process. Its messages are printed if it `tells`.
+fn start(place: &Path, context: &Context<'_>, tells: bool) -> Result<()> {
+    let program = process::program()?;
+    let mut command = process::quiet(&program);
+    command.args(words(std::env::args_os().skip(1), place));
+    // Into a file: a pipe that nobody reads would hold the process up.
+    let log = place.with_extension("log");
+    let file = fs::File::create(&log).map_err(|cause| Error::io(&log, cause))?;
+    command.stderr(file).env("NIMBUS_PROGRESS_S", "0");
+    let child = command.spawn().map_err(|cause| Error::of_io(Path::new("nimbus"), &cause));
+    let failed = |cause| Error::io(Path::new("nimbus bench"), cause);
+    let status = process::wait(&mut child?, context.stop, IDLE_LIMIT).map_err(failed)?;
+    let text = fs::read(&log).map_err(|cause| Error::io(&log, cause))?;
+    let text = String::from_utf8_lossy(&text);
+    if context.stop.load(Ordering::Relaxed) {
+        return Err(Error::Interrupted);
+    }
+    match status.code() {
+        Some(0) => {
+            // What the first start says of the scene holds for all.
+            if tells {
+                text.lines().for_each(|line| say!("{line}"));
+            }
+            Ok(())
+        }
+        code => Err(error(code, &text)),
+    }
+}
+
+/// Returns the error of a process that failed, with its own exit code.
+fn error(code: Option<i32>, text: &str) -> Error {
+    let what = text.trim().strip_prefix("error: ").unwrap_or(text.trim()).to_owned();
+    match code {
+        Some(1) => Error::Check { what },
+        Some(2) => Error::usage(what),
+        Some(75) => Error::Transient { what },
+        Some(130) => Error::Interrupted,
+        _ => Error::Vulkan { call: "nimbus bench".to_owned(), what },
+    }
+}
+
+/// Returns the arguments of this process with the place of a start after the command's name.
+fn words(own: impl Iterator<Item = OsString>, place: &Path) -> Vec<OsString> {
+    let mut words: Vec<OsString> = own.collect();
+    let at = words.iter().position(|word| word == OsStr::new("bench")).map_or(0, |i| i + 1);
+    let more = [OsString::from("--as-start"), place.as_os_str().to_owned()];
+    words.splice(at..at, more);
+    words
+}
+
+/// Reads what a start wrote; none if it has written nothing.
+fn read(place: &Path) -> Result<Option<Start>> {
+    let path = place.join(FRAMES_FILE);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let table = parse_frames(&read_result(&path, TABLE_LIMIT)?, &path)?;
+    Ok(Some(Start { run: json::read(place)?, table }))
+}

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::bench_remarks::{
     clocks_line, drawn_line, empty_line, error_lines, latency_line, missing_lines, ms,
-    overlap_lines, skipping_line, spread_lines, still_line, still_lines,
+    overlap_lines, skipping_line, spread_lines, state_lines, still_line, still_lines,
 };
 use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
@@ -54,7 +54,7 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
             "{n_same} of {n_told} cases gave the same last frame in all their blocks, to the byte\n"
         );
     }
-    out + &missing_lines(run) + &clocks_line(&run.clocks)
+    out + &missing_lines(run) + &clocks_line(&run.clocks) + &state_lines(run, verbose)
 }
 
 const DIFFER: &str = "THE LAST FRAMES DIFFER between the blocks\n";

@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 use super::attachments::CasePicture;
 use super::cases::{Case, Loop};
 use super::check::{Check, DevicePicture, Stages};
+use super::state::{BenchState, BlockWatch, FrameMark};
 use crate::error::{Error, Result};
 use crate::frame::{Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
 use crate::gpu::hex;
@@ -49,6 +50,8 @@ pub struct Sample {
     pub times: FrameTimes,
     /// SHA-256 of the image, if it was asked for.
     pub image_hash: Option<String>,
+    /// What the state of the machine says about it.
+    pub mark: FrameMark,
 }
 
 /// Consecutive frames of one case in one loop.
@@ -85,6 +88,10 @@ pub struct Outcome {
     pub checks: BTreeMap<usize, Check>,
     /// Whether Ctrl-C came before the end.
     pub interrupted: bool,
+    /// Is told which block runs, without waiting for it.
+    pub watch: BlockWatch,
+    /// The state of the machine, if it was read.
+    pub state: Option<BenchState>,
 }
 
 /// A bench that has ended.
@@ -290,18 +297,27 @@ fn run_frames(
         return Err(Error::usage(what));
     }
     stage.set_skip(of.skip);
-    let n_before = lock(outcome).samples.len();
+    let (n_before, watch) = (lock(outcome).samples.len(), lock(outcome).watch.clone());
+    if plan.n_warm_up == 0 {
+        watch.begin(i_block);
+    }
     let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
         let image_hash = if plan.hash_frames { Some(image_hash(renderer)?) } else { None };
         {
             let samples = &mut lock(outcome).samples;
             let warm_up = samples.len() - n_before < plan.n_warm_up as usize;
-            samples.push(Sample { i_case, of, i_block, warm_up, times, image_hash });
+            let mark = FrameMark::default();
+            samples.push(Sample { i_case, of, i_block, warm_up, times, image_hash, mark });
+            if warm_up && samples.len() - n_before == plan.n_warm_up as usize {
+                watch.begin(i_block);
+            }
         }
         // Without the lock: stderr may hold the tick up, and Ctrl-C needs the samples.
         Ok(tick())
     };
-    stage.run(of.threading, frames_of(case, plan.n_warm_up), on_frame)
+    let ended = stage.run(of.threading, frames_of(case, plan.n_warm_up), on_frame);
+    watch.end(i_block);
+    ended
 }
 
 /// Returns the frames of a block: the warm-up, which leads up to the timed frames, and these.

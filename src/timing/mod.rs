@@ -6,10 +6,12 @@
 //! `frames.csv` ([`frame_rows`]), which [`results`] writes and reads with the files beside them
 //! ([`attachments`]). [`still`] remarks on scenes in which nothing moves. [`compare`] decides which
 //! of two results is faster; [`difference`] lists what else differs between them. [`parts`] joins a
-//! bench that several nodes timed. [`trace`] writes the frames as a time line. [`machine`],
-//! [`names`] and [`json`] serve all of them, and the studies too.
+//! bench that several nodes timed. [`trace`] writes the frames as a time line. [`state`] reads the
+//! clocks and the load of the machine beside the frames, and [`bench_state`] judges the frames by
+//! them. [`machine`], [`names`] and [`json`] serve all of them, and the studies too.
 
 pub mod attachments;
+pub mod bench_state;
 pub mod blocks;
 pub mod cases;
 pub mod check;
@@ -26,6 +28,7 @@ pub mod overlap;
 pub mod parts;
 pub mod records;
 pub mod results;
+pub mod state;
 pub mod still;
 pub mod sweep;
 pub mod trace;

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::bench_state::end_s;
 use super::blocks::{BenchPlan, Outcome, Sample};
 use super::cases::{Case, Loop};
 use super::frame_rows::{FrameRow, FrameTable};
@@ -67,7 +68,8 @@ impl Outcome {
     }
 
     fn timed(&self, i_case: usize, of: Loop) -> Timed<'_> {
-        Timed(self.of_loop(i_case, of).filter(|s| !s.warm_up).collect())
+        let is_timed = |s: &&Sample| !s.warm_up && !s.mark.is_discarded;
+        Timed(self.of_loop(i_case, of).filter(is_timed).collect())
     }
 
     /// Returns the records of all cases, in order.
@@ -96,6 +98,7 @@ impl Outcome {
             skipping: unskipped.and_then(|unskipped| self.skipping(i, case, unskipped)),
             figure: None,
             check: self.checks.get(&i).cloned(),
+            state: self.state.as_ref().and_then(|state| state.cases.get(&i).cloned()),
         };
         record.figure = record.figure_mode().map(Mode::name);
         record
@@ -179,6 +182,7 @@ impl Outcome {
 
     /// Returns the rows of `frames.csv`.
     pub fn table(&self, cases: &[Case]) -> FrameTable {
+        let zero = self.state.as_ref().map(|state| state.zero);
         let row = |s: &Sample| FrameRow {
             phase: cases[s.i_case].phase.clone().unwrap_or_default(),
             sweep: sweep_text(&cases[s.i_case].sweep),
@@ -200,6 +204,9 @@ impl Outcome {
             ran: ran(&s.times),
             pass_ms: Pass::ALL.map(|pass| pass_ms(&s.times, pass)).to_vec(),
             image_hash: s.image_hash.clone(),
+            end_s: zero.map(|zero| end_s(s, zero)),
+            throttled: Some(s.mark.flags.text()).filter(|text| !text.is_empty()),
+            discarded: s.mark.is_discarded,
         };
         let pass_names = Pass::ALL.map(|pass| pass.name().to_owned()).to_vec();
         FrameTable { pass_names, rows: self.samples.iter().map(row).collect() }

@@ -9,6 +9,7 @@ use super::json::ResultFile;
 use super::machine::{Clocks, Cpu, Device};
 use super::names::{Setting, case_name, loop_name, mode_name, sweep_text};
 use super::overlap::Overlap;
+use super::state::{CaseState, RunState};
 use crate::frame::Counts;
 use crate::measure::lows::Lows;
 use crate::measure::stats::Summary;
@@ -55,6 +56,10 @@ pub struct Run {
     pub parts: Vec<PartRecord>,
     /// Whether Ctrl-C or an error came before the end; the record then holds what was finished.
     pub interrupted: bool,
+    /// The state of the machine during the run. Null if it was not read, and where nodes of a farm
+    /// timed the cases: `parts` then has that of each node.
+    #[serde(default)]
+    pub state: Option<RunState>,
 }
 
 impl Run {
@@ -113,6 +118,9 @@ pub struct Case {
     /// The check of its pictures. Null in results of versions that did not check them.
     #[serde(default)]
     pub check: Option<Check>,
+    /// The state of the machine while its timed frames ran; null if it was not read.
+    #[serde(default)]
+    pub state: Option<CaseState>,
 }
 
 impl Case {
@@ -319,6 +327,9 @@ pub struct PartRecord {
     pub clocks: Clocks,
     /// The first case of all as this node timed it, one record a loop; shows how far nodes differ.
     pub base: Vec<BaseTime>,
+    /// The state of the node while it timed its cases; null if it was not read.
+    #[serde(default)]
+    pub state: Option<RunState>,
 }
 
 /// The time that a node took for the first case, in one loop.

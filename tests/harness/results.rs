@@ -91,11 +91,13 @@ pub fn run(modes: Vec<Mode>) -> Run {
             counts: None,
             figure: None,
             check: None,
+            state: None,
         }],
         stages: None,
         chosen: Vec::new(),
         parts: Vec::new(),
         interrupted: false,
+        state: None,
     }
 }
 
@@ -122,5 +124,8 @@ pub fn row(threading: &str, frame: u32) -> FrameRow {
         ran: "sort+sprites".to_owned(),
         pass_ms: Vec::new(),
         image_hash: None,
+        end_s: None,
+        throttled: None,
+        discarded: false,
     }
 }

@@ -48,6 +48,7 @@ fn case(k: usize, ms: f64) -> Case {
         counts: None,
         figure: None,
         check: None,
+        state: None,
     }
 }
 
@@ -78,6 +79,9 @@ fn row(k: usize, threading: &str, block: u32, frame: usize, ms: f64) -> FrameRow
         ran: "sort".to_owned(),
         pass_ms: vec![Some(0.5)],
         image_hash: None,
+        end_s: None,
+        throttled: None,
+        discarded: false,
     }
 }
 

@@ -297,7 +297,8 @@ fn run_frames(
         return Err(Error::usage(what));
     }
     stage.set_skip(of.skip);
-    let (n_before, watch) = (lock(outcome).samples.len(), lock(outcome).watch.clone());
+    let n_before = lock(outcome).samples.len();
+    let watch = lock(outcome).watch.clone();
     if plan.n_warm_up == 0 {
         watch.begin(i_block);
     }

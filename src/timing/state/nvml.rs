@@ -16,6 +16,7 @@ pub fn open(_: &str, _: Option<&str>) -> Result<Box<dyn DeviceSource>, String> {
 }
 
 /// A GPU as NVML lists it.
+#[cfg_attr(not(any(target_os = "linux", windows)), allow(dead_code))]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Listed {
     /// "GPU-" and the UUID that Vulkan has, too.
@@ -26,6 +27,7 @@ pub struct Listed {
 
 /// Returns the place in NVML's list of the GPU with this UUID of Vulkan or, failing that, at this
 /// PCI address. Neither the name nor the order can tell two equal cards apart.
+#[cfg_attr(not(any(target_os = "linux", windows)), allow(dead_code))]
 pub fn place(all: &[Listed], uuid: &str, address: Option<&str>) -> Option<usize> {
     let digits = |uuid: &str| {
         let digits = uuid.strip_prefix("GPU-").unwrap_or(uuid).replace('-', "");

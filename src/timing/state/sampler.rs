@@ -112,7 +112,8 @@ impl Sampler {
         let started = thread::Builder::new().name("state".to_owned()).spawn(move || {
             let (sources, notes) = Sources::open(&named, memory, &folders);
             let mut reader = Reader { sources, log: of_thread };
-            (reader.log.lock().sources, reader.log.lock().notes) = (reader.sources.names(), notes);
+            reader.log.lock().sources = reader.sources.names();
+            reader.log.lock().notes = notes;
             reader.read(Event::Start, None);
             // Whoever waits may have given up.
             let _ = ready.send(());

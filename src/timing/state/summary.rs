@@ -67,17 +67,19 @@ impl Observed<'_> {
         };
         let drift = rules::drift(&rows.iter().filter_map(point).collect::<Vec<_>>());
 
-        let all: Vec<(&TimedFrame, Flags)> = self.frames.iter().zip(flags.clone()).collect();
-        let i_cases = self.frames.iter().map(|frame| frame.i_case);
-        let mut cases: BTreeMap<usize, CaseState> = BTreeMap::new();
-        for i in i_cases {
-            cases.entry(i).or_insert_with(|| {
-                let is_of = |row: &&&StateRow| frame_of(row).is_some_and(|f| f.i_case == i);
-                let rows: Vec<&StateRow> = rows.iter().filter(is_of).copied().collect();
-                let flags = all.iter().filter(|(frame, _)| frame.i_case == i).map(|(_, f)| *f);
-                self.case(&rows, &flags.collect::<Vec<_>>())
-            });
+        let mut of_cases: BTreeMap<usize, (Vec<&StateRow>, Vec<Flags>)> = BTreeMap::new();
+        for (frame, flags) in self.frames.iter().zip(&flags) {
+            of_cases.entry(frame.i_case).or_default().1.push(*flags);
         }
+        for row in &rows {
+            if let Some(frame) = frame_of(row) {
+                of_cases.entry(frame.i_case).or_default().0.push(row);
+            }
+        }
+        let case = |(i, (rows, flags)): (usize, (Vec<&StateRow>, Vec<Flags>))| {
+            (i, self.case(&rows, &flags))
+        };
+        let cases = of_cases.into_iter().map(case).collect();
         let start = self.rows.iter().find(|row| row.event == Event::Start);
         let counts = self.rows.iter().filter_map(|row| row.cpu_throttles);
         let counted = counts.clone().next().zip(counts.last());

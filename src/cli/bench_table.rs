@@ -11,6 +11,7 @@ use crate::measure::lows::fps;
 use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::names::loop_name;
 use crate::timing::records::{Block, Case, Measured, Mode, Ratio, Run};
+use crate::timing::state::case_line;
 use crate::timing::still::skipped_text;
 
 /// Returns the whole text. `same` says for each case whether the last frames of its blocks have the
@@ -43,6 +44,8 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
     for (case, same) in run.cases.iter().zip(same) {
         if run.cases.len() == 1 || verbose {
             out += &case_report(case, *same);
+            let state = case.state.as_ref().filter(|_| run.cases.len() > 1);
+            out += &state.and_then(case_line).unwrap_or_default();
         } else if *same == Some(false) {
             out += &format!("{}: {DIFFER}", case.name());
         }

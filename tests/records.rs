@@ -19,6 +19,7 @@ use nimbus::timing::records::{
     BaseTime, Case, Measured, Mode, PartRecord, Pass, Ratio, Reason, Run, Skipping,
 };
 use nimbus::timing::results::{RUN_FILE, open_results};
+use nimbus::timing::state::{CaseState, Drift, RunState, Spread, ThrottleCount};
 use serde_json::{Value, json};
 
 fn schema() -> Value {
@@ -74,6 +75,38 @@ fn mode(threading: &str) -> Mode {
     }
 }
 
+/// The state of a machine with every source.
+fn run_state() -> RunState {
+    let spread = Spread::of(&[1905.0, 1890.0, 1920.0]);
+    let all = CaseState {
+        n_readings: 3,
+        gpu_mhz: spread,
+        gpu_memory_mhz: spread,
+        gpu_c: spread,
+        gpu_w: spread,
+        cpu_mhz: spread,
+        throttle: Some(vec![ThrottleCount { reason: "sw_power_cap".to_owned(), n: 2 }]),
+        peak_process_bytes: Some(1 << 30),
+        peak_own_bytes: Some(1 << 29),
+        others_share: Some(0.25),
+        n_slow_clock: 1,
+        n_slowdown: 2,
+        n_limited: 3,
+        n_discarded: 2,
+    };
+    RunState {
+        sources: vec!["NVML".to_owned()],
+        clock: "gpu".to_owned(),
+        all,
+        drift: Some(Drift { last_by_first: 0.95, low: 0.94, high: 0.96, drifts: true }),
+        governor: Some("powersave".to_owned()),
+        turbo: Some(true),
+        load_at_start: Some(0.5),
+        cpu_throttles: Some(1),
+        remarks: vec!["the clock drifts".to_owned()],
+    }
+}
+
 fn sample() -> Run {
     let blank = results::run(vec![mode("serial"), mode("parallel")]);
     let case = Case {
@@ -86,6 +119,7 @@ fn sample() -> Run {
         ),
         skipping: Some(Skipping { gpu_ms: 1.0, gpu_no_skip_ms: 3.0, same_bytes: Some(true) }),
         counts: Some(Counts { values: 8, ..Counts::default() }),
+        state: Some(run_state().all),
         ..blank.cases[0].clone()
     };
     let base = BaseTime { threading: "serial".to_owned(), skip: true, p50_ms: Some(1.5) };
@@ -96,6 +130,7 @@ fn sample() -> Run {
         date: utc_now(),
         clocks: blank.clocks,
         base: vec![base],
+        state: Some(run_state()),
     };
     Run {
         nimbus: env!("CARGO_PKG_VERSION").to_owned(),
@@ -105,6 +140,7 @@ fn sample() -> Run {
         cases: vec![case],
         chosen: vec!["draw.path = \"auto\" took \"tiles\"".to_owned()],
         parts: vec![part],
+        state: Some(run_state()),
         ..blank
     }
 }
@@ -138,8 +174,10 @@ fn a_full_and_a_bare_run_satisfy_the_schema() {
             overlap: None,
             skipping: None,
             counts: None,
+            state: Some(CaseState::default()),
             ..sample().cases[0].clone()
         }],
+        state: Some(RunState { clock: "cpu".to_owned(), ..RunState::default() }),
         block_order: Vec::new(),
         parts: Vec::new(),
         interrupted: true,
@@ -155,6 +193,18 @@ fn a_run_of_one_process_has_no_parts() {
     let value = serde_json::to_value(Run { parts: Vec::new(), ..sample() }).unwrap();
     assert!(value.get("parts").is_none());
     assert!(serde_json::from_value::<Run>(value).unwrap().parts.is_empty());
+}
+
+#[test]
+fn results_without_a_state_are_read() {
+    let mut value = serde_json::to_value(sample()).unwrap();
+    for pointer in ["", "/cases/0", "/parts/0"] {
+        let object = value.pointer_mut(pointer).and_then(Value::as_object_mut).unwrap();
+        assert!(object.remove("state").is_some(), "{pointer}");
+    }
+    assert_eq!(complaints(&value), [""; 0]);
+    let run: Run = serde_json::from_value(value).unwrap();
+    assert!(run.state.is_none() && run.cases[0].state.is_none() && run.parts[0].state.is_none());
 }
 
 #[test]
@@ -176,6 +226,10 @@ fn the_schema_rejects_wrong_values() {
         ("/parts/0/node", Value::Null),
         ("/parts/0/base/0/p50_ms", json!(-1)),
         ("/parts", json!([])),
+        ("/state/clock", json!("sun")),
+        ("/state/all/others_share", json!(1.5)),
+        ("/state/drift/drifts", Value::Null),
+        ("/cases/0/state/n_discarded", json!(-1)),
     ] {
         let mut bad = good.clone();
         *bad.pointer_mut(pointer).unwrap() = wrong;
@@ -234,8 +288,9 @@ fn keys_and_their_order_match_the_schema() {
     );
     // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its
     // share, skipping, counts; twice a mode, seven summaries, lows, two passes, a reason. A part,
-    // its clocks and its time.
-    assert_eq!(n_compared, 3 + 4 + 2 + 7 + 2 * (1 + 7 + 1 + 2 + 1));
+    // its clocks and its time. The state of the case, with five spreads and a reason; of run and
+    // part, each of which has that of all cases, and a drift.
+    assert_eq!(n_compared, 7 + 2 * (1 + 7 + 1) + 3 + 4 + 2 + 7 + 2 * (1 + 7 + 1 + 2 + 1));
 }
 
 #[test]
@@ -254,11 +309,11 @@ fn a_run_is_read_as_it_was_written() {
         fs::read_to_string(out_dir.join(FRAMES_FILE)).unwrap(),
         "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,\
          submit_ms,wait_ms,gpu_ms,latency_ms,queue_depth,n_drawn,ran,gpu_sort_ms,gpu_first_ms,\
-         image_hash\n\
+         image_hash,end_s,throttled,discarded\n\
          0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,\
-         1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
+         1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,,,,false\n\
          1,dense,\"a=1, b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,\
-         1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n"
+         1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,,,,false\n"
     );
 }
 

@@ -8,6 +8,8 @@ mod checks;
 mod program;
 #[path = "harness/results.rs"]
 mod results;
+#[path = "report/state.rs"]
+mod state;
 #[path = "report/still.rs"]
 mod still;
 #[path = "harness/studies.rs"]
@@ -328,6 +330,7 @@ fn bench_replaces_only_its_own_files() {
         "passes.svg",
         "run.json",
         "run.sha256",
+        "state.csv",
     ];
     assert_eq!(swept, all);
     // The picture equals that of `render`.
@@ -342,6 +345,6 @@ fn bench_replaces_only_its_own_files() {
     fs::write(format!("{out}/picture-7.png"), "mine").expect("a file");
     assert_eq!(
         bench(&["--force"]),
-        ["case-0.png", "frames.csv", "picture-7.png", "run.json", "run.sha256"]
+        ["case-0.png", "frames.csv", "picture-7.png", "run.json", "run.sha256", "state.csv"]
     );
 }

@@ -841,9 +841,9 @@ FRAME_COLUMNS = (
 def _kind_of_frame_column(name: str) -> Convert:
     if name in ("i_row", "block", "frame", "queue_depth", "n_drawn"):
         return _integers
-    if name in ("skip", "warm_up"):
+    if name in ("skip", "warm_up", "discarded"):
         return _truths
-    return _times if name == "time_s" or name.endswith("_ms") else _texts
+    return _times if name in ("time_s", "end_s") or name.endswith("_ms") else _texts
 
 
 class Run(_Result):
@@ -965,17 +965,24 @@ class Run(_Result):
             "saved_ms": of["saved_ms"].number(),
         }
 
+    def _is_timed(self) -> np.ndarray:
+        """Returns which rows of `frames` are in the statistics: neither warm-up nor throttled
+        frames that --discard-throttled left out. Earlier versions have no column of these."""
+        frames = self.table("frames")
+        is_timed = ~frames["warm_up"]
+        return is_timed & ~frames["discarded"] if "discarded" in frames else is_timed
+
     def _is_of(self, i: int) -> np.ndarray:
         """Returns which rows of `frames` are timed frames of row `i` of `loops`."""
         frames, loops = self.table("frames"), self.loops
-        result = ~frames["warm_up"] & (frames["skip"] == loops["skip"][i])
+        result = self._is_timed() & (frames["skip"] == loops["skip"][i])
         for name in ("threading", "phase", "sweep"):
             result &= (frames[name] == loops[name][i]).astype(bool)
         return result
 
     def check_frames(self, path: Path) -> None:
         """Raises ResultsError if `frames` are not those of the record; `path` is their file."""
-        n_left = int((~self.table("frames")["warm_up"]).sum())
+        n_left = int(self._is_timed().sum())
         for i, expected in enumerate(self.loops["frames"]):
             n = int(self._is_of(i).sum())
             n_left -= n

@@ -25,6 +25,7 @@ use crate::timing::cases::Case;
 use crate::timing::machine;
 use crate::timing::results::open_results;
 use crate::timing::running::{self, Event, Finished};
+use crate::timing::state::Sampler;
 
 /// Readings of the device's clock and the host's, before the frames and again after them.
 const N_CLOCK_READINGS: usize = 8;
@@ -134,6 +135,11 @@ fn bench_scene(
     let clocks = machine::clocks_record(&info, pass_times, &mut stage.renderer)?;
     // Read before and after the frames, to measure the drift between the two clocks.
     let readings = stage.device.read_clocks(N_CLOCK_READINGS)?;
+    let sampler = (!args.no_state).then(|| Sampler::start(&stage.device));
+    if args.options.verbose {
+        let notes = sampler.as_ref().map(|sampler| sampler.log().notes());
+        notes.into_iter().flatten().for_each(|note| say!("note: {note}"));
+    }
     let (color, zones) = (context.color, context.zones.cloned());
     let (args, path) = (args.clone(), path.to_owned());
     let recorder = Arc::new(Recorder {
@@ -150,8 +156,10 @@ fn bench_scene(
         clocks,
         zones,
         readings,
+        state: sampler.as_ref().map(Sampler::log),
     });
-    let outcome = Arc::new(Mutex::new(Outcome::default()));
+    let watch = sampler.as_ref().map(Sampler::watch).unwrap_or_default();
+    let outcome = Arc::new(Mutex::new(Outcome { watch, ..Outcome::default() }));
     let mut keeping = {
         let (recorder, outcome, runs) = (recorder.clone(), outcome.clone(), runs.clone());
         interrupt::keep(PATIENCE, move || recorder.keep(&outcome, &runs))
@@ -163,12 +171,14 @@ fn bench_scene(
     }
     let begin = Instant::now();
     let ended = time(stage, &recorder, context.stop, &outcome);
+    drop(sampler);
     // After a failure the device may be lost or hung.
     if ended.failure.is_none() {
         bench_check::run(&recorder, begin.elapsed(), context.stop, &outcome);
     }
     keeping.finish();
-    let outcome = std::mem::take(&mut *blocks::lock(&outcome));
+    let mut outcome = std::mem::take(&mut *blocks::lock(&outcome));
+    recorder.judge(&mut outcome);
     let Finished { stage, failure } = ended;
     if let (Some(failure), true) = (&failure, outcome.samples.is_empty()) {
         drop(lock_folder(&recorder.folder).take());

@@ -15,6 +15,7 @@ use crate::io::console::say;
 use crate::io::process_info::command_line;
 use crate::measure::zones::Zones;
 use crate::timing::attachments::Attachments;
+use crate::timing::bench_state::Judging;
 use crate::timing::blocks::{self, BenchPlan, Outcome};
 use crate::timing::cases::Case;
 use crate::timing::frame_rows::FrameTable;
@@ -23,6 +24,7 @@ use crate::timing::machine::{self, Clocks};
 use crate::timing::precision::PrecisionRecord;
 use crate::timing::records::Run;
 use crate::timing::results::write_results;
+use crate::timing::state::{BenchState, STATE_FILE, StateLog, rows_text};
 use crate::timing::trace;
 
 /// The conditions of a bench of one scene, and where its results go.
@@ -53,12 +55,22 @@ pub struct Recorder {
     pub zones: Option<Zones>,
     /// Readings of the device's clock and the host's before the frames.
     pub readings: Vec<ClockSample>,
+    /// The state of the machine, if it is read.
+    pub state: Option<StateLog>,
 }
 
 /// The records of the scenes that are done, for `--json`.
 pub type Runs = Arc<Mutex<Vec<Run>>>;
 
 impl Recorder {
+    /// Judges the frames by the state of the machine, before they are recorded.
+    pub fn judge(&self, outcome: &mut Outcome) {
+        let Some(log) = &self.state else { return };
+        let is_cpu = self.info.kind == "cpu";
+        let n_cores = machine::cpu().logical_cores;
+        outcome.judge(log, Judging { is_cpu, n_cores, discard: self.args.discard_throttled });
+    }
+
     /// Writes and prints the results, and returns the record. `later` are the readings of the
     /// clocks after the frames.
     ///
@@ -110,6 +122,7 @@ impl Recorder {
             say!("no frame was finished, nothing is kept");
             return Error::Interrupted;
         }
+        self.judge(&mut outcome);
         let printed = self.record(&outcome, &[], true).and_then(|run| {
             before.lock().unwrap_or_else(PoisonError::into_inner).push(run);
             print_json(&self.args, before)
@@ -141,6 +154,7 @@ impl Recorder {
                 seed: asked.seed,
                 limit_s: asked.limit.as_secs_f64(),
             }),
+            state: outcome.state.as_ref().map(|state| state.run.clone()),
         }
     }
 
@@ -149,7 +163,9 @@ impl Recorder {
         let Some(folder) = &mut *folder else { return Ok(()) };
         let charts = if self.args.plot { bench_plot::files(run, &table.rows)? } else { vec![] };
         let pictures = outcome.pictures.clone();
-        let attachments = Attachments { pictures, charts, copies: vec![] };
+        let readings = |state: &BenchState| Ok((STATE_FILE.to_owned(), rows_text(&state.rows)?));
+        let tables = outcome.state.as_ref().map(readings).into_iter().collect::<Result<_>>()?;
+        let attachments = Attachments { pictures, charts, tables, copies: vec![] };
         write_results(folder, run, table, &attachments)
     }
 

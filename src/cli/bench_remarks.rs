@@ -11,6 +11,7 @@ use crate::timing::machine::Clocks;
 use crate::timing::overlap::Overlap;
 use crate::timing::precision::{Limit, PrecisionRecord};
 use crate::timing::records::{Case, Mode, Run, Skipping};
+use crate::timing::state::{remark_lines, run_line};
 use crate::timing::still::{NO_RATIO, StillRemark, empty_frames_text};
 
 /// Returns a time in ms with three decimals.
@@ -155,6 +156,13 @@ pub fn pass_times_text(how: PassTimes) -> &'static str {
     }
 }
 
+/// Returns what disturbed the times; with `verbose` also the readings of the machine's state.
+pub fn state_lines(run: &Run, verbose: bool) -> String {
+    let Some(state) = &run.state else { return String::new() };
+    let readings = if verbose { run_line(state) } else { String::new() };
+    readings + &remark_lines(state)
+}
+
 /// Returns the lines that come before all tables if nothing moves in a case.
 pub fn still_lines(run: &Run) -> String {
     let Some(remark) = StillRemark::of(run) else { return String::new() };
@@ -191,7 +199,11 @@ pub fn missing_lines(run: &Run) -> String {
     }
     for (case, mode) in run.modes() {
         if mode.frames == 0 {
-            add(format!("{}: no timed frame: the run ended before", mode.name_in(case)));
+            let why = match case.state.as_ref().map_or(0, |state| state.n_discarded) {
+                0 => "the run ended before",
+                _ => "the device was throttled in all of them (--discard-throttled)",
+            };
+            add(format!("{}: no timed frame: {why}", mode.name_in(case)));
         } else if lacks_interval(mode) && mode.frames >= N_FRAMES_NEEDED {
             let n_starts = run.n_starts();
             let why = if (2..N_STARTS_NEEDED).contains(&n_starts) {

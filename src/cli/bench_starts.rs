@@ -81,7 +81,12 @@ pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
             from.exists().then(|| (picture_file(i), from))
         };
         let copies = (0..n_cases).filter_map(copy).collect();
-        write_results(folder, &run, &table, &Attachments { pictures: vec![], charts, copies })
+        write_results(
+            folder,
+            &run,
+            &table,
+            &Attachments { charts, copies, ..Attachments::default() },
+        )
     });
     // The tables appear even where the files cannot be written.
     if !args.json {

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::bench_remarks::{
     clocks_line, drawn_line, empty_line, error_lines, latency_line, missing_lines, ms,
-    overlap_lines, precision_lines, skipping_line, spread_lines, still_line, still_lines,
+    overlap_lines, precision_lines, skipping_line, spread_lines, state_lines, still_line,
+    still_lines,
 };
 use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
@@ -12,6 +13,7 @@ use crate::timing::N_FRAMES_NEEDED;
 use crate::timing::names::loop_name;
 use crate::timing::precision::PrecisionRecord;
 use crate::timing::records::{Block, Case, Measured, Mode, Ratio, Run};
+use crate::timing::state::case_line;
 use crate::timing::still::skipped_text;
 
 /// Returns the whole text. `same` says for each case whether the last frames of its blocks have the
@@ -44,6 +46,8 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
     for (case, same) in run.cases.iter().zip(same) {
         if run.cases.len() == 1 || verbose {
             out += &case_report(case, *same);
+            let state = case.state.as_ref().filter(|_| run.cases.len() > 1);
+            out += &state.and_then(case_line).unwrap_or_default();
         } else if *same == Some(false) {
             out += &format!("{}: {DIFFER}", case.name());
         }
@@ -55,7 +59,8 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
             "{n_same} of {n_told} cases gave the same last frame in all their blocks, to the byte\n"
         );
     }
-    out + &precision_lines(run) + &missing_lines(run) + &clocks_line(&run.clocks)
+    out += &(precision_lines(run) + &missing_lines(run) + &clocks_line(&run.clocks));
+    out + &state_lines(run, verbose)
 }
 
 const DIFFER: &str = "THE LAST FRAMES DIFFER between the blocks\n";

@@ -7,11 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::gpu::DeviceInfo;
-
-/// Vendors by their PCI numbers.
-const NVIDIA: u32 = 0x10de;
-const AMD: u32 = 0x1002;
-const INTEL: u32 = 0x8086;
+use crate::timing::state::{AMD, INTEL, NVIDIA, card};
 
 /// Returns the commands for each device; `sys` is the folder /sys.
 pub fn text(devices: &[DeviceInfo], sys: &Path) -> String {
@@ -27,11 +23,12 @@ struct Lock {
 }
 
 fn lock(device: &DeviceInfo, sys: &Path) -> String {
+    let address = device.pci_address.as_deref();
     let found = match (device.kind, device.vendor) {
         ("cpu", _) => of_processor(sys),
         (_, NVIDIA) => Ok(of_nvidia(&device.uuid)),
-        (_, AMD) => card(device, sys).and_then(|card| of_amd(&card)),
-        (_, INTEL) => card(device, sys).and_then(|card| of_intel(&card)),
+        (_, AMD) => card(sys, address, None).and_then(|card| of_amd(&card)),
+        (_, INTEL) => card(sys, address, None).and_then(|card| of_intel(&card)),
         _ => Err("nimbus knows no commands for this maker's devices".to_owned()),
     };
     let indented = |lines: &[String]| -> String {
@@ -123,25 +120,6 @@ fn of_processor(sys: &Path) -> Result<Lock, String> {
     }
     let remark = "without turbo, and with no other load, the processor keeps its clock".to_owned();
     Ok(Lock { lock, unlock, remark })
-}
-
-/// Returns the device's folder in /sys/class/drm.
-fn card(device: &DeviceInfo, sys: &Path) -> Result<PathBuf, String> {
-    let address = device.pci_address.as_ref().ok_or("the driver does not tell its PCI address")?;
-    let folder = sys.join("class/drm");
-    let entries = fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let is_card = |path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let digits = name.strip_prefix("card");
-        digits.is_some_and(|d| !d.is_empty() && d.chars().all(|c| c.is_ascii_digit()))
-    };
-    let has_address = |path: &PathBuf| {
-        let device = fs::canonicalize(path.join("device"));
-        device.is_ok_and(|device| device.file_name().is_some_and(|name| name == address.as_str()))
-    };
-    let mut all = entries.flatten().map(|entry| entry.path()).filter(is_card);
-    let found = all.find(has_address);
-    found.ok_or_else(|| format!("no card of {} has its address {address}", folder.display()))
 }
 
 /// Returns a path that exists.

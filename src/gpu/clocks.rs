@@ -108,7 +108,7 @@ impl Device {
             }
             .of_call("vkGetCalibratedTimestamps", "")?;
             let (host, reading_ns) = instant_of(calibration.domain, clocks[1]);
-            let device_ns = self.limits().ticks_ns(clocks[0]);
+            let device_ns = self.shared().tick_clock.ns(&clocks[..1], host)[0];
             Ok(ClockSample { device_ns, host, deviation_ns: deviation_ns as f64 + reading_ns })
         };
         (0..n).map(|_| read()).collect()

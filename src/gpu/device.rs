@@ -17,9 +17,11 @@ use super::guard::Guards;
 use super::instance::Instance;
 use super::limits::Limits;
 use super::lowered::LoweredLimits;
+use super::memory_count::MemoryCount;
 use super::over_limit::OverLimit;
 use super::pass_times::PassTimes;
 use super::statistics::{PipelineReport, Reports};
+use super::tick_clock::TickClock;
 use crate::error::{Error, Result};
 
 /// The way in which a device is opened.
@@ -57,6 +59,10 @@ pub(super) struct SharedDevice {
     pub queue_family: u32,
     pub limits: Limits,
     pub allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
+    /// Device-local memory in use.
+    pub memory_count: Arc<MemoryCount>,
+    /// Timestamps, which may wrap, as times that do not.
+    pub tick_clock: TickClock,
     /// Names and labels for the tools that show them.
     pub debug: Option<ext::debug_utils::Device>,
     /// The guard bands of buffers, where they are wanted.
@@ -140,6 +146,8 @@ impl Device {
             queue_family: info.queue_family,
             limits: info.limits,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
+            memory_count: Arc::default(),
+            tick_clock: TickClock::new(&info.limits),
             debug,
             guards: options.guard.then(Guards::default),
             max_submit_ns: max_submit_ms.map(|ms| 1e6 * ms),
@@ -289,27 +297,6 @@ impl SharedDevice {
     ) -> Owned<H> {
         self.name(raw, name);
         Owned { raw, destroy, shared: self.clone() }
-    }
-
-    /// Creates a semaphore; a timeline semaphore starts at 0.
-    pub fn semaphore(
-        self: &Arc<Self>,
-        name: &str,
-        kind: vk::SemaphoreType,
-    ) -> Result<Owned<vk::Semaphore>> {
-        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(kind);
-        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
-        let raw =
-            unsafe { self.raw.create_semaphore(&info, None) }.of_call("vkCreateSemaphore", name)?;
-        Ok(self.own(raw, name, ash::Device::destroy_semaphore))
-    }
-
-    /// Creates a command pool of the device's queue family.
-    pub fn command_pool(self: &Arc<Self>, name: &str) -> Result<Owned<vk::CommandPool>> {
-        let info = vk::CommandPoolCreateInfo::default().queue_family_index(self.queue_family);
-        let raw = unsafe { self.raw.create_command_pool(&info, None) }
-            .of_call("vkCreateCommandPool", name)?;
-        Ok(self.own(raw, name, ash::Device::destroy_command_pool))
     }
 }
 

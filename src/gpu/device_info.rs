@@ -323,7 +323,11 @@ fn has_pipeline_statistics(instance: &ash::Instance, physical: vk::PhysicalDevic
 }
 
 /// Whether a device lists an extension; false where the list cannot be read.
-fn has_extension(instance: &ash::Instance, physical: vk::PhysicalDevice, name: &CStr) -> bool {
+pub(super) fn has_extension(
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    name: &CStr,
+) -> bool {
     let extensions = unsafe { instance.enumerate_device_extension_properties(physical) };
     extensions.is_ok_and(|all| all.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
 }

@@ -73,11 +73,6 @@ impl Limits {
             && (self.is_subgroup_size_fixed || self.can_choose_subgroup_size)
     }
 
-    /// Returns the nanoseconds from the device's own zero to a timestamp of its queue.
-    pub(super) fn ticks_ns(&self, ticks: u64) -> f64 {
-        (ticks & self.tick_mask()) as f64 * self.timestamp_period_ns
-    }
-
     /// Returns a mask of the timestamp bits that count.
     pub(super) fn tick_mask(&self) -> u64 {
         u64::MAX.checked_shr(64 - self.timestamp_valid_bits).unwrap_or(0)

@@ -13,6 +13,8 @@ use crate::error::{Error, Result};
 pub(super) struct Memory {
     /// None only while it is dropped.
     allocation: Option<Allocation>,
+    /// Its bytes, if it is memory of the device.
+    local_bytes: u64,
     shared: Arc<SharedDevice>,
 }
 
@@ -45,7 +47,11 @@ impl Memory {
                 e => Error::vulkan(format!("allocating {name}"), format!("{bytes}: {e}")),
             }
         })?;
-        Ok(Memory { allocation: Some(allocation), shared: shared.clone() })
+        let local = vk::MemoryPropertyFlags::DEVICE_LOCAL;
+        let is_local = allocation.memory_properties().contains(local);
+        let local_bytes = if is_local { allocation.size() } else { 0 };
+        shared.memory_count.add(local_bytes);
+        Ok(Memory { allocation: Some(allocation), local_bytes, shared: shared.clone() })
     }
 
     /// Returns the memory block and the offset in it, in bytes.
@@ -73,6 +79,7 @@ impl Memory {
 
 impl Drop for Memory {
     fn drop(&mut self) {
+        self.shared.memory_count.remove(self.local_bytes);
         if let Some(allocation) = self.allocation.take()
             && !self.shared.is_abandoned()
         {

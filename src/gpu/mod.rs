@@ -29,6 +29,8 @@ mod labels;
 mod limits;
 mod lowered;
 mod memory;
+mod memory_count;
+mod memory_use;
 mod over_limit;
 #[cfg(feature = "window")]
 mod overlay;
@@ -46,6 +48,8 @@ mod statistics;
 mod surface;
 #[cfg(feature = "window")]
 mod swapchain;
+mod sync_objects;
+mod tick_clock;
 mod timer;
 mod validation;
 
@@ -66,6 +70,7 @@ pub use interface::Field;
 pub use kernel::Kernel;
 pub use limits::Limits;
 pub use lowered::LoweredLimits;
+pub use memory_use::{DeviceMemory, MemoryProbe};
 #[cfg(feature = "window")]
 pub use overlay::{Backdrop, Overlay, Widgets};
 pub use pass_times::PassTimes;

@@ -1,6 +1,7 @@
 //! Times of the scopes of one submission, from GPU timestamps.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use ash::vk;
 
@@ -118,18 +119,12 @@ impl Timer {
     pub fn read(&self) -> Result<Vec<ScopeTime>> {
         let Some(Queries { ticks, .. }) = &self.queries else { return Ok(vec![]) };
         let ticks: Vec<u64> = ticks.read(2 * self.names.len())?;
-        let limits = &self.shared.limits;
-        let mask = limits.tick_mask();
-        let times = self.names.iter().zip(ticks.chunks_exact(2)).map(|(name, t)| {
-            // The counter wraps at its valid bits; a difference modulo them is right all the same.
-            let n_ticks = t[1].wrapping_sub(t[0]) & mask;
-            let begin_ns = limits.ticks_ns(t[0]);
-            ScopeTime {
-                name,
-                begin_ns,
-                end_ns: begin_ns + n_ticks as f64 * limits.timestamp_period_ns,
-            }
-        });
+        let ns = self.shared.tick_clock.ns(&ticks, Instant::now());
+        let of = |(name, ns): (&&'static str, &[f64])| {
+            let [begin_ns, end_ns] = [ns[0], ns[1]];
+            ScopeTime { name, begin_ns, end_ns }
+        };
+        let times = self.names.iter().zip(ns.chunks_exact(2)).map(of);
         Ok(times.collect())
     }
 }

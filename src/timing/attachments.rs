@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use super::state::STATE_FILE;
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::io::image::write_bytes;
@@ -43,6 +44,8 @@ pub struct Attachments {
     pub pictures: Vec<CasePicture>,
     /// File names and SVG documents.
     pub charts: Vec<(String, String)>,
+    /// File names and texts of tables.
+    pub tables: Vec<(String, String)>,
     /// File names, and the finished pictures that are copied to them.
     pub copies: Vec<(String, PathBuf)>,
 }
@@ -60,6 +63,7 @@ pub fn frames_chart(i: usize, n: usize) -> String {
 /// Returns the names of the files that a bench of `n_cases` may write beside its record.
 pub fn planned(n_cases: usize, has_charts: bool) -> Vec<String> {
     let mut names: Vec<String> = (0..n_cases).map(picture_file).collect();
+    names.push(STATE_FILE.to_owned());
     if has_charts {
         names.extend((0..n_cases).map(|i| frames_chart(i, n_cases)));
         names.extend([FRAMES_CHART, PASSES_CHART].map(str::to_owned));
@@ -71,8 +75,8 @@ impl Attachments {
     /// Returns the names of all files.
     pub(super) fn names(&self) -> Vec<String> {
         let pictures = self.pictures.iter().map(|p| picture_file(p.i_case));
-        let charts = self.charts.iter().map(|(name, _)| name.clone());
-        pictures.chain(charts).chain(self.copies.iter().map(|(name, _)| name.clone())).collect()
+        let texts = self.charts.iter().chain(&self.tables).map(|(name, _)| name.clone());
+        pictures.chain(texts).chain(self.copies.iter().map(|(name, _)| name.clone())).collect()
     }
 
     /// Writes all files into `folder`.
@@ -88,7 +92,7 @@ impl Attachments {
                 input_file::read(from, PICTURE_LIMIT).map_err(|cause| Error::io(from, cause))?;
             write_atomic(&folder.join(name), |file| file.write_all(&bytes))?;
         }
-        for (name, text) in &self.charts {
+        for (name, text) in self.charts.iter().chain(&self.tables) {
             write_atomic(&folder.join(name), |file| file.write_all(text.as_bytes()))?;
         }
         Ok(())

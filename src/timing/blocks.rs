@@ -8,6 +8,7 @@ use super::cases::{Case, Loop};
 use super::check::{Check, DevicePicture, Stages};
 use super::precision::Reached;
 use super::schedule::{Rounds, n_frames_of};
+use super::state::{BenchState, BlockWatch, FrameMark};
 use crate::frame::{Counts, FrameTimes};
 use crate::measure::blocked::N_BLOCKS_NEEDED;
 
@@ -45,6 +46,8 @@ pub struct Sample {
     pub times: FrameTimes,
     /// SHA-256 of the image, if it was asked for.
     pub image_hash: Option<String>,
+    /// What the state of the machine says about it.
+    pub mark: FrameMark,
 }
 
 /// Consecutive frames of one case in one loop.
@@ -84,6 +87,10 @@ pub struct Outcome {
     pub reached: BTreeMap<usize, Reached>,
     /// Whether Ctrl-C came before the end.
     pub interrupted: bool,
+    /// Is told which block runs, without waiting for it.
+    pub watch: BlockWatch,
+    /// The state of the machine, if it was read.
+    pub state: Option<BenchState>,
 }
 
 /// Locks an outcome. A panic elsewhere leaves whole samples in it.

@@ -72,9 +72,26 @@ pub struct FrameRow {
     pub pass_ms: Vec<Option<f64>>,
     /// SHA-256 of the image, if it was computed.
     pub image_hash: Option<String>,
+    /// End of the frame in seconds since the start of the run, on the clock of `state.csv`; None in
+    /// results of versions that did not write it.
+    #[serde(default, with = "optional")]
+    pub end_s: Option<f64>,
+    /// What held the device's clock down, joined by "+": "clock", "slowdown", "power".
+    #[serde(default)]
+    pub throttled: Option<String>,
+    /// Whether the frame is in no statistic, because it was throttled.
+    #[serde(default)]
+    pub discarded: bool,
 }
 
-/// The columns before those of the passes; `image_hash` follows these.
+impl FrameRow {
+    /// Whether the frame is in the statistics.
+    pub fn is_timed(&self) -> bool {
+        !self.warm_up && !self.discarded
+    }
+}
+
+/// The columns before those of the passes; `image_hash` and [`LATER_COLUMNS`] follow these.
 const COLUMNS: [&str; 19] = [
     "i_row",
     "phase",
@@ -97,6 +114,8 @@ const COLUMNS: [&str; 19] = [
     "ran",
 ];
 const HASH_COLUMN: &str = "image_hash";
+/// Columns that results of earlier versions lack.
+const LATER_COLUMNS: [&str; 3] = ["end_s", "throttled", "discarded"];
 
 /// Writes the table to `path`.
 ///
@@ -109,6 +128,7 @@ pub fn write_frames(path: &Path, table: &FrameTable) -> Result<()> {
     let columns = COLUMNS.iter().map(|name| (*name).to_owned());
     let pass_columns = pass_names.iter().map(|name| format!("gpu_{name}_ms"));
     let header = columns.chain(pass_columns).chain([HASH_COLUMN.to_owned()]);
+    let header = header.chain(LATER_COLUMNS.map(str::to_owned));
     writer.write_record(header).map_err(failed)?;
     for (i_row, row) in rows.iter().enumerate() {
         let (n, n_passes) = (row.pass_ms.len(), pass_names.len());
@@ -177,7 +197,7 @@ fn row(
 }
 
 fn is_time(column: &str) -> bool {
-    column.ends_with("_ms") || column == "time_s"
+    column.ends_with("_ms") || column == "time_s" || column == "end_s"
 }
 
 fn parse_time(field: &str) -> std::result::Result<Option<f64>, String> {
@@ -228,10 +248,11 @@ mod tests {
 
     const HEADER: &str = "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,\
         game_ms,record_ms,submit_ms,wait_ms,gpu_ms,latency_ms,queue_depth,n_drawn,ran,gpu_sort_ms,\
-        gpu_first_ms,image_hash\n";
+        gpu_first_ms,image_hash,end_s,throttled,discarded\n";
     const ROWS: &str = "0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,\
-        1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
-        1,,,parallel,false,3,4000000000,-0.1,false,0.1,1e-9,,0,3,7.25,1,0,0,,,0.3,0abc\n";
+        1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,,0.5,,false\n\
+        1,,,parallel,false,3,4000000000,-0.1,false,0.1,1e-9,,0,3,7.25,1,0,0,,,0.3,0abc,1.25,\
+        clock+slowdown,true\n";
 
     fn read(text: &str) -> Result<FrameTable> {
         parse_frames(text, Path::new("frames.csv"))
@@ -254,6 +275,24 @@ mod tests {
     }
 
     #[test]
+    fn rows_of_earlier_versions_are_read() {
+        let [of_header, of_first, of_second] =
+            [",end_s,throttled,discarded", ",0.5,,false", ",1.25,clock+slowdown,true"];
+        let text = format!("{HEADER}{ROWS}");
+        let old = [of_header, of_first, of_second].iter().fold(text.clone(), |text, added| {
+            assert!(text.contains(added));
+            text.replace(added, "")
+        });
+        let (old, new) = (read(&old).unwrap().rows, read(&text).unwrap().rows);
+        assert!(old.iter().all(|row| row.end_s.is_none() && row.throttled.is_none()));
+        assert!(!old[1].discarded && old[1].is_timed());
+        // The frame that is left out stays a row, and the one of the warm-up is not timed either.
+        assert!(new[1].discarded && !new[1].is_timed() && !new[0].is_timed());
+        assert_eq!(new[1].throttled.as_deref(), Some("clock+slowdown"));
+        assert_eq!(new[1].end_s, Some(1.25));
+    }
+
+    #[test]
     fn a_faulty_row_is_reported_with_its_line() {
         for (from, to, expected) in [
             ("phase", "stage", "no column phase"),
@@ -265,7 +304,7 @@ mod tests {
             (
                 ",0.3,0abc",
                 ",0.3",
-                "line 3: expected 22 fields as in the header, found 21: cut off?",
+                "line 3: expected 25 fields as in the header, found 24: cut off?",
             ),
         ] {
             let text = format!("{HEADER}{ROWS}");

@@ -8,10 +8,13 @@
 //! ([`attachments`]). [`still`] remarks on scenes in which nothing moves. [`compare`] compares
 //! results and gives each measure a [`verdict`]; [`difference`] lists what else differs between
 //! them. [`history`] finds changes in a series of results. [`parts`] joins a bench that several
-//! nodes timed, and [`starts`] one that several processes ran. [`trace`] writes the frames as a time line. [`machine`], [`names`] and [`json`]
-//! serve all of them, and the studies too.
+//! nodes timed, and [`starts`] one that several processes ran. [`trace`] writes the frames as a time
+//! line. [`state`] reads the clocks and the load of the machine beside the frames, and
+//! [`bench_state`] judges the frames by them. [`machine`], [`names`] and [`json`] serve all of them,
+//! and the studies too.
 
 pub mod attachments;
+pub mod bench_state;
 pub mod blocks;
 pub mod cases;
 pub mod check;
@@ -33,6 +36,7 @@ pub mod results;
 pub mod running;
 pub mod schedule;
 pub mod starts;
+pub mod state;
 pub mod still;
 pub mod sweep;
 pub mod trace;

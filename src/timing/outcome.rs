@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::bench_state::end_s;
 use super::blocks::{BenchPlan, Outcome, Sample};
 use super::cases::{Case, Loop};
 use super::frame_rows::{FrameRow, FrameTable};
@@ -75,7 +76,8 @@ impl Outcome {
     }
 
     fn timed(&self, i_case: usize, of: Loop) -> Timed<'_> {
-        let samples = self.of_loop(i_case, of).filter(|s| !s.warm_up).collect();
+        let is_timed = |s: &&Sample| !s.warm_up && !s.mark.is_discarded;
+        let samples = self.of_loop(i_case, of).filter(is_timed).collect();
         // Where a precision was asked for, the rule has chosen the number of rounds.
         let widening = if self.reached.contains_key(&i_case) { WIDENING } else { 1.0 };
         Timed { samples, widening }
@@ -140,6 +142,7 @@ impl Outcome {
             figure: None,
             check: self.checks.get(&i).cloned(),
             precision: self.reached.get(&i).copied(),
+            state: self.state.as_ref().and_then(|state| state.cases.get(&i).cloned()),
         };
         record.figure = record.figure_mode().map(Mode::name);
         record
@@ -224,6 +227,7 @@ impl Outcome {
 
     /// Returns the rows of `frames.csv`.
     pub fn table(&self, cases: &[Case]) -> FrameTable {
+        let zero = self.state.as_ref().map(|state| state.zero);
         let row = |s: &Sample| FrameRow {
             phase: cases[s.i_case].phase.clone().unwrap_or_default(),
             sweep: sweep_text(&cases[s.i_case].sweep),
@@ -245,6 +249,9 @@ impl Outcome {
             ran: ran(&s.times),
             pass_ms: Pass::ALL.map(|pass| pass_ms(&s.times, pass)).to_vec(),
             image_hash: s.image_hash.clone(),
+            end_s: zero.map(|zero| end_s(s, zero)),
+            throttled: Some(s.mark.flags.text()).filter(|text| !text.is_empty()),
+            discarded: s.mark.is_discarded,
         };
         let pass_names = Pass::ALL.map(|pass| pass.name().to_owned()).to_vec();
         FrameTable { pass_names, rows: self.samples.iter().map(row).collect() }

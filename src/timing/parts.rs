@@ -12,6 +12,7 @@ use super::json;
 use super::names::sweep_text;
 use super::records::{BaseTime, Block, Case, Mode, PartRecord, Run};
 use super::results;
+use super::state::{STATE_FILE, StateRow, parse_rows};
 use crate::error::{Error, Result};
 use crate::io::text_file::{TABLE_LIMIT, read_result};
 
@@ -28,6 +29,8 @@ pub struct Part {
     pub run: Run,
     /// Its `frames.csv`.
     pub table: FrameTable,
+    /// Its `state.csv`; empty if there is none.
+    pub state: Vec<StateRow>,
     /// Names of its pictures and charts.
     pub pictures: Vec<String>,
 }
@@ -39,6 +42,8 @@ pub struct Joined {
     pub run: Run,
     /// The joined rows.
     pub table: FrameTable,
+    /// The readings of the parts' blocks. Times count from the start of each part.
+    pub state: Vec<StateRow>,
     /// The pictures to copy.
     pub pictures: Vec<PictureCopy>,
 }
@@ -71,7 +76,12 @@ impl Part {
         }
         let pictures = (0..run.cases.len()).map(picture_file);
         let pictures = pictures.filter(|name| folder.join(name).exists()).collect();
-        Ok(Part { name, node, range, run, table, pictures })
+        let path = folder.join(STATE_FILE);
+        let state = match path.exists() {
+            true => parse_rows(&read_result(&path, TABLE_LIMIT)?, &path)?,
+            false => vec![],
+        };
+        Ok(Part { name, node, range, run, table, state, pictures })
     }
 
     fn record(&self) -> PartRecord {
@@ -87,6 +97,7 @@ impl Part {
             date: self.run.date.clone(),
             clocks: self.run.clocks,
             base: self.run.cases.iter().take(1).flat_map(|c| &c.modes).map(base).collect(),
+            state: self.run.state.clone(),
         }
     }
 
@@ -176,9 +187,11 @@ pub fn join(parts: &[Part]) -> Option<Joined> {
         chosen: Vec::new(),
         parts: parts.iter().map(Part::record).collect(),
         interrupted: parts.iter().any(|part| part.run.interrupted),
+        // Each part has its own.
+        state: None,
         ..first.run.clone()
     };
-    let (mut rows, mut pictures) = (Vec::new(), Vec::new());
+    let (mut rows, mut state, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
     for (i_part, part) in parts.iter().enumerate() {
         let numbers = numbers(&part.range);
         // The number of a case in the whole. Only the first part keeps the first case of all.
@@ -193,6 +206,11 @@ pub fn join(parts: &[Part]) -> Option<Joined> {
             let block = (*block_numbers.get(row.block as usize)?)?;
             Some(FrameRow { block, ..row.clone() })
         }));
+        // Readings before the first block are of no block.
+        state.extend(part.state.iter().filter_map(|row| {
+            let block = (*block_numbers.get(row.block? as usize)?)?;
+            Some(StateRow { block: Some(block), ..row.clone() })
+        }));
         let chosen = chosen_by_case(&part.run, n_cases).into_iter();
         run.chosen.extend(chosen.filter(|(i, _)| number(*i).is_some()).map(|(_, text)| text));
         for (i, case) in part.run.cases.iter().enumerate() {
@@ -204,7 +222,7 @@ pub fn join(parts: &[Part]) -> Option<Joined> {
         }
     }
     let table = FrameTable { pass_names: first.table.pass_names.clone(), rows };
-    Some(Joined { run, table, pictures })
+    Some(Joined { run, table, state, pictures })
 }
 
 /// Returns what "auto" chose, with the number of the case. In a run of several cases each text

@@ -10,6 +10,7 @@ use super::machine::{Clocks, Cpu, Device};
 use super::names::{Setting, case_name, loop_name, mode_name, sweep_text};
 use super::overlap::Overlap;
 use super::precision::{PrecisionRecord, Reached};
+use super::state::{CaseState, RunState};
 use crate::frame::Counts;
 use crate::measure::lows::Lows;
 use crate::measure::stats::Summary;
@@ -60,6 +61,10 @@ pub struct Run {
     /// counted.
     #[serde(default)]
     pub precision: Option<PrecisionRecord>,
+    /// The state of the machine during the run. Null if it was not read, and where nodes of a farm
+    /// timed the cases: `parts` then has that of each node.
+    #[serde(default)]
+    pub state: Option<RunState>,
 }
 
 impl Run {
@@ -134,6 +139,9 @@ pub struct Case {
     /// How narrow its intervals are; null if blocks were counted.
     #[serde(default)]
     pub precision: Option<Reached>,
+    /// The state of the machine while its timed frames ran; null if it was not read.
+    #[serde(default)]
+    pub state: Option<CaseState>,
 }
 
 impl Case {
@@ -340,6 +348,9 @@ pub struct PartRecord {
     pub clocks: Clocks,
     /// The first case of all as this node timed it, one record a loop; shows how far nodes differ.
     pub base: Vec<BaseTime>,
+    /// The state of the node while it timed its cases; null if it was not read.
+    #[serde(default)]
+    pub state: Option<RunState>,
 }
 
 /// The time that a node took for the first case, in one loop.

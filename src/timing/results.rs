@@ -181,7 +181,7 @@ fn expected_in(folder: &Path) -> String {
 fn timed_modes(run: &Run, table: &FrameTable) -> BTreeMap<String, TimedMode> {
     let mut modes: BTreeMap<String, TimedMode> = BTreeMap::new();
     let mut last_blocks: BTreeMap<String, u32> = BTreeMap::new();
-    for row in table.rows.iter().filter(|row| !row.warm_up) {
+    for row in table.rows.iter().filter(|row| row.is_timed()) {
         let case = case_name(&row.phase, &row.sweep);
         let name = mode_name(&case, &row.threading, row.skip);
         let mode = modes.entry(name.clone()).or_insert_with(|| {

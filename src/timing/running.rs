@@ -13,6 +13,7 @@ use super::check::DevicePicture;
 use super::limits::{MOST_BLOCKS, MOST_FRAMES};
 use super::precision::{Limit, Precision, Reached, look, n_segments};
 use super::schedule::{self, PlannedBlock, Rounds, n_frames_of};
+use super::state::FrameMark;
 use crate::error::{Error, Result};
 use crate::frame::{Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
 use crate::gpu::hex;
@@ -283,17 +284,27 @@ fn run_frames(
     let PlannedBlock { i_case, of, .. } = *block;
     stage.set_skip(of.skip);
     let n_before = lock(outcome).samples.len();
+    let watch = lock(outcome).watch.clone();
+    if plan.n_warm_up == 0 {
+        watch.begin(i_block);
+    }
     let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
         let image_hash = if plan.hash_frames { Some(image_hash(renderer)?) } else { None };
         {
             let samples = &mut lock(outcome).samples;
             let warm_up = samples.len() - n_before < plan.n_warm_up as usize;
-            samples.push(Sample { i_case, of, i_block, warm_up, times, image_hash });
+            let mark = FrameMark::default();
+            samples.push(Sample { i_case, of, i_block, warm_up, times, image_hash, mark });
+            if warm_up && samples.len() - n_before == plan.n_warm_up as usize {
+                watch.begin(i_block);
+            }
         }
         // Without the lock: stderr may hold the tick up, and Ctrl-C needs the samples.
         Ok(tick())
     };
-    stage.run(of.threading, frames_of(case, block, plan.n_warm_up), on_frame)
+    let ended = stage.run(of.threading, frames_of(case, block, plan.n_warm_up), on_frame);
+    watch.end(i_block);
+    ended
 }
 
 /// Returns the frames of a block: the warm-up, which leads up to the timed frames, and these.

@@ -55,6 +55,8 @@ pub fn join(starts: &[Start]) -> Result<Start> {
     let run = Run {
         cases,
         chosen: chosen.into_iter().cloned().collect(),
+        // Each start has its own.
+        state: None,
         interrupted: starts.iter().any(|start| start.run.interrupted),
         block_order,
         ..first.run.clone()
@@ -88,7 +90,7 @@ impl<'a> Joined<'a> {
     /// Returns the timed rows of one case in one loop.
     fn timed(&self, i_case: usize, mode: &Mode) -> Timed<'a> {
         let is_of = |row: &&FrameRow| {
-            !row.warm_up
+            row.is_timed()
                 && self.block_order.get(row.block as usize).is_some_and(|b| {
                     (b.case, &b.threading, b.skip) == (i_case, &mode.threading, mode.skip)
                 })
@@ -142,6 +144,7 @@ impl<'a> Joined<'a> {
             skipping,
             check: all.iter().find(is_wrong).unwrap_or(&first).check.clone(),
             precision,
+            state: None,
             modes,
             ..first.clone()
         }

@@ -93,12 +93,14 @@ pub fn run(modes: Vec<Mode>) -> Run {
             figure: None,
             check: None,
             precision: None,
+            state: None,
         }],
         stages: None,
         chosen: Vec::new(),
         parts: Vec::new(),
         interrupted: false,
         precision: None,
+        state: None,
     }
 }
 
@@ -125,5 +127,8 @@ pub fn row(threading: &str, frame: u32) -> FrameRow {
         ran: "sort+sprites".to_owned(),
         pass_ms: Vec::new(),
         image_hash: None,
+        end_s: None,
+        throttled: None,
+        discarded: false,
     }
 }

@@ -125,6 +125,13 @@ pub struct BenchArgs {
     /// Do not check whether the device's pictures are right; the results then say so
     #[arg(long)]
     pub no_check: bool,
+    /// Leave frames out of the statistics that ran below 75 % of the run's median clock, or while
+    /// heat held the clock down; frames.csv keeps them
+    #[arg(long)]
+    pub discard_throttled: bool,
+    /// Do not read clocks, heat and load beside the frames
+    #[arg(long, conflicts_with = "discard_throttled", hide_short_help = true)]
+    pub no_state: bool,
     /// Print run.json instead of the table
     #[arg(long)]
     pub json: bool,

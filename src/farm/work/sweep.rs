@@ -17,6 +17,7 @@ use crate::timing::machine::Device;
 use crate::timing::parts::{Part, base_spread, differences, join, numbers};
 use crate::timing::records::{Case, PartRecord, Run};
 use crate::timing::results::{RUN_FILE, open_results, write_results};
+use crate::timing::state::{STATE_FILE, rows_text};
 
 /// A bench of several cases.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -83,7 +84,12 @@ impl Work for Sweep {
         let pictures = joined.pictures.iter();
         let copies = pictures
             .map(|moved| (moved.to.clone(), results[moved.i_part].folder.join(&moved.from)));
-        let beside = Attachments { copies: copies.collect(), ..Attachments::default() };
+        let tables = match &joined.state[..] {
+            [] => vec![],
+            rows => vec![(STATE_FILE.to_owned(), rows_text(rows)?)],
+        };
+        let copies = copies.collect();
+        let beside = Attachments { copies, tables, ..Attachments::default() };
         let written = write_results(&mut folder, &joined.run, &joined.table, &beside);
         Ok(Merged { n, summary: summary(&joined.run.parts), written })
     }

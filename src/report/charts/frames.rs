@@ -43,7 +43,7 @@ struct Loop {
 /// Returns the charts of rows of frames.csv, without warm-up.
 pub fn charts_of_rows<'a>(rows: impl IntoIterator<Item = &'a FrameRow>) -> Vec<FrameChart> {
     let mut charts = Vec::new();
-    for row in rows.into_iter().filter(|row| !row.warm_up) {
+    for row in rows.into_iter().filter(|row| row.is_timed()) {
         let name = loop_name(&row.threading, row.skip);
         add(&mut charts, [&row.sweep, &row.phase, &name], row.frame, row.frame_ms);
     }

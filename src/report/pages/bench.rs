@@ -14,6 +14,7 @@ use crate::report::charts::{frames, number, passes, sweep, with_interval};
 use crate::timing::attachments::picture_file;
 use crate::timing::records::{Case, Measured, Mode, PartRecord, Pass, Run};
 use crate::timing::results::BenchResults;
+use crate::timing::state::{RunState, Spread, run_line};
 use crate::timing::still::{NO_RATIO, StillRemark, marked_name, skipped_text};
 
 /// Returns the name of a case.
@@ -73,6 +74,7 @@ pub fn section(results: &BenchResults, folder: &Path, colors: &PassColors) -> Re
             }
         }
         (pass_table(run))
+        (state(run))
     })
 }
 
@@ -233,6 +235,74 @@ fn cases(run: &Run) -> Markup {
         (table(caption, &header, run.cases.iter().map(row)))
         @if run.cases.iter().any(Case::is_still) { p class="why" { (NOT_GIVEN) ": " (NO_RATIO) } }
     }
+}
+
+/// Returns the state of the machine during the run, and of the cases if there are several.
+fn state(run: &Run) -> Markup {
+    let sentences = |state: &RunState, of: &str| {
+        let readings = run_line(state);
+        let readings = readings.trim_start_matches("state: ").trim_end();
+        html! {
+            p class="why" { (of) (sentence(readings)) }
+            @if !state.remarks.is_empty() {
+                ul class="warning" { @for remark in &state.remarks { li { (sentence(remark)) } } }
+            }
+        }
+    };
+    let parts = run.parts.iter().filter_map(|part| Some((part, part.state.as_ref()?)));
+    let parts: Vec<(&PartRecord, &RunState)> = parts.collect();
+    if run.state.is_none() && parts.is_empty() {
+        return html! {};
+    }
+    html! {
+        h3 { "State of the machine" }
+        @if let Some(state) = &run.state { (sentences(state, "")) }
+        @for (part, state) in parts {
+            (sentences(state, &format!("Cases {}..{} on {}: ", part.first, part.end, part.node)))
+        }
+        (state_table(run))
+    }
+}
+
+fn state_table(run: &Run) -> Markup {
+    let median = |spread: Option<Spread>| value(spread.map(|s| s.median));
+    let mib = |bytes: Option<u64>| value(bytes.map(|bytes| bytes as f64 / f64::from(1 << 20)));
+    let row = |case: &Case| {
+        let state = case.state.as_ref()?;
+        let throttle = state.throttle.as_ref().map(|all| {
+            all.iter().map(|c| format!("{} ({})", c.reason, c.n)).collect::<Vec<_>>().join("; ")
+        });
+        Some(vec![
+            text(&case_name(case)),
+            median(state.gpu_mhz),
+            median(state.gpu_memory_mhz),
+            median(state.gpu_c),
+            median(state.gpu_w),
+            median(state.cpu_mhz),
+            mib(state.peak_own_bytes),
+            mib(state.peak_process_bytes),
+            percent(state.others_share),
+            count(state.n_slow_clock + state.n_slowdown),
+            count(state.n_discarded),
+            text(throttle.as_deref().unwrap_or("—")),
+        ])
+    };
+    let header = [
+        "case",
+        "GPU, MHz",
+        "GPU memory, MHz",
+        "GPU, °C",
+        "GPU, W",
+        "processor, MHz",
+        "most device memory of nimbus, MiB",
+        "of the process, MiB",
+        "other processes",
+        "throttled frames",
+        "left out",
+        "throttled by (readings)",
+    ];
+    let caption = "The state of the machine while the timed frames of each case ran: medians";
+    table(caption, &header, run.cases.iter().filter_map(row))
 }
 
 fn pass_table(run: &Run) -> Markup {

@@ -11,6 +11,7 @@ use crate::timing::machine::{Cpu, Device};
 use crate::timing::names::Setting;
 use crate::timing::records::Measured;
 use crate::timing::results::{open_results, write_results};
+use crate::timing::state::{CaseState, RunState};
 
 const LOOPS: [&str; 2] = ["serial", "parallel"];
 const N_WARM_UP: usize = 1;
@@ -48,6 +49,7 @@ fn case(k: usize, ms: f64) -> Case {
         counts: None,
         figure: None,
         check: None,
+        state: None,
     }
 }
 
@@ -78,6 +80,9 @@ fn row(k: usize, threading: &str, block: u32, frame: usize, ms: f64) -> FrameRow
         ran: "sort".to_owned(),
         pass_ms: vec![Some(0.5)],
         image_hash: None,
+        end_s: None,
+        throttled: None,
+        discarded: false,
     }
 }
 
@@ -106,6 +111,14 @@ fn part(range: Range<usize>) -> Part {
             .map(move |frame| row(k, &threading, block as u32, frame, ms(k, first)))
     });
     let rows = rows.collect();
+    // A reading before the blocks, and one in each.
+    let reading = |block: Option<u32>| StateRow {
+        block,
+        gpu_mhz: block.map(|block| f64::from(100 * first as u32 + block)),
+        ..StateRow::default()
+    };
+    let blocks = (0..block_order.len() as u32).map(Some);
+    let state = [None].into_iter().chain(blocks).map(reading).collect();
     let run = json!({
         "schema": Run::SCHEMA, "nimbus": "0.1.0", "revision": "0123456789ab",
         "date": "2024-02-29T12:34:56Z", "command": ["nimbus", "bench", "a.toml"],
@@ -135,6 +148,7 @@ fn part(range: Range<usize>) -> Part {
         range,
         run: Run { block_order, cases, chosen, ..run },
         table: FrameTable { pass_names: vec!["sort".to_owned()], rows },
+        state,
         pictures,
     }
 }
@@ -154,7 +168,8 @@ fn a_part_has_the_first_case_once() {
 #[test]
 fn parts_together_are_the_whole() {
     let whole = part(0..6);
-    let Joined { run, table: FrameTable { pass_names, rows }, pictures } = join(&three()).unwrap();
+    let Joined { run, table: FrameTable { pass_names, rows }, pictures, .. } =
+        join(&three()).unwrap();
     assert_eq!(run.cases, whole.run.cases);
     assert_eq!((pass_names, &run.chosen), (whole.table.pass_names, &whole.run.chosen));
     // The same blocks and rows, in another order; every row belongs to the block that it names.
@@ -189,6 +204,44 @@ fn parts_together_are_the_whole() {
         [of(0, 0, 0), of(1, 1, 1), of(1, 2, 2), of(1, 3, 3), of(2, 1, 4), of(2, 2, 5)]
     );
     assert!(!run.interrupted);
+}
+
+#[test]
+fn the_state_of_each_part_is_kept() {
+    let mut parts = three();
+    let with_load = |load: f64| Some(RunState { load_at_start: Some(load), ..RunState::default() });
+    for (part, load) in parts.iter_mut().zip([1.0, 2.0, 3.0]) {
+        part.run.state = with_load(load);
+        for (case, n) in part.run.cases.iter_mut().zip(1..) {
+            case.state =
+                Some(CaseState { n_readings: 10 * load as usize + n, ..CaseState::default() });
+        }
+    }
+    // Results of an earlier version have no readings.
+    parts[1].state.clear();
+    let Joined { run, state, .. } = join(&parts).unwrap();
+    assert_eq!(run.state, None);
+    let of_parts: Vec<_> = run.parts.iter().map(|part| part.state.clone()).collect();
+    assert_eq!(of_parts, [1.0, 2.0, 3.0].map(with_load));
+    let of_cases: Vec<usize> =
+        run.cases.iter().map(|case| case.state.as_ref().unwrap().n_readings).collect();
+    assert_eq!(of_cases, [11, 22, 23, 24, 32, 33]);
+    // One reading a block of the first and the third part, which name the blocks of the whole. The
+    // third part's first case is that of the first part.
+    let blocks: Vec<(u32, f64)> =
+        state.iter().map(|row| (row.block.unwrap(), row.gpu_mhz.unwrap())).collect();
+    let n = LOOPS.len() * N_ROUNDS;
+    assert_eq!(blocks.len(), n + 2 * n);
+    for (block, mhz) in blocks {
+        let i_part = if mhz >= 400.0 { 2 } else { 0 };
+        let own = mhz as usize % 100;
+        let of_part = &parts[i_part].run.block_order[own];
+        let of_whole = &run.block_order[block as usize];
+        assert_eq!(
+            (numbers(&parts[i_part].range)[of_part.case], &of_part.threading),
+            (of_whole.case, &of_whole.threading)
+        );
+    }
 }
 
 #[test]

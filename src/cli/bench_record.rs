@@ -21,7 +21,8 @@ use crate::timing::json::ResultFile;
 use crate::timing::machine::{self, Clocks};
 use crate::timing::records::Run;
 use crate::timing::results::write_results;
-use crate::timing::trace;
+use crate::timing::roofs::Roofs;
+use crate::timing::{shares, trace};
 
 /// The conditions of a bench of one scene, and where its results go.
 pub struct Recorder {
@@ -114,6 +115,10 @@ impl Recorder {
     }
 
     fn run(&self, outcome: &Outcome, is_cut: bool) -> Run {
+        let mut cases = outcome.cases(&self.cases, &self.plan);
+        let ceilings = Roofs::kept(&self.info).and_then(|roofs| roofs.ceilings());
+        let cold_bytes = self.plan.cold_bytes;
+        shares::add(&mut cases, &outcome.amounts, ceilings.as_ref(), cold_bytes.is_some());
         Run {
             schema: Run::SCHEMA,
             nimbus: env!("CARGO_PKG_VERSION").into(),
@@ -127,11 +132,13 @@ impl Recorder {
             environment: machine::environment(),
             clocks: self.clocks,
             block_order: outcome.block_order(),
-            cases: outcome.cases(&self.cases, &self.plan),
+            cases,
             stages: outcome.stages.clone(),
             chosen: outcome.chosen.clone(),
             parts: Vec::new(),
             interrupted: is_cut,
+            ceilings,
+            cold_bytes,
         }
     }
 

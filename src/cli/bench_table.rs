@@ -6,6 +6,7 @@ use super::bench_remarks::{
     clocks_line, drawn_line, empty_line, error_lines, latency_line, missing_lines, ms,
     overlap_lines, skipping_line, spread_lines, still_line, still_lines,
 };
+use super::bench_roofs::{self, cold_line};
 use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
 use crate::timing::N_FRAMES_NEEDED;
@@ -34,6 +35,7 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
         blocks_line(run),
         if run.interrupted { "; INTERRUPTED: what was finished" } else { "" }
     );
+    out += &cold_line(run);
     out += &still_lines(run);
     if run.cases.len() > 1 {
         out += &table(&case_rows(run));
@@ -43,6 +45,9 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
     for (case, same) in run.cases.iter().zip(same) {
         if run.cases.len() == 1 || verbose {
             out += &case_report(case, *same);
+            if verbose {
+                out += &bench_roofs::case_text(case);
+            }
         } else if *same == Some(false) {
             out += &format!("{}: {DIFFER}", case.name());
         }
@@ -53,6 +58,9 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
         out += &format!(
             "{n_same} of {n_told} cases gave the same last frame in all their blocks, to the byte\n"
         );
+    }
+    if verbose {
+        out += &bench_roofs::missing_line(run);
     }
     out + &missing_lines(run) + &clocks_line(&run.clocks)
 }

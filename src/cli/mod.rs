@@ -9,6 +9,7 @@ mod bench_check;
 mod bench_plot;
 mod bench_record;
 mod bench_remarks;
+mod bench_roofs;
 mod bench_stages;
 mod bench_table;
 mod clock_locks;
@@ -33,6 +34,7 @@ mod progress;
 mod render;
 mod render_reference;
 mod report;
+mod roof;
 mod scene;
 mod stress;
 #[cfg(feature = "window")]

@@ -10,7 +10,7 @@ use super::attachments::CasePicture;
 use super::cases::{Case, Loop};
 use super::check::{Check, DevicePicture, Stages};
 use crate::error::{Error, Result};
-use crate::frame::{Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
+use crate::frame::{Amounts, Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
 use crate::gpu::hex;
 use crate::io::image::display_bytes;
 use crate::model::scene::{Draw, LightingMode, Scene};
@@ -29,6 +29,8 @@ pub struct BenchPlan {
     /// Returns the pixels [column, row] of a film whose numbers are kept of the last frame of every
     /// block, to be checked; none without a check.
     pub checked: Option<PixelsOf>,
+    /// Bytes that the device writes before each pass, so that caches are cold.
+    pub cold_bytes: Option<u64>,
 }
 
 /// Returns pixels of a film of some width and height.
@@ -77,6 +79,8 @@ pub struct Outcome {
     pub pictures: Vec<CasePicture>,
     /// Counts of odd values in the last frame of each case that ran to its end.
     pub counts: BTreeMap<usize, Counts>,
+    /// Amounts of the last frame of each case that ran to its end.
+    pub amounts: BTreeMap<usize, Amounts>,
     /// The last frames of the blocks, to be checked; one of several with the same bytes.
     pub drawn: Vec<DevicePicture>,
     /// The check of the device's stages, if it was asked for.
@@ -195,6 +199,11 @@ impl Bench<'_> {
         };
         let stage = self.stage.insert(stage);
         self.drawing[block.i_case] = Some(stage.scene.draw);
+        // A new stage, or the first one, knows nothing of cold caches.
+        let is_new = !block.is_staged || block.i_block == 0;
+        if let Some(bytes) = self.plan.cold_bytes.filter(|_| is_new) {
+            stage.set_cold(bytes)?;
+        }
         let has_several = self.cases.len() > 1;
         let named = |note: &String| {
             if has_several { format!("{}: {note}", case.name()) } else { note.clone() }
@@ -224,6 +233,10 @@ impl Bench<'_> {
             lock(self.outcome).notes.extend(unseen.iter().chain(&notes).map(named));
             let counts = Counts::new(&mut stage.renderer, &stage.device, &stage.scene)?;
             lock(self.outcome).counts.insert(block.i_case, counts);
+            let scene = stage.scene.clone();
+            let amounts = Amounts::measured(&mut stage.renderer, &stage.device, &scene)?;
+            let amounts = amounts.map(|amounts| (block.i_case, amounts));
+            lock(self.outcome).amounts.extend(amounts);
             if self.plan.pictures && !is_stopped() {
                 let film = case.scene.film;
                 let (width, height) = (film.width, film.height);
@@ -368,6 +381,7 @@ mod tests {
             hash_frames: false,
             pictures: false,
             checked: None,
+            cold_bytes: None,
         };
         assert_eq!(n_frames_total(&two, &plan), 2 * (3 * 8 + 2 * 7));
     }

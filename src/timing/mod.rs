@@ -6,11 +6,13 @@
 //! `frames.csv` ([`frame_rows`]), which [`results`] writes and reads with the files beside them
 //! ([`attachments`]). [`still`] remarks on scenes in which nothing moves. [`compare`] decides which
 //! of two results is faster; [`difference`] lists what else differs between them. [`parts`] joins a
-//! bench that several nodes timed. [`trace`] writes the frames as a time line. [`machine`],
+//! bench that several nodes timed. [`roofs`] are what a device can do at most, [`caches`] the size
+//! of its last cache level, and [`shares`] compares passes with both. [`trace`] writes the frames as a time line. [`machine`],
 //! [`names`] and [`json`] serve all of them, and the studies too.
 
 pub mod attachments;
 pub mod blocks;
+pub mod caches;
 pub mod cases;
 pub mod check;
 pub mod compare;
@@ -26,6 +28,8 @@ pub mod overlap;
 pub mod parts;
 pub mod records;
 pub mod results;
+pub mod roofs;
+pub mod shares;
 pub mod still;
 pub mod sweep;
 pub mod trace;

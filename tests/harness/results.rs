@@ -96,6 +96,8 @@ pub fn run(modes: Vec<Mode>) -> Run {
         chosen: Vec::new(),
         parts: Vec::new(),
         interrupted: false,
+        ceilings: None,
+        cold_bytes: None,
     }
 }
 

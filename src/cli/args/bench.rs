@@ -21,6 +21,8 @@ const FRAMES: &str = "the records of all frames are kept in memory";
     in any case, and its time is the figure.\n\n\
     Draw the frame times here, and as SVG files beside the results:\n  \
     nimbus bench scenes/threads.toml --plot --out run\n\n\
+    The times of passes whose data comes from memory and not from a cache:\n  \
+    nimbus bench scenes/threads.toml --cold --out cold\n\n\
     Each [[phase]] of a scene is timed by itself; --set and --sweep apply to all of them.\n\n\
     Exit codes: 0 done; 1 the device's picture is wrong; 2 bad input; 3 device or driver; \
     130 interrupted, what was finished is kept.")]
@@ -86,6 +88,18 @@ pub struct BenchArgs {
     /// Replace existing results
     #[arg(long)]
     pub force: bool,
+    /// Make caches cold before each pass: the device writes MIB MiB, by default as much as its last
+    /// cache level holds (256 MiB on a GPU, a bound), outside of the pass's time. Times of passes
+    /// then are those of data from memory; times of frames contain the writes and are no figure
+    #[arg(
+        long,
+        value_name = "MIB",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0",
+        value_parser = parse_cold
+    )]
+    pub cold: Option<u32>,
     /// Do not check whether the device's pictures are right; the results then say so
     #[arg(long)]
     pub no_check: bool,
@@ -95,6 +109,13 @@ pub struct BenchArgs {
     /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,
+}
+
+/// Parses the MiB of `--cold`; 0 stands for the size of the last cache level.
+fn parse_cold(text: &str) -> Result<u32, String> {
+    limited(0, 4096, "the device writes them before each pass; 0: as the last cache level holds")(
+        text,
+    )
 }
 
 /// The loops that a bench times.

@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::figure::figure;
 use super::pictures::Png;
-use super::provenance;
+use super::{provenance, roofs};
 use super::table::{Cell, count, median, ms, percent, table, text, value};
 use crate::error::Result;
 use crate::report::charts::passes::PassColors;
@@ -55,6 +55,7 @@ pub fn section(results: &BenchResults, folder: &Path, colors: &PassColors) -> Re
             h3 { "Pictures" }
             div class="gallery" { @for picture in &pictures { (picture) } }
         }
+        (roofs::cold(run))
         (still(run))
         @if !sweep.is_empty() {
             h3 { "Times against the swept keys" }
@@ -73,6 +74,7 @@ pub fn section(results: &BenchResults, folder: &Path, colors: &PassColors) -> Re
             }
         }
         (pass_table(run))
+        (roofs::section(run))
     })
 }
 

@@ -3,8 +3,9 @@
 #extension GL_EXT_control_flow_attributes : require
 #include "buffers.glsl"
 
-// Multiplies and adds in eight independent chains an invocation, for the arithmetic of `nimbus
-// devices --roof`: eight cover the latency of a processor whose pipelines take two vectors a cycle.
+// Multiplies and adds in independent chains, for the arithmetic of `nimbus devices --roof`. Sixteen
+// chains an invocation cover the latency of a processor without a fused multiply-add: seven cycles,
+// of which each takes two vectors. Vectors of 64-bit numbers are two there, so that eight do.
 // A step is x = a x + b. The host passes a = b = 1, which the compiler does not know, so that each
 // chain ends at its start plus the number of steps, exactly in every format.
 
@@ -12,6 +13,9 @@
 #ifndef KIND
 #define KIND 0
 #endif
+
+// 1: sixteen chains, 0: eight.
+#define IS_WIDE (KIND == 0 || KIND == 2 || KIND == 3)
 
 #if KIND == 0
 #define FOUR vec4
@@ -53,12 +57,22 @@ void main() {
     FOUR a = FOUR(ONE(push.a)), b = FOUR(ONE(push.b));
     // Starts differ between invocations, so that no compiler takes them for one.
     FOUR x = FOUR(0, 1, 2, 3) + FOUR(ONE(gl_LocalInvocationID.x & 7u)), y = x + FOUR(ONE(4));
+#if IS_WIDE
+    FOUR z = x + FOUR(ONE(8)), w = x + FOUR(ONE(12));
+#endif
     for (uint i = 0; i < push.n_loops; ++i) {
         [[unroll]] for (uint k = 0; k < 16; ++k) {
             x = STEP(x);
             y = STEP(y);
+#if IS_WIDE
+            z = STEP(z);
+            w = STEP(w);
+#endif
         }
     }
     uvec4 ends = uvec4(x) + uvec4(y);
+#if IS_WIDE
+    ends += uvec4(z) + uvec4(w);
+#endif
     sums[gl_WorkGroupID.x * 64u + gl_LocalInvocationID.x] = ends.x + ends.y + ends.z + ends.w;
 }

@@ -82,6 +82,10 @@ impl Arithmetic {
     fn n_steps(&self) -> u32 {
         self.kind.n_loops * STEPS
     }
+
+    fn n_chains(&self) -> u32 {
+        CHAINS[usize::from(!self.kind.name.ends_with("64"))]
+    }
 }
 
 impl Load for Arithmetic {
@@ -94,7 +98,7 @@ impl Load for Arithmetic {
     }
 
     fn amount(&self, n: u32) -> f64 {
-        2.0 * f64::from(n) * f64::from(LANES) * f64::from(self.n_steps() * CHAINS)
+        2.0 * f64::from(n) * f64::from(LANES) * f64::from(self.n_steps() * self.n_chains())
     }
 
     fn most(&self) -> u32 {
@@ -113,9 +117,10 @@ impl Load for Arithmetic {
     fn check(&self, device: &Device, commands: &mut Commands, n: u32) -> Result<()> {
         let found = words(device, commands, &self.sums, (n * LANES) as usize)?;
         // Chains start at their numbers, and each lane at its own among eight.
-        let of_chains = CHAINS * (CHAINS - 1) / 2;
+        let n_chains = self.n_chains();
+        let of_chains = n_chains * (n_chains - 1) / 2;
         for (lane, found) in (0..).zip(found) {
-            let expected = of_chains + CHAINS * (lane % 8 + self.n_steps());
+            let expected = of_chains + n_chains * (lane % 8 + self.n_steps());
             expect_same(self.kind.name, found, expected)?;
         }
         Ok(())

@@ -8,6 +8,8 @@ mod checks;
 mod program;
 #[path = "harness/results.rs"]
 mod results;
+#[path = "report/roofs.rs"]
+mod roofs;
 #[path = "report/still.rs"]
 mod still;
 #[path = "harness/studies.rs"]

@@ -83,7 +83,7 @@ pub struct Blobs {
     pub pixels: f64,
     /// Layers that its pixels are made of, over all pixels: blobs within the cutoff, near to far,
     /// until nothing behind them shows. A mean over some rays of the frame, times the pixels; 0
-    /// where solids, thresholds, other forms or numbers of blobs leave some of them out.
+    /// where solids, thresholds or other numbers of blobs leave some of them out.
     pub layers: f64,
 }
 
@@ -113,7 +113,6 @@ impl Amounts {
             let (camera, size) = renderer.blob_camera(&packet);
             let is_whole = !scene.has_solids()
                 && !scene.draw.threshold.is_active()
-                && !scene.has_ellipsoids()
                 && scene.draw.count.is_none();
             let pixels = f64::from(size[0]) * f64::from(size[1]);
             let mut per_pixel = 0.0;

@@ -50,10 +50,13 @@ pub(super) fn layers(
         let mut met = Vec::new();
         for (place, particle) in placed.iter().zip(particles) {
             let offset = vector(place.position) - eye;
-            let (along, sigma) = (offset.dot(*ray), f64::from(place.sigma));
+            let (depth, sigma) = (offset.dot(forward), f64::from(place.sigma));
+            // In units in which the blob is round.
+            let round = DVec3::new(1.0, 1.0 / f64::from(particle.aspect), 1.0);
+            let (offset, ray) = (offset * round, *ray * round);
+            let along = offset.dot(ray) / ray.length();
             let apart = offset.length_squared() - along * along;
-            let depth = offset.dot(forward);
-            let tau = SQRT_TAU * f64::from(particle.kappa) * sigma;
+            let tau = SQRT_TAU * f64::from(particle.kappa) * sigma / ray.length();
             if apart > (cutoff * sigma).powi(2) || depth < f64::from(camera.near) || tau <= 0.0 {
                 continue;
             }
@@ -99,7 +102,7 @@ mod tests {
         let position = [0.0, 0.0, z];
         (
             PlacedRecord { position, sigma },
-            ParticleRecord { sigma, kappa, ..ParticleRecord::default() },
+            ParticleRecord { sigma, kappa, aspect: 1.0, ..ParticleRecord::default() },
         )
     }
 
@@ -133,6 +136,19 @@ mod tests {
         assert_eq!(rays.0.len(), MOST_ALONG * MOST_ALONG);
         let share = layers(&rays, &camera(), &[placed], &[particle], [3.0, 1e-3]);
         assert!((share - std::f64::consts::PI / 16.0).abs() < 0.08, "{share}");
+    }
+
+    #[test]
+    fn flat_blobs_count_within_their_own_form() {
+        let at = |y: f32, aspect: f32| {
+            let (mut placed, mut particle) = blob(-10.0, 1.0, 1e-3);
+            (placed.position[1], particle.aspect) = (y, aspect);
+            (placed, particle)
+        };
+        // The ray passes 2 below the centre: 2 σ of a round blob, 4 σ of one half as high.
+        assert_eq!(count(&[at(2.0, 1.0)], 1e-3), 1.0);
+        assert_eq!(count(&[at(2.0, 0.5)], 1e-3), 0.0);
+        assert_eq!(count(&[at(1.4, 0.5)], 1e-3), 1.0);
     }
 
     #[test]

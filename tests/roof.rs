@@ -50,7 +50,11 @@ fn every_roof_is_measured_and_its_results_are_right() {
     let roofs = measured(passes::sources(), false).expect("right results");
     let of = |name: &str, way: Option<&str>, set: Option<u64>| {
         let same = |way: Option<&str>, other: &Option<String>| way == other.as_deref();
-        roofs.roofs.iter().filter(|r| r.name == name && r.set_bytes == set && same(way, &r.way)).count()
+        roofs
+            .roofs
+            .iter()
+            .filter(|r| r.name == name && r.set_bytes == set && same(way, &r.way))
+            .count()
     };
     for set in [1 << 18, 1 << 21] {
         for (name, way) in [
@@ -68,7 +72,7 @@ fn every_roof_is_measured_and_its_results_are_right() {
     }
     for roof in &roofs.roofs {
         let ordered = 0.0 < roof.p5 && roof.p5 <= roof.p50 && roof.p50 <= roof.p95;
-        assert!(ordered && roof.p95 <= roof.max && roof.n >= 5, "{roof:?}");
+        assert!(ordered && roof.p95 <= roof.max && roof.n >= 3, "{roof:?}");
     }
     assert!(roofs.absent.iter().any(|text| text == "f64: the device has no shaderFloat64"));
     assert!(roofs.absent.iter().any(|text| text == "i64: the device has no shaderInt64"));
@@ -148,8 +152,9 @@ fn amounts_of_a_frame_are_those_of_its_scene() {
     // Each facet of a cloud takes a sample toward each light at least; the floor hides nothing.
     assert!(of.march_samples >= of.cloud_facets, "{of:?}");
     assert!(of.deposits >= of.particles && of.cells >= 512.0, "{of:?}");
-    // Solids may hide blobs, so that no layer is certain.
-    assert_eq!(of.blobs.map(|blobs| blobs.layers), Some(0.0));
+    // The floor is below the clouds, so that layers before it are certain.
+    let blobs = of.blobs.expect("a picture");
+    assert!(blobs.pixels == of.film_pixels && blobs.layers > 0.0, "{blobs:?}");
     for pass in [Pass::Place, Pass::Grid, Pass::Facets, Pass::Transmit, Pass::Sort, Pass::Tiles] {
         let work = floor(pass, &of).expect("a floor");
         assert!(work.bytes > 0.0 && work.bytes.is_finite(), "{pass:?}: {work:?}");

@@ -45,7 +45,7 @@ pub const ELEMENT_BYTES: u64 = 16;
 /// Steps of a loop of `roof_arithmetic.comp`.
 pub const STEPS: u32 = 16;
 /// Chains of an invocation of `roof_arithmetic.comp`: of 64-bit numbers, and of others.
-pub const CHAINS: [u32; 2] = [8, 16];
+pub const CHAINS: [u32; 2] = [8, 12];
 /// `MODE` of `roof_memory.comp`: reads elements of a storage buffer.
 pub const READ: u32 = 0;
 /// `MODE` of `roof_memory.comp`: reads texels.

@@ -23,8 +23,10 @@ const N_ARITHMETIC: u64 = 7;
 const CACHES_OF_LARGEST: u64 = 4;
 /// … and has at least and at most these bytes.
 const LARGEST_SET: [u64; 2] = [1 << 28, 1 << 30];
-/// Samples that are taken in any case, and the most.
+/// Samples that are taken where the time allows it, and the most.
 const N_SAMPLES: [usize; 2] = [5, 101];
+/// Samples that are taken in any case.
+const LEAST_SAMPLES: usize = 3;
 /// The samples agree if the 5th and the 95th percentile are this near, relative to the median.
 const SPREAD: f64 = 0.03;
 /// Length of a sample, in seconds, beside which the time of a submission is small.
@@ -61,7 +63,8 @@ pub fn measure(
     let mut sampler = Sampler {
         device,
         commands: Commands::new(device, "roof")?,
-        time: budget.time.div_f64(n_loads as f64),
+        end: begin + budget.time,
+        n_left: n_loads,
         sample_s: budget
             .max_submit_ms
             .map_or(SAMPLE_S, |ms| SAMPLE_S.min(1e-3 * SHARE_OF_LIMIT * ms)),
@@ -119,8 +122,10 @@ fn sets(cache_bytes: u64, memory_bytes: u64) -> Vec<u64> {
 struct Sampler<'a> {
     device: &'a Device,
     commands: Commands,
-    /// The time for a load.
-    time: Duration,
+    /// The time at which all loads are to be done.
+    end: Instant,
+    /// Loads that are not done.
+    n_left: u64,
     /// Length of a sample.
     sample_s: f64,
     stop: &'a AtomicBool,
@@ -129,16 +134,20 @@ struct Sampler<'a> {
 impl Sampler<'_> {
     /// Measures a load until its samples agree or its time is up, and checks its results.
     fn roof(&mut self, load: &dyn Load) -> Result<Roof> {
+        // Each load takes its share of the time that is left. One that takes longer by itself,
+        // as all do on a slow device, gives its samples up first.
         let begin = Instant::now();
+        let time = self.end.saturating_duration_since(begin).div_f64(self.n_left.max(1) as f64);
+        self.n_left = self.n_left.saturating_sub(1);
         let n = self.units(load)?;
         let mut rates = Vec::new();
         let (summary, is_stable) = loop {
             rates.push(load.amount(n) / self.seconds(load, n)?);
-            let summary = Summary::of(&rates).filter(|_| rates.len() >= N_SAMPLES[0]);
+            let summary = Summary::of(&rates).filter(|_| rates.len() >= LEAST_SAMPLES);
             let Some(summary) = summary else { continue };
-            let is_stable = summary.p95 - summary.p5 <= SPREAD * summary.p50;
-            let is_over = begin.elapsed() >= self.time || rates.len() >= N_SAMPLES[1];
-            if is_stable || is_over {
+            let is_stable =
+                rates.len() >= N_SAMPLES[0] && summary.p95 - summary.p5 <= SPREAD * summary.p50;
+            if is_stable || begin.elapsed() >= time || rates.len() >= N_SAMPLES[1] {
                 break (summary, is_stable);
             }
         };

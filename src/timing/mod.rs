@@ -7,8 +7,8 @@
 //! ([`attachments`]). [`still`] remarks on scenes in which nothing moves. [`compare`] decides which
 //! of two results is faster; [`difference`] lists what else differs between them. [`parts`] joins a
 //! bench that several nodes timed. [`roofs`] are what a device can do at most, [`caches`] the size
-//! of its last cache level, and [`shares`] compares passes with both. [`trace`] writes the frames as a time line. [`machine`],
-//! [`names`] and [`json`] serve all of them, and the studies too.
+//! of its last cache level, and [`shares`] compares passes with both. [`trace`] writes the frames
+//! as a time line. [`machine`], [`names`] and [`json`] serve all of them, and the studies too.
 
 pub mod attachments;
 pub mod blocks;

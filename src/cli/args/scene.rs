@@ -89,9 +89,9 @@ pub struct DevicesArgs {
     /// that undo it; nothing is changed
     #[arg(long, conflicts_with_all = ["kernels", "json"])]
     pub lock: bool,
-    /// Measure what the device can do at most: bandwidth by the size of the data, arithmetic of each
-    /// kind of number, and atomics, in less than 30 s. The roofs are kept, and bench shows which
-    /// share of them each pass reaches
+    /// Measure what the device can do at most: bandwidth by the size of the data, arithmetic of
+    /// each kind of number, and atomics, in less than 30 s. The roofs are kept, and bench shows
+    /// which share of them each pass reaches
     #[arg(long, conflicts_with_all = ["kernels", "lock"])]
     pub roof: bool,
     /// Keep the submissions that measure below MS milliseconds [default: 500 on a GPU, no limit on

@@ -1,5 +1,7 @@
 //! The amounts of a frame that its floors follow from.
 
+use glam::DVec3;
+
 use super::layers::{Rays, layers};
 use super::marches::march_samples;
 use crate::error::Result;
@@ -12,6 +14,7 @@ use crate::frame::renderer::Renderer;
 use crate::frame::tensor_shape::{Shape, basis_of, is_edited};
 use crate::frame::tensors::bright_lights;
 use crate::gpu::Device;
+use crate::layout::facet::{FacetRecord, RegionRecord};
 use crate::layout::particle::GroupRecord;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
@@ -83,7 +86,8 @@ pub struct Blobs {
     pub pixels: f64,
     /// Layers that its pixels are made of, over all pixels: blobs within the cutoff, near to far,
     /// until nothing behind them shows. A mean over some rays of the frame, times the pixels; 0
-    /// where solids, thresholds or other numbers of blobs leave some of them out.
+    /// where thresholds or other numbers of blobs leave some of them out. Blobs in and behind the
+    /// bounds of a solid do not count.
     pub layers: f64,
 }
 
@@ -104,16 +108,15 @@ impl Amounts {
         if let Some(n) = renderer.n_kept_last()? {
             (of.culls, of.kept) = (true, f64::from(n));
         }
+        let mut facets = Vec::new();
         if of.facets > 0.0 {
-            let facets = renderer.facets(device)?.0;
+            facets = renderer.facets(device)?.0;
             let transmittance = renderer.transmittance(device)?;
             of.march_samples = march_samples(scene, &packet, &facets, &transmittance);
         }
         if !has_impostors(scene) {
             let (camera, size) = renderer.blob_camera(&packet);
-            let is_whole = !scene.has_solids()
-                && !scene.draw.threshold.is_active()
-                && scene.draw.count.is_none();
+            let is_whole = !scene.draw.threshold.is_active() && scene.draw.count.is_none();
             let pixels = f64::from(size[0]) * f64::from(size[1]);
             let mut per_pixel = 0.0;
             if is_whole && of.particles > 0.0 {
@@ -121,7 +124,9 @@ impl Amounts {
                 let cutoff = scene.draw.cutoff;
                 let saturated = renderer.saturated();
                 let rays = Rays::new(&camera, size, placed.len());
-                per_pixel = layers(&rays, &camera, &placed, &particles, [cutoff, saturated]);
+                let solids = solids(scene, &packet, &facets);
+                let bounds = [cutoff, saturated];
+                per_pixel = layers(&rays, &camera, &placed, &particles, &solids, bounds);
             }
             of.blobs = Some(Blobs { pixels, layers: pixels * per_pixel });
         }
@@ -176,6 +181,28 @@ impl Amounts {
             blobs: None,
         }
     }
+}
+
+/// Returns boxes around surfaces and terrains, relative to the lighting origin. Terrain that has no
+/// facets, without light, may be anywhere.
+fn solids(scene: &Scene, packet: &Packet, facets: &[FacetRecord]) -> Vec<[DVec3; 2]> {
+    let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    let anywhere = [DVec3::NEG_INFINITY, DVec3::INFINITY];
+    let around = |points: &mut dyn Iterator<Item = DVec3>| {
+        let first = points.next().map(|p| [p, p])?;
+        Some(points.fold(first, |[low, high], p| [low.min(p), high.max(p)]))
+    };
+    let of = |(i, region): (usize, &RegionRecord)| {
+        let [center, u, v] = [region.center, region.u, region.v].map(vector);
+        if i < scene.surfaces.len() {
+            let half = u.abs() + v.abs();
+            return [center - half, center + half];
+        }
+        let first = region.i_first_facet as usize;
+        let own = facets.get(first..first + region.n_facets as usize).unwrap_or(&[]);
+        around(&mut own.iter().map(|f| vector(f.position))).unwrap_or(anywhere)
+    };
+    packet.regions.iter().take(scene.n_solids()).enumerate().map(of).collect()
 }
 
 /// Returns the waves of all particles' gusts.

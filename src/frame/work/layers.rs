@@ -37,16 +37,21 @@ impl Rays {
 }
 
 /// Returns the mean number of layers along `rays`: blobs within the cutoff, in σ, near to far,
-/// until what passes is below `saturated`.
+/// until what passes is below `saturated`. Blobs that a solid in one of the boxes `solids` (low and
+/// high corner) may hide are none: those whose centres are not nearer than the box.
 pub(super) fn layers(
     rays: &Rays,
     camera: &CameraRecord,
     placed: &[PlacedRecord],
     particles: &[ParticleRecord],
+    solids: &[[DVec3; 2]],
     [cutoff, saturated]: [f64; 2],
 ) -> f64 {
     let (eye, forward) = (vector(camera.eye), vector(camera.forward));
+    let near = f64::from(camera.near);
     let of_ray = |ray: &DVec3| {
+        let nearest = solids.iter().map(|solid| entry(eye, *ray, solid));
+        let hidden = nearest.fold(f64::INFINITY, f64::min) * ray.dot(forward);
         let mut met = Vec::new();
         for (place, particle) in placed.iter().zip(particles) {
             let offset = vector(place.position) - eye;
@@ -57,7 +62,7 @@ pub(super) fn layers(
             let along = offset.dot(ray) / ray.length();
             let apart = offset.length_squared() - along * along;
             let tau = SQRT_TAU * f64::from(particle.kappa) * sigma / ray.length();
-            if apart > (cutoff * sigma).powi(2) || depth < f64::from(camera.near) || tau <= 0.0 {
+            if apart > (cutoff * sigma).powi(2) || depth < near || depth > hidden || tau <= 0.0 {
                 continue;
             }
             met.push((depth, tau * (-0.5 * apart / (sigma * sigma)).exp()));
@@ -75,6 +80,17 @@ pub(super) fn layers(
     };
     let n: usize = rays.0.iter().map(of_ray).sum();
     n as f64 / rays.0.len().max(1) as f64
+}
+
+/// Returns the distance from `eye` along `ray` to a box; infinity where the ray misses it.
+fn entry(eye: DVec3, ray: DVec3, [low, high]: &[DVec3; 2]) -> f64 {
+    let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
+    for axis in 0..3 {
+        let [a, b] = [low, high].map(|face| (face[axis] - eye[axis]) / ray[axis]);
+        // A ray within the plane of a face has no number there, which leaves all as it is.
+        (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+    }
+    if enter <= leave { enter } else { f64::INFINITY }
 }
 
 fn vector(v: [f32; 3]) -> DVec3 {
@@ -111,7 +127,7 @@ mod tests {
         // One pixel: its ray is the view direction.
         let rays = Rays::new(&camera(), [1, 1], placed.len());
         assert_eq!(rays.0, [DVec3::NEG_Z]);
-        layers(&rays, &camera(), &placed, &particles, [3.0, saturated])
+        layers(&rays, &camera(), &placed, &particles, &[], [3.0, saturated])
     }
 
     #[test]
@@ -134,8 +150,26 @@ mod tests {
         let (placed, particle) = blob(-10.0, 5.0 / 3.0, 1e-3);
         let rays = Rays::new(&camera(), [640, 640], 1);
         assert_eq!(rays.0.len(), MOST_ALONG * MOST_ALONG);
-        let share = layers(&rays, &camera(), &[placed], &[particle], [3.0, 1e-3]);
+        let share = layers(&rays, &camera(), &[placed], &[particle], &[], [3.0, 1e-3]);
         assert!((share - std::f64::consts::PI / 16.0).abs() < 0.08, "{share}");
+    }
+
+    #[test]
+    fn blobs_behind_a_box_of_solids_are_not_certain() {
+        let blobs = [blob(-5.0, 1.0, 1e-3), blob(-9.0, 1.0, 1e-3)];
+        let (placed, particles): (Vec<_>, Vec<_>) = blobs.iter().copied().unzip();
+        let rays = Rays::new(&camera(), [1, 1], 2);
+        let n = |solids: &[[DVec3; 2]]| {
+            layers(&rays, &camera(), &placed, &particles, solids, [3.0, 1e-3])
+        };
+        let at = |x: f64, z: f64| [DVec3::new(x - 1.0, -1.0, z - 0.5), DVec3::new(x + 1.0, 1.0, z)];
+        assert_eq!(n(&[at(0.0, -7.0)]), 1.0);
+        assert_eq!(n(&[at(0.0, -7.0), at(0.0, -3.0)]), 0.0);
+        assert_eq!(n(&[at(0.0, -10.0)]), 2.0);
+        // Beside the ray, and behind the eye.
+        assert_eq!(n(&[at(5.0, -7.0), at(0.0, 3.0)]), 2.0);
+        // About the eye.
+        assert_eq!(n(&[at(0.0, 0.2)]), 0.0);
     }
 
     #[test]

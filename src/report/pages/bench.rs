@@ -6,8 +6,8 @@ use maud::{Markup, html};
 
 use super::figure::figure;
 use super::pictures::Png;
-use super::{provenance, roofs};
 use super::table::{Cell, count, median, ms, percent, table, text, value};
+use super::{provenance, roofs};
 use crate::error::Result;
 use crate::report::charts::passes::PassColors;
 use crate::report::charts::{frames, number, passes, sweep, with_interval};

@@ -30,7 +30,7 @@ impl Renderer {
 fn cold_caches(device: &Device, compiler: &Compiler, bytes: u64) -> Result<ColdCaches> {
     let most = device.limits().max_storage_buffer_bytes.max(LEAST_BYTES);
     let largest = if most.is_power_of_two() { most } else { most.next_power_of_two() / 2 };
-    let each = bytes.max(LEAST_BYTES).next_power_of_two().min(largest);
+    let each = (bytes / 4).max(LEAST_BYTES).next_power_of_two().min(largest);
     let buffer = |_| {
         let name = "frame.cold";
         Buffer::new::<[u32; 4]>(device, name, each / ELEMENT_BYTES, MemoryUsage::Device)

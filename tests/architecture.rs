@@ -15,7 +15,7 @@ use files::Graph;
 use source::{Source, Token};
 
 /// The rooms that every room may import, besides itself and `error`.
-const MAY_IMPORT: [(&str, &str); 18] = [
+const MAY_IMPORT: [(&str, &str); 19] = [
     ("error", ""),
     ("model", ""),
     ("io", "model"),
@@ -30,12 +30,13 @@ const MAY_IMPORT: [(&str, &str); 18] = [
     ("studies", "model io layout reference gpu frame measure timing"),
     ("stress", "model io layout reference gpu passes frame"),
     ("report", "io measure timing studies"),
+    ("roof", "layout gpu frame measure timing"),
     ("viewer", "model io layout reference gpu passes frame measure timing studies"),
     ("farm", "model io layout reference gpu passes frame measure timing studies report"),
     (
         "cli",
         "model io layout reference gpu passes frame measure inspect timing studies stress report \
-         viewer farm",
+         roof viewer farm",
     ),
     ("main", "cli"),
 ];

@@ -19,6 +19,7 @@ use nimbus::timing::records::{
     BaseTime, Case, Measured, Mode, PartRecord, Pass, Ratio, Reason, Run, Skipping,
 };
 use nimbus::timing::results::{RUN_FILE, open_results};
+use nimbus::timing::roofs::{Bandwidth, Ceilings};
 use nimbus::timing::state::{CaseState, Drift, RunState, Spread, ThrottleCount};
 use serde_json::{Value, json};
 
@@ -58,6 +59,9 @@ fn mode(threading: &str) -> Mode {
                 reason: Some("camera did not move".to_owned()),
                 reasons: vec![Reason { reason: "camera did not move".to_owned(), n: 1 }],
                 saved_ms: None,
+                bytes: Some(5.6e5),
+                operations: Some(0.0),
+                roof_share: Some(0.25),
             },
             Pass {
                 name: "first".to_owned(),
@@ -68,6 +72,7 @@ fn mode(threading: &str) -> Mode {
                 reason: None,
                 reasons: vec![],
                 saved_ms: Some(0.5),
+                ..Pass::default()
             },
         ],
         image_hash: Some("0123456789abcdef".repeat(4)),
@@ -141,6 +146,12 @@ fn sample() -> Run {
         chosen: vec!["draw.path = \"auto\" took \"tiles\"".to_owned()],
         parts: vec![part],
         state: Some(run_state()),
+        ceilings: Some(Ceilings {
+            date: utc_now(),
+            bandwidths: vec![Bandwidth { set_bytes: 1 << 28, bytes_per_s: 2e10 }],
+            operations_per_s: 1e11,
+        }),
+        cold_bytes: Some(1 << 25),
         ..blank
     }
 }
@@ -180,6 +191,8 @@ fn a_full_and_a_bare_run_satisfy_the_schema() {
         state: Some(RunState { clock: "cpu".to_owned(), ..RunState::default() }),
         block_order: Vec::new(),
         parts: Vec::new(),
+        ceilings: None,
+        cold_bytes: None,
         interrupted: true,
         environment: environment(),
         cpu: Cpu { model: "unknown".to_owned(), logical_cores: 1 },

@@ -8,6 +8,8 @@ mod checks;
 mod program;
 #[path = "harness/results.rs"]
 mod results;
+#[path = "report/roofs.rs"]
+mod roofs;
 #[path = "report/state.rs"]
 mod state;
 #[path = "report/still.rs"]

@@ -36,9 +36,14 @@ fn benched(zones: &Zones) -> (Vec<Sample>, Stage, Collected) {
     let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
     let stage = Stage::new(cases[0].scene.clone(), &choice, false).expect("a stage");
     zones.take();
-    let rounds = Rounds::Fixed(1);
-    let plan =
-        BenchPlan { n_warm_up: 0, rounds, hash_frames: false, pictures: false, checked: None };
+    let plan = BenchPlan {
+        n_warm_up: 0,
+        rounds: Rounds::Fixed(1),
+        hash_frames: false,
+        pictures: false,
+        checked: None,
+        cold_bytes: None,
+    };
     let outcome = Mutex::default();
     let ran = running::run(stage, &cases, &plan, &AtomicBool::new(false), &outcome, &mut |_| {});
     assert_eq!(ran.failure, None);

@@ -44,7 +44,7 @@ pub use weather::WeatherArgs;
     Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver;\n  70 farm \
     results that differ; 75 another run writes there, or another try may succeed;\n  101 \
     a fault of nimbus itself; 130 interrupted.\n\n\
-    Environment: NIMBUS_CACHE_DIR has compiled shaders and references (~/.cache/nimbus).\n  \
+    Environment: NIMBUS_CACHE_DIR has shaders, references and roofs (~/.cache/nimbus).\n  \
     NIMBUS_PROGRESS_S is the time between lines of progress in a log (15 s; 0: none).")]
 pub struct Args {
     /// The command.

@@ -17,10 +17,12 @@ use super::scene::{device_choice, print_sizes};
 use super::{bench_check, bench_starts};
 use crate::error::{Error, Result};
 use crate::frame::{Stage, limits};
+use crate::gpu::PassTimes;
 use crate::io::console::say;
 use crate::io::result_folder::Existing;
 use crate::measure::zones::Zones;
 use crate::timing::blocks::{self, Outcome};
+use crate::timing::caches::last_level_bytes;
 use crate::timing::cases::Case;
 use crate::timing::machine;
 use crate::timing::results::open_results;
@@ -62,6 +64,13 @@ fn run_here(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
         if is_set && n_scenes > 1 {
             return Err(Error::usage(format!("{flag} takes one scene, found {n_scenes}")));
         }
+    }
+    if args.cold.is_some() && args.options.pass_times != PassTimes::Drained {
+        let how = args.options.pass_times.name();
+        return Err(Error::usage(format!(
+            "--cold needs passes that are timed one by one: expected --pass-times drained, found \
+             {how}"
+        )));
     }
     let outs = out_dirs(args)?;
     if args.out.is_some() {
@@ -125,12 +134,17 @@ fn bench_scene(
 ) -> Result<()> {
     let date = machine::utc_now();
     let BenchCases { cases, scene_hash, resolved } = bench_cases(args, path, &args.options)?;
-    let plan = plan(args);
+    let mut plan = plan(args);
     let mut stage = open(args, &cases)?;
     if args.options.verbose {
         print_sizes(&stage.scene, Some(&stage));
     }
     let info = stage.info().clone();
+    // 0 stands for the size of the last cache level.
+    plan.cold_bytes = plan.cold_bytes.map(|bytes| match bytes {
+        0 => last_level_bytes(&info),
+        bytes => bytes,
+    });
     let pass_times = args.options.pass_times;
     let clocks = machine::clocks_record(&info, pass_times, &mut stage.renderer)?;
     // Read before and after the frames, to measure the drift between the two clocks.

@@ -24,8 +24,9 @@ use crate::timing::machine::{self, Clocks};
 use crate::timing::precision::PrecisionRecord;
 use crate::timing::records::Run;
 use crate::timing::results::write_results;
+use crate::timing::roofs::Roofs;
 use crate::timing::state::{BenchState, STATE_FILE, StateLog, rows_text};
-use crate::timing::trace;
+use crate::timing::{shares, trace};
 
 /// The conditions of a bench of one scene, and where its results go.
 pub struct Recorder {
@@ -131,6 +132,10 @@ impl Recorder {
     }
 
     fn run(&self, outcome: &Outcome, is_cut: bool) -> Run {
+        let mut cases = outcome.cases(&self.cases, &self.plan);
+        let ceilings = Roofs::kept(&self.info).and_then(|roofs| roofs.ceilings());
+        let cold_bytes = self.plan.cold_bytes;
+        shares::add(&mut cases, &outcome.amounts, ceilings.as_ref(), cold_bytes.is_some());
         Run {
             schema: Run::SCHEMA,
             nimbus: env!("CARGO_PKG_VERSION").into(),
@@ -144,7 +149,7 @@ impl Recorder {
             environment: machine::environment(),
             clocks: self.clocks,
             block_order: outcome.block_order(),
-            cases: outcome.cases(&self.cases, &self.plan),
+            cases,
             stages: outcome.stages.clone(),
             chosen: outcome.chosen.clone(),
             parts: Vec::new(),
@@ -155,6 +160,8 @@ impl Recorder {
                 limit_s: asked.limit.as_secs_f64(),
             }),
             state: outcome.state.as_ref().map(|state| state.run.clone()),
+            ceilings,
+            cold_bytes,
         }
     }
 

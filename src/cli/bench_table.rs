@@ -7,6 +7,7 @@ use super::bench_remarks::{
     overlap_lines, precision_lines, skipping_line, spread_lines, state_lines, still_line,
     still_lines,
 };
+use super::bench_roofs::{self, cold_line};
 use super::output::{header, or_dash, table};
 use crate::measure::lows::fps;
 use crate::timing::N_FRAMES_NEEDED;
@@ -37,6 +38,7 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
         blocks_line(run),
         if run.interrupted { "; INTERRUPTED: what was finished" } else { "" }
     );
+    out += &cold_line(run);
     out += &still_lines(run);
     if run.cases.len() > 1 {
         out += &table(&case_rows(run));
@@ -48,6 +50,9 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
             out += &case_report(case, *same);
             let state = case.state.as_ref().filter(|_| run.cases.len() > 1);
             out += &state.and_then(case_line).unwrap_or_default();
+            if verbose {
+                out += &bench_roofs::case_text(case);
+            }
         } else if *same == Some(false) {
             out += &format!("{}: {DIFFER}", case.name());
         }
@@ -58,6 +63,9 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
         out += &format!(
             "{n_same} of {n_told} cases gave the same last frame in all their blocks, to the byte\n"
         );
+    }
+    if verbose {
+        out += &bench_roofs::missing_line(run);
     }
     out += &(precision_lines(run) + &missing_lines(run) + &clocks_line(&run.clocks));
     out + &state_lines(run, verbose)

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::args::DevicesArgs;
-use super::{clock_locks, kernels, output};
+use super::{clock_locks, kernels, output, roof};
 use crate::error::{Error, Result};
 use crate::gpu::{DeviceInfo, Instance, no_permission};
 use crate::io::console::say;
@@ -18,6 +18,9 @@ use crate::io::console::say;
 pub fn run(args: &DevicesArgs) -> Result<()> {
     if !args.kernels.is_empty() {
         return kernels::run(args);
+    }
+    if args.roof {
+        return roof::run(args);
     }
     let instance = Instance::new(args.validation)?;
     let devices = DeviceInfo::list(&instance)?;

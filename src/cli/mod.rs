@@ -9,6 +9,7 @@ mod bench_check;
 mod bench_plot;
 mod bench_record;
 mod bench_remarks;
+mod bench_roofs;
 mod bench_stages;
 mod bench_starts;
 mod bench_table;
@@ -37,6 +38,7 @@ mod render;
 mod render_reference;
 mod report;
 mod revisions;
+mod roof;
 mod scene;
 mod stress;
 #[cfg(feature = "window")]

@@ -1,6 +1,7 @@
 //! The render step: planning, submission of frames, and waiting for them.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::time::Instant;
 
 use tracing::info_span;
@@ -13,8 +14,9 @@ use super::plan::{Pass, Plan, Skipping, plan};
 use super::staging::IN_FLIGHT;
 use crate::error::{Error, Result};
 use crate::gpu::{
-    Barriers, Buffer, Commands, Compiler, Device, MemoryUsage, ScopeTime, Submission,
+    Barriers, Buffer, ColdCaches, Commands, Compiler, Device, MemoryUsage, ScopeTime, Submission,
 };
+use crate::layout::frame::CameraRecord;
 use crate::model::scene::Scene;
 
 /// A scene on a device, and the frames of it that are in flight.
@@ -30,7 +32,7 @@ pub struct Renderer {
     pub(super) i_ended_picture: usize,
     pub(super) readback: Buffer,
     pub(super) skipping: Skipping,
-    last: Option<Packet>,
+    pub(super) last: Option<Packet>,
     /// Frames submitted so far.
     n_begun: u64,
     last_end: Instant,
@@ -194,6 +196,27 @@ impl Renderer {
     /// Sets whether frames skip passes whose input is unchanged.
     pub fn set_skip(&mut self, skip: bool) {
         self.skipping.is_on = skip;
+    }
+
+    /// Returns the particles that the last frame kept; `None` without culling.
+    pub(super) fn n_kept_last(&self) -> Result<Option<u32>> {
+        let slot = (self.n_begun.wrapping_sub(1) % IN_FLIGHT as u64) as usize;
+        self.passes.culling.as_ref().map(|culling| culling.n_kept(slot)).transpose()
+    }
+
+    /// Returns camera and size, in pixels, of the picture that a frame's blobs are drawn into.
+    pub(super) fn blob_camera(&self, packet: &Packet) -> (CameraRecord, [u32; 2]) {
+        self.passes.picture.blob_camera(&packet.camera, &self.passes.constants)
+    }
+
+    /// Returns the transmittance below which a pixel hides everything behind it.
+    pub(super) fn saturated(&self) -> f64 {
+        self.passes.constants.saturated
+    }
+
+    /// Makes caches cold before each pass of later frames.
+    pub(super) fn make_cold(&mut self, cold: &Arc<ColdCaches>) {
+        self.frames.iter_mut().for_each(|frame| frame.set_cold(Some(cold.clone())));
     }
 
     /// Sets where frames have barriers. Tests omit some, to prove that validation would notice.

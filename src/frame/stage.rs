@@ -209,6 +209,15 @@ impl Stage {
         self.game.set_culling(skip);
     }
 
+    /// Makes the device write at least `bytes` before each pass of later frames, so that the pass
+    /// finds nothing in a cache.
+    ///
+    /// # Errors
+    /// Fails if the device has too little memory.
+    pub fn set_cold(&mut self, bytes: u64) -> Result<()> {
+        self.renderer.set_cold(&self.device, &self.compiler, bytes)
+    }
+
     /// Returns the device's name, type and driver.
     pub fn info(&self) -> &DeviceInfo {
         self.device.info()

@@ -7,6 +7,7 @@ use tracing::info_span;
 
 use super::barriers::{Scope, stage_barrier};
 use super::call::Call;
+use super::cold::ColdCaches;
 use super::descriptors::DescriptorPools;
 use super::device::{Device, Owned, SharedDevice};
 use super::rate::Pace;
@@ -42,6 +43,8 @@ pub struct Commands {
     pub(super) descriptors: DescriptorPools,
     pub(super) timer: Timer,
     pub(super) stamp: Stamp,
+    /// What is written before each scope, where caches are to be cold.
+    pub(super) cold: Option<Arc<ColdCaches>>,
     /// The value that the semaphore has after the last submission.
     value: u64,
     semaphore: Arc<Owned<vk::Semaphore>>,
@@ -116,6 +119,7 @@ impl Commands {
             descriptors,
             timer,
             stamp,
+            cold: None,
             value: 0,
             semaphore,
             name,
@@ -132,6 +136,11 @@ impl Commands {
         let mut commands = Commands::new(device, name)?;
         commands.is_divisible = false;
         Ok(commands)
+    }
+
+    /// Makes caches cold before each scope of later recordings; none leaves them as they are.
+    pub fn set_cold(&mut self, cold: Option<Arc<ColdCaches>>) {
+        self.cold = cold;
     }
 
     /// Returns the command buffer that is being recorded.

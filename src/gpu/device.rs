@@ -13,6 +13,7 @@ use super::call::Call;
 use super::device_info::DeviceInfo;
 use super::executed::Executed;
 use super::fault;
+use super::features;
 use super::guard::Guards;
 use super::instance::Instance;
 use super::limits::Limits;
@@ -345,14 +346,7 @@ fn create(
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(info.queue_family)
         .queue_priorities(&priorities)];
-    let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true);
-    // `discard` compiles to demotion.
-    let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
-        .synchronization2(true)
-        .dynamic_rendering(true)
-        .shader_demote_to_helper_invocation(true)
-        .subgroup_size_control(true)
-        .compute_full_subgroups(true);
+    let (mut v12, mut v13) = features::enabled(&info.limits);
     let presents = !instance.vulkan.surface_extensions.is_empty() && info.has_swapchain;
     let swapchain = presents.then_some(khr::swapchain::NAME);
     let statistics = has_statistics.then_some(khr::pipeline_executable_properties::NAME);

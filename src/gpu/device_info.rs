@@ -6,10 +6,10 @@ use ash::{ext, khr, vk};
 
 use super::advice::no_driver;
 use super::call::Call;
-use super::fault;
 use super::host_clock::{self, ClockCalibration};
 use super::instance::Instance;
 use super::limits::{LLVMPIPE_ITERATIONS, Limits};
+use super::{fault, features};
 use crate::error::{Error, Result};
 
 /// Properties of a device that need no opening.
@@ -185,6 +185,7 @@ impl DeviceInfo {
                 can_choose_subgroup_size: in_compute(sizes.required_subgroup_size_stages),
                 has_int64: features.shader_int64 == vk::TRUE,
                 has_float64: features.shader_float64 == vk::TRUE,
+                has_float16: features::has_float16(vulkan, physical),
                 max_loop_iterations: match driver.driver_id {
                     vk::DriverId::MESA_LLVMPIPE => LLVMPIPE_ITERATIONS,
                     _ => u32::MAX,

@@ -35,6 +35,8 @@ pub struct Limits {
     pub has_int64: bool,
     /// Whether shaders can use 64-bit floats.
     pub has_float64: bool,
+    /// Whether shaders can compute with 16-bit floats.
+    pub has_float16: bool,
     /// Iterations after which the driver ends every loop of an invocation without a message; nested
     /// loops count together. [`u32::MAX`] where it does not.
     pub max_loop_iterations: u32,

@@ -98,6 +98,9 @@ impl Recorder<'_> {
         f: impl FnOnce(&mut Self) -> Result<()>,
     ) -> Result<()> {
         let _zone = info_span!("record", name).entered();
+        if self.scope.is_empty() {
+            self.make_cold()?;
+        }
         let commands = &mut self.commands;
         commands.begin_label(name);
         let i = commands.timer.begin(commands.buffer(), name);
@@ -116,6 +119,14 @@ impl Recorder<'_> {
             }
             None => Ok(()),
         }
+    }
+
+    /// Writes the buffers that make caches cold, if there are any.
+    fn make_cold(&mut self) -> Result<()> {
+        let Some(cold) = self.commands.cold.clone() else { return Ok(()) };
+        cold.buffers.iter().try_for_each(|buffer| {
+            self.dispatch_blocks(&cold.kernel, &[buffer], &cold.push, cold.n_groups)
+        })
     }
 
     /// Dispatches `kernel` with one invocation a record (each.glsl). Workgroups lie in rows where

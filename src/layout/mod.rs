@@ -6,6 +6,7 @@ pub mod disc;
 pub mod facet;
 pub mod frame;
 pub mod particle;
+pub mod roof;
 pub mod second;
 pub mod sums;
 pub mod tiles;

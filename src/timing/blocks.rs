@@ -9,7 +9,7 @@ use super::check::{Check, DevicePicture, Stages};
 use super::precision::Reached;
 use super::schedule::{Rounds, n_frames_of};
 use super::state::{BenchState, BlockWatch, FrameMark};
-use crate::frame::{Counts, FrameTimes};
+use crate::frame::{Amounts, Counts, FrameTimes};
 use crate::measure::blocked::N_BLOCKS_NEEDED;
 
 /// How many frames a bench runs, and what it keeps of them.
@@ -26,6 +26,8 @@ pub struct BenchPlan {
     /// Returns the pixels [column, row] of a film whose numbers are kept of the last frame of every
     /// block, to be checked; none without a check.
     pub checked: Option<PixelsOf>,
+    /// Bytes that the device writes before each pass, so that caches are cold.
+    pub cold_bytes: Option<u64>,
 }
 
 /// Returns pixels of a film of some width and height.
@@ -77,6 +79,8 @@ pub struct Outcome {
     pub pictures: Vec<CasePicture>,
     /// Counts of odd values in the last frame of each case that ran to its end.
     pub counts: BTreeMap<usize, Counts>,
+    /// Amounts of the last frame of each case that ran to its end.
+    pub amounts: BTreeMap<usize, Amounts>,
     /// The last frames of the blocks, to be checked; one of several with the same bytes.
     pub drawn: Vec<DevicePicture>,
     /// The check of the device's stages, if it was asked for.

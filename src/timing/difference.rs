@@ -69,6 +69,7 @@ pub fn differences(a: &Run, b: &Run) -> Vec<Difference> {
         (Condition::Device, "processor", |r| r.cpu.model.clone()),
         (Condition::Device, "cores", |r| r.cpu.logical_cores.to_string()),
         (Condition::Device, "times of passes", |r| r.clocks.pass_times.name().to_owned()),
+        (Condition::Device, "caches", |r| caches(r).to_owned()),
         (Condition::Build, "version", |r| r.nimbus.clone()),
         (Condition::Build, "revision", |r| r.revision.clone()),
     ] {
@@ -94,6 +95,11 @@ pub fn differences(a: &Run, b: &Run) -> Vec<Difference> {
         }
     }
     found
+}
+
+/// Returns whether caches were cold before each pass.
+fn caches(run: &Run) -> &'static str {
+    if run.cold_bytes.is_some() { "cold before each pass" } else { "as the pass before left them" }
 }
 
 /// Lists the scene hashes and the first keys that differ; no key differs if only a file that the

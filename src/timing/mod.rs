@@ -10,12 +10,14 @@
 //! them. [`history`] finds changes in a series of results. [`parts`] joins a bench that several
 //! nodes timed, and [`starts`] one that several processes ran. [`trace`] writes the frames as a time
 //! line. [`state`] reads the clocks and the load of the machine beside the frames, and
-//! [`bench_state`] judges the frames by them. [`machine`], [`names`] and [`json`] serve all of them,
-//! and the studies too.
+//! [`bench_state`] judges the frames by them. [`roofs`] are what a device can do at most, [`caches`]
+//! the size of its last cache level, and [`shares`] compares passes with both. [`machine`],
+//! [`names`] and [`json`] serve all of them, and the studies too.
 
 pub mod attachments;
 pub mod bench_state;
 pub mod blocks;
+pub mod caches;
 pub mod cases;
 pub mod check;
 pub mod compare;
@@ -33,8 +35,10 @@ pub mod parts;
 pub mod precision;
 pub mod records;
 pub mod results;
+pub mod roofs;
 pub mod running;
 pub mod schedule;
+pub mod shares;
 pub mod starts;
 pub mod state;
 pub mod still;

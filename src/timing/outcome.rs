@@ -324,5 +324,8 @@ fn pass_record(pass: Pass, timed: &Timed<'_>, unskipped: Option<&Timed<'_>>) -> 
         reason: skipped.last().map(|t| reason(t)),
         reasons: reasons(skipped.iter().map(|t| reason(t))),
         saved_ms: whole_ms.map(|ms| ms * (skipped.len() as f64 / n as f64)),
+        bytes: None,
+        operations: None,
+        roof_share: None,
     }
 }

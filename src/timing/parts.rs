@@ -131,6 +131,7 @@ impl Part {
             ("guard bands", has("--guard")),
             ("limit of a submission", value_of(command, "--max-submit-ms")),
             ("times of passes", self.run.clocks.pass_times.name().to_owned()),
+            ("cold caches", format!("{:?}", self.run.cold_bytes)),
             ("passes", self.table.pass_names.join(", ")),
             ("first case", of_base(&Case::name)),
             ("scene of the first case", of_base(&|c| c.scene_hash.clone())),

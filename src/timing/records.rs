@@ -10,6 +10,7 @@ use super::machine::{Clocks, Cpu, Device};
 use super::names::{Setting, case_name, loop_name, mode_name, sweep_text};
 use super::overlap::Overlap;
 use super::precision::{PrecisionRecord, Reached};
+use super::roofs::Ceilings;
 use super::state::{CaseState, RunState};
 use crate::frame::Counts;
 use crate::measure::lows::Lows;
@@ -65,6 +66,13 @@ pub struct Run {
     /// timed the cases: `parts` then has that of each node.
     #[serde(default)]
     pub state: Option<RunState>,
+    /// The roofs that the shares of passes are of; null if the device's were not measured.
+    #[serde(default)]
+    pub ceilings: Option<Ceilings>,
+    /// Bytes that the device wrote before each pass, so that caches were cold; null if they were
+    /// left as they were. The times of frames then contain these writes.
+    #[serde(default)]
+    pub cold_bytes: Option<u64>,
 }
 
 impl Run {
@@ -284,7 +292,7 @@ impl Mode {
 }
 
 /// A pass in one loop of a case.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pass {
     /// Name of the pass.
     pub name: String,
@@ -303,6 +311,16 @@ pub struct Pass {
     /// Device time a frame that skipping this pass saved: its median time in the loop without
     /// skipping, times the share of frames that skipped it. Null if that loop was not timed.
     pub saved_ms: Option<f64>,
+    /// Least bytes that the pass moves in the case's last frame; null if they are not known.
+    #[serde(default)]
+    pub bytes: Option<f64>,
+    /// Least operations on 32-bit floats of the pass in that frame.
+    #[serde(default)]
+    pub operations: Option<f64>,
+    /// Share of the roof that its median time reaches: the least time for these bytes, or for these
+    /// operations if that is longer, divided by the median. Null if the roof is not known.
+    #[serde(default)]
+    pub roof_share: Option<f64>,
 }
 
 impl Pass {

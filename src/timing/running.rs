@@ -15,7 +15,7 @@ use super::precision::{Limit, Precision, Reached, look, n_segments};
 use super::schedule::{self, PlannedBlock, Rounds, n_frames_of};
 use super::state::FrameMark;
 use crate::error::{Error, Result};
-use crate::frame::{Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
+use crate::frame::{Amounts, Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
 use crate::gpu::hex;
 use crate::io::image::display_bytes;
 use crate::model::scene::{Draw, LightingMode, Scene};
@@ -114,7 +114,8 @@ impl Bench<'_> {
         let (i_case, case) = (block.i_case, &self.cases[block.i_case]);
         let what = "the stage before this block has failed";
         let stage = self.stage.take().ok_or_else(|| Error::usage(what))?;
-        let stage = if self.staged == i_case {
+        let is_same = self.staged == i_case;
+        let stage = if is_same {
             stage
         } else {
             stage.again(with_drawing(&case.scene, self.drawing[i_case]), block.of.skip)?
@@ -122,6 +123,11 @@ impl Bench<'_> {
         self.staged = i_case;
         let stage = self.stage.insert(stage);
         self.drawing[i_case] = Some(stage.scene.draw);
+        // A new stage, or the first one, knows nothing of cold caches.
+        let is_new = !is_same || i_block == 0;
+        if let Some(bytes) = self.plan.cold_bytes.filter(|_| is_new) {
+            stage.set_cold(bytes)?;
+        }
         let has_several = self.cases.len() > 1;
         let named = |note: &String| {
             if has_several { format!("{}: {note}", case.name()) } else { note.clone() }
@@ -217,6 +223,9 @@ impl Bench<'_> {
         lock(self.outcome).notes.extend(unseen.iter().chain(&notes).map(named));
         let counts = Counts::new(&mut stage.renderer, &stage.device, &stage.scene)?;
         lock(self.outcome).counts.insert(i_case, counts);
+        let scene = stage.scene.clone();
+        let amounts = Amounts::measured(&mut stage.renderer, &stage.device, &scene)?;
+        lock(self.outcome).amounts.extend(amounts.map(|amounts| (i_case, amounts)));
         if self.plan.pictures && !self.stop.load(Ordering::Relaxed) {
             let film = case.scene.film;
             let (width, height) = (film.width, film.height);

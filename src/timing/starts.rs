@@ -214,7 +214,7 @@ fn joined_pass(
     whole: Option<&Timed<'_>>,
 ) -> Pass {
     let of = |timed: &Timed<'_>| values(&timed.blocks(|row| row.pass_ms.get(k).copied().flatten()));
-    let ms = of(timed);
+    let (first, ms) = (of_starts.first(), of(timed));
     let total: f64 = values(&timed.blocks(|row| row.gpu_ms)).iter().sum();
     let sum = |of: fn(&Pass) -> usize| of_starts.iter().map(|pass| of(pass)).sum::<usize>();
     let (n_run, n_skipped) = (sum(|p| p.n_run), sum(|p| p.n_skipped));
@@ -227,7 +227,7 @@ fn joined_pass(
     reasons.sort_by_key(|reason| std::cmp::Reverse(reason.n));
     let whole_ms = whole.and_then(|whole| median(&of(whole))).filter(|_| n_skipped > 0);
     Pass {
-        name: of_starts.first().map_or_else(String::new, |pass| pass.name.clone()),
+        name: first.map_or_else(String::new, |pass| pass.name.clone()),
         p50_ms: median(&ms),
         share: (total > 0.0).then(|| ms.iter().sum::<f64>() / total),
         n_run,
@@ -235,6 +235,12 @@ fn joined_pass(
         reason: of_starts.iter().rev().find_map(|pass| pass.reason.clone()),
         reasons,
         saved_ms: whole_ms.map(|ms| ms * (n_skipped as f64 / (n_run + n_skipped) as f64)),
+        // The least time, by the median of all starts.
+        roof_share: first.and_then(|pass| {
+            Some(pass.roof_share? * pass.p50_ms? / median(&ms).filter(|ms| *ms > 0.0)?)
+        }),
+        bytes: first.and_then(|pass| pass.bytes),
+        operations: first.and_then(|pass| pass.operations),
     }
 }
 

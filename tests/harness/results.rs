@@ -101,6 +101,8 @@ pub fn run(modes: Vec<Mode>) -> Run {
         interrupted: false,
         precision: None,
         state: None,
+        ceilings: None,
+        cold_bytes: None,
     }
 }
 

@@ -8,6 +8,7 @@ use nimbus::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use nimbus::layout::particle::{
     BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, TexturedRecord,
 };
+use nimbus::layout::roof;
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 use nimbus::passes::{
@@ -82,6 +83,9 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
         second::GatherPush::FIELDS,
         "Block Pairing 4 4 Facet T Light T T F F Node Lit 4 T 4",
     ),
+    ("roof_arithmetic.comp", roof::ArithmeticPush::FIELDS, "4"),
+    ("roof_atomics.comp", roof::AtomicsPush::FIELDS, "4"),
+    ("roof_memory.comp", roof::MemoryPush::FIELDS, "16 16"),
     ("second_merge.comp", second::MergePush::FIELDS, "4 Node Source 16"),
     ("second_sources.comp", second::SourcesPush::FIELDS, "Facet Light 4 4 T 4 4 Source 16 Packed"),
     (

@@ -14,7 +14,7 @@ pub fn chart(run: &Run) -> PassChart {
 
 pub fn pass(name: &str, p50_ms: Option<f64>, n_run: usize, n_skipped: usize) -> Pass {
     let (name, share, reason, reasons) = (name.to_owned(), None, None, vec![]);
-    Pass { name, p50_ms, share, n_run, n_skipped, reason, reasons, saved_ms: None }
+    Pass { name, p50_ms, share, n_run, n_skipped, reason, reasons, ..Pass::default() }
 }
 
 pub fn timed_run() -> Run {

@@ -23,6 +23,7 @@ fn mode(threading: &str, skip: bool, n_empty: usize, n_skipped: usize) -> Mode {
         reason: None,
         reasons: vec![],
         saved_ms: (n_skipped > 0).then_some(1.5),
+        ..Pass::default()
     };
     let of = Summary::of(&[1.0; N_FRAMES]).expect("a summary");
     Mode {

@@ -26,6 +26,8 @@ const MOST_STARTS: u32 = 100;
     nimbus bench scenes/threads.toml --plot --out run\n\n\
     As many blocks as intervals of ±2 % need:\n  \
     nimbus bench scenes/threads.toml --precision 2%\n\n\
+    The times of passes whose data comes from memory and not from a cache:\n  \
+    nimbus bench scenes/threads.toml --cold --out cold\n\n\
     Each [[phase]] of a scene is timed by itself; --set and --sweep apply to all of them.\n\n\
     Exit codes: 0 done; 1 the device's picture is wrong; 2 bad input; 3 device or driver; \
     130 interrupted, what was finished is kept.")]
@@ -122,6 +124,18 @@ pub struct BenchArgs {
     /// Replace existing results
     #[arg(long)]
     pub force: bool,
+    /// Make caches cold before each pass: the device writes MIB MiB, by default as much as its last
+    /// cache level holds (256 MiB on a GPU, a bound), outside of the pass's time. Times of passes
+    /// then are those of data from memory; times of frames contain the writes and are no figure
+    #[arg(
+        long,
+        value_name = "MIB",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0",
+        value_parser = parse_cold
+    )]
+    pub cold: Option<u32>,
     /// Do not check whether the device's pictures are right; the results then say so
     #[arg(long)]
     pub no_check: bool,
@@ -152,6 +166,13 @@ impl BenchArgs {
         let default = if self.precision.is_some() { WARM_UP_SHORT } else { WARM_UP };
         self.warmup.unwrap_or(default)
     }
+}
+
+/// Parses the MiB of `--cold`; 0 stands for the size of the last cache level.
+fn parse_cold(text: &str) -> Result<u32, String> {
+    limited(0, 4096, "the device writes them before each pass; 0: as the last cache level holds")(
+        text,
+    )
 }
 
 /// The loops that a bench times.

@@ -64,7 +64,9 @@ pub struct SceneArgs {
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "All devices, and what the driver's compiler makes of two scenes:\n  \
     nimbus devices\n  nimbus devices --kernels scenes/hello.toml scenes/ground.toml\n\n\
-    The commands that lock clocks before a benchmark:\n  nimbus devices --lock")]
+    The commands that lock clocks before a benchmark:\n  nimbus devices --lock\n\n\
+    What the device can do at most, and how near to it passes are:\n  nimbus devices --roof\n  \
+    nimbus bench scenes/threads.toml -v")]
 pub struct DevicesArgs {
     /// The device to mark as used, by index or part of its name
     #[arg(long, value_name = "INDEX|NAME")]
@@ -87,6 +89,15 @@ pub struct DevicesArgs {
     /// that undo it; nothing is changed
     #[arg(long, conflicts_with_all = ["kernels", "json"])]
     pub lock: bool,
+    /// Measure what the device can do at most: bandwidth by the size of the data, arithmetic of
+    /// each kind of number, and atomics, in less than 30 s. The roofs are kept, and bench shows
+    /// which share of them each pass reaches
+    #[arg(long, conflicts_with_all = ["kernels", "lock"])]
+    pub roof: bool,
+    /// Keep the submissions that measure below MS milliseconds [default: 500 on a GPU, no limit on
+    /// a CPU]
+    #[arg(long, value_name = "MS", value_parser = parse_positive, requires = "roof")]
+    pub max_submit_ms: Option<f64>,
     /// Print JSON instead of the table
     #[arg(long)]
     pub json: bool,

@@ -6,8 +6,8 @@ use maud::{Markup, html};
 
 use super::figure::figure;
 use super::pictures::Png;
-use super::provenance;
 use super::table::{Cell, count, median, ms, percent, table, text, value};
+use super::{provenance, roofs};
 use crate::error::Result;
 use crate::report::charts::passes::PassColors;
 use crate::report::charts::{frames, number, passes, sweep, with_interval};
@@ -56,6 +56,7 @@ pub fn section(results: &BenchResults, folder: &Path, colors: &PassColors) -> Re
             h3 { "Pictures" }
             div class="gallery" { @for picture in &pictures { (picture) } }
         }
+        (roofs::cold(run))
         (still(run))
         @if !sweep.is_empty() {
             h3 { "Times against the swept keys" }
@@ -75,6 +76,7 @@ pub fn section(results: &BenchResults, folder: &Path, colors: &PassColors) -> Re
         }
         (pass_table(run))
         (state(run))
+        (roofs::section(run))
     })
 }
 

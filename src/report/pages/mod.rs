@@ -11,6 +11,7 @@ mod ledger;
 mod page;
 mod pictures;
 mod provenance;
+mod roofs;
 pub mod source;
 mod table;
 

@@ -1,0 +1,32 @@
+//! Features of Vulkan 1.2 and 1.3 that devices are opened with.
+
+use ash::vk;
+
+use super::limits::Limits;
+
+/// Returns the features that nimbus enables: those that it needs, and 16-bit floats where the
+/// device has them.
+pub(super) fn enabled(
+    limits: &Limits,
+) -> (vk::PhysicalDeviceVulkan12Features<'static>, vk::PhysicalDeviceVulkan13Features<'static>) {
+    let v12 = vk::PhysicalDeviceVulkan12Features::default()
+        .timeline_semaphore(true)
+        .shader_float16(limits.has_float16);
+    // `discard` compiles to demotion.
+    let v13 = vk::PhysicalDeviceVulkan13Features::default()
+        .synchronization2(true)
+        .dynamic_rendering(true)
+        .shader_demote_to_helper_invocation(true)
+        .subgroup_size_control(true)
+        .compute_full_subgroups(true);
+    (v12, v13)
+}
+
+/// Returns whether shaders of a device can compute with 16-bit floats.
+pub(super) fn has_float16(instance: &ash::Instance, physical: vk::PhysicalDevice) -> bool {
+    let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12);
+    // A device that is older than Vulkan 1.2 leaves the structure as it is.
+    unsafe { instance.get_physical_device_features2(physical, &mut all) };
+    v12.shader_float16 == vk::TRUE
+}

@@ -31,6 +31,7 @@ mod ledger;
 mod output;
 mod progress;
 mod render;
+mod render_layers;
 mod render_reference;
 mod report;
 mod scene;

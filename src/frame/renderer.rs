@@ -30,7 +30,7 @@ pub struct Renderer {
     pub(super) i_ended_picture: usize,
     pub(super) readback: Buffer,
     pub(super) skipping: Skipping,
-    last: Option<Packet>,
+    pub(super) last: Option<Packet>,
     /// Frames submitted so far.
     n_begun: u64,
     last_end: Instant,

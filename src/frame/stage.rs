@@ -11,6 +11,7 @@ use super::times::OnFrame;
 use super::{parallel, serial};
 use crate::error::{Error, Result};
 use crate::gpu::{Compiler, Device, DeviceInfo, DeviceOptions, Instance, Sources};
+use crate::io::layers::Layers;
 use crate::model::scene::{Scene, Threading};
 use crate::passes;
 
@@ -207,6 +208,14 @@ impl Stage {
     pub fn set_skip(&mut self, skip: bool) {
         self.renderer.set_skip(skip);
         self.game.set_culling(skip);
+    }
+
+    /// Draws the layers of the last frame.
+    ///
+    /// # Errors
+    /// Fails as [`Renderer::layers`] does.
+    pub fn layers(&mut self) -> Result<Layers> {
+        self.renderer.layers(&self.device, &self.compiler, &self.scene)
     }
 
     /// Returns the device's name, type and driver.

@@ -35,8 +35,14 @@ fn benched(zones: &Zones) -> (Vec<Sample>, Stage, Collected) {
     let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
     let stage = Stage::new(cases[0].scene.clone(), &choice, false).expect("a stage");
     zones.take();
-    let plan =
-        BenchPlan { n_warm_up: 0, n_rounds: 1, hash_frames: false, pictures: false, checked: None };
+    let plan = BenchPlan {
+        n_warm_up: 0,
+        n_rounds: 1,
+        hash_frames: false,
+        pictures: false,
+        checked: None,
+        counts_invocations: false,
+    };
     let outcome = Mutex::default();
     let ran = blocks::run(stage, &cases, &plan, &AtomicBool::new(false), &outcome, &mut || {});
     assert_eq!(ran.failure, None);

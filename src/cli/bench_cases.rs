@@ -74,6 +74,7 @@ pub fn plan(args: &BenchArgs) -> BenchPlan {
         hash_frames: args.hash_frames,
         pictures: args.out.is_some(),
         checked: (!args.no_check).then_some(|w, h| checked_pixels(w, h).at),
+        counts_invocations: args.invocations,
     }
 }
 

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::args::RenderArgs;
 use super::progress::spinner;
 use super::scene::{check_time, device_choice, load, print_notes, print_sizes, print_unseen};
-use super::{output, render_layers, render_reference};
+use super::{capture_note, output, render_layers, render_reference};
 use crate::error::Result;
 use crate::frame::plan::Pass;
 use crate::frame::{Counts, DrawnFrame, Rendered, Stage, scene_of_layers};
@@ -42,7 +42,9 @@ fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
     let film = scene.film;
     let quiet = args.options.quiet;
     let drawing = spinner("drawing", quiet);
-    let mut stage = Stage::new(scene, &device_choice(&args.options), !args.options.no_skip)?;
+    let mut choice = device_choice(&args.options);
+    choice.options.captured_frame = args.capture.then_some(0);
+    let mut stage = Stage::new(scene, &choice, !args.options.no_skip)?;
     let packet = stage.game.step_at(args.frame, time_s)?;
     let rendered = stage.renderer.step(packet)?;
     let rgba = stage.renderer.image()?;
@@ -65,6 +67,7 @@ fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
     if let (Some(counts), true) = (&counts, args.options.verbose) {
         say!("  {}", counts.text());
     }
+    capture_note::print(&stage.device, choice.options.captured_frame, quiet);
     stage.close()?;
     let n_bad = match &layers {
         Some(layers) => layers.n_not_finite(),

@@ -27,9 +27,11 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         files,
     };
     let _keeping = interrupt::close_window(PATIENCE_WITH_CHILDREN);
+    let mut choice = device_choice(&args.options);
+    choice.options.captured_frame = args.capture;
     let WindowTimes { loops, panels_ms } = scene_window::run(Options {
         source,
-        choice: device_choice(&args.options),
+        choice,
         skips: !args.options.no_skip,
         mode: args.present,
         n_frames: args.frames,

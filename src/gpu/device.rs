@@ -10,33 +10,19 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::call::Call;
+use super::capture::{Capture, Captured};
+use super::counters::has_counters;
 use super::device_info::DeviceInfo;
+use super::device_options::DeviceOptions;
 use super::executed::Executed;
 use super::fault;
 use super::guard::Guards;
 use super::instance::Instance;
 use super::limits::Limits;
-use super::lowered::LoweredLimits;
 use super::over_limit::OverLimit;
 use super::pass_times::PassTimes;
 use super::statistics::{PipelineReport, Reports};
 use crate::error::{Error, Result};
-
-/// The way in which a device is opened.
-#[derive(Debug, Clone, Default)]
-pub struct DeviceOptions {
-    /// Limits of another device that the device is lowered to.
-    pub limits: Option<LoweredLimits>,
-    /// The device keeps a report on every pipeline that it makes.
-    pub reports_pipelines: bool,
-    /// Buffers are filled with NaN and have guard bands, which are checked after each pass.
-    pub guard: bool,
-    /// Most milliseconds that a submission is predicted to take; without, 500 on a device that is
-    /// no CPU, and any time on a CPU.
-    pub max_submit_ms: Option<f64>,
-    /// The way in which the times of passes are taken.
-    pub pass_times: PassTimes,
-}
 
 /// Most milliseconds of a submission to a GPU. Windows resets a GPU that does not answer for two
 /// seconds, other systems wait longer; a prediction may be off by a factor of four.
@@ -71,6 +57,10 @@ pub(super) struct SharedDevice {
     pub executed: Executed,
     /// Whether the device may be at work for ever, so that nothing that it may use can be freed.
     is_abandoned: AtomicBool,
+    /// Whether commands can count invocations.
+    pub counts_invocations: bool,
+    /// The frame to capture, if one is to be captured.
+    pub capture: Option<Capture>,
     /// Reports on new pipelines, where they are wanted.
     pub reports: Option<Reports>,
     /// Where the driver says why the device was lost, if it does.
@@ -96,6 +86,7 @@ impl Device {
         choice: Option<&str>,
         options: &DeviceOptions,
     ) -> Result<Device> {
+        let capture = options.captured_frame.map(Capture::new).transpose()?;
         let info = DeviceInfo::choose(DeviceInfo::list(instance)?, choice)?;
         let mut info = match &options.limits {
             Some(limits) => info.lowered(limits),
@@ -105,7 +96,9 @@ impl Device {
             info.limits.timestamp_valid_bits = 0;
         }
         let has_statistics = options.reports_pipelines && info.has_pipeline_statistics;
-        let raw = create(instance, &info, options, has_statistics)?;
+        let counts_invocations =
+            options.counts_invocations && has_counters(&instance.vulkan.raw, info.physical);
+        let raw = create(instance, &info, options, has_statistics, counts_invocations)?;
         let queue = unsafe { raw.get_device_queue(info.queue_family, 0) };
         let mut debug_settings = gpu_allocator::AllocatorDebugSettings::default();
         // Device::drop reports leaks itself, into the messages that tests read.
@@ -147,6 +140,8 @@ impl Device {
             pass_times: options.pass_times,
             executed: Executed::default(),
             is_abandoned: AtomicBool::new(false),
+            counts_invocations,
+            capture,
             reports: options.reports_pipelines.then(|| Reports::new(statistics)),
             faults,
             instance: instance.clone(),
@@ -179,6 +174,11 @@ impl Device {
     /// Returns notes on work that takes longer than a submission is to take; each once.
     pub fn take_over_limit(&self) -> Vec<String> {
         self.shared.max_submit_ns.map_or(vec![], |limit| self.shared.over_limit.take(limit))
+    }
+
+    /// Returns the result of the capture that was asked for; none before its frame has ended.
+    pub fn captured(&self) -> Option<Captured> {
+        self.shared.capture.as_ref().and_then(Capture::result)
     }
 
     /// Returns the bytes allocated on the device at present.
@@ -353,6 +353,7 @@ fn create(
     info: &DeviceInfo,
     options: &DeviceOptions,
     has_statistics: bool,
+    counts_invocations: bool,
 ) -> Result<ash::Device> {
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default()
@@ -381,6 +382,7 @@ fn create(
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(info.limits.has_int64)
         .shader_float64(info.limits.has_float64)
+        .pipeline_statistics_query(counts_invocations)
         // A read far beyond the end must not end the process.
         .robust_buffer_access(options.guard);
     let mut create = vk::DeviceCreateInfo::default()

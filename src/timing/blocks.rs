@@ -9,6 +9,7 @@ use sha2::{Digest, Sha256};
 use super::attachments::CasePicture;
 use super::cases::{Case, Loop};
 use super::check::{Check, DevicePicture, Stages};
+use super::invocations::{self, NO_COUNTERS, PassInvocations};
 use crate::error::{Error, Result};
 use crate::frame::{Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
 use crate::gpu::hex;
@@ -29,6 +30,8 @@ pub struct BenchPlan {
     /// Returns the pixels [column, row] of a film whose numbers are kept of the last frame of every
     /// block, to be checked; none without a check.
     pub checked: Option<PixelsOf>,
+    /// Whether one more frame of every case, after its blocks, counts what its passes invoke.
+    pub counts_invocations: bool,
 }
 
 /// Returns pixels of a film of some width and height.
@@ -83,6 +86,8 @@ pub struct Outcome {
     pub stages: Option<Stages>,
     /// The checks of pictures, by case.
     pub checks: BTreeMap<usize, Check>,
+    /// What the passes of each case invoked in a frame of their own, where that was counted.
+    pub invocations: BTreeMap<usize, Vec<PassInvocations>>,
     /// Whether Ctrl-C came before the end.
     pub interrupted: bool,
 }
@@ -231,6 +236,14 @@ impl Bench<'_> {
                 let picture = CasePicture { i_case: block.i_case, width, height, rgb };
                 lock(self.outcome).pictures.push(picture);
             }
+            if let Some(frame) = last.filter(|_| self.plan.counts_invocations && !is_stopped()) {
+                let counted = invocations::count(stage, frame.time_s)?;
+                let mut outcome = lock(self.outcome);
+                if counted.is_none() && !outcome.notes.iter().any(|n| n == NO_COUNTERS) {
+                    outcome.notes.push(NO_COUNTERS.to_owned());
+                }
+                outcome.invocations.extend(counted.map(|of| (block.i_case, of)));
+            }
         }
         Ok(())
     }
@@ -368,6 +381,7 @@ mod tests {
             hash_frames: false,
             pictures: false,
             checked: None,
+            counts_invocations: false,
         };
         assert_eq!(n_frames_total(&two, &plan), 2 * (3 * 8 + 2 * 7));
     }

@@ -96,6 +96,7 @@ impl Outcome {
             skipping: unskipped.and_then(|unskipped| self.skipping(i, case, unskipped)),
             figure: None,
             check: self.checks.get(&i).cloned(),
+            invocations: self.invocations.get(&i).cloned(),
         };
         record.figure = record.figure_mode().map(Mode::name);
         record

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::check::{Check, Stages};
+use super::invocations::PassInvocations;
 use super::json::ResultFile;
 use super::machine::{Clocks, Cpu, Device};
 use super::names::{Setting, case_name, loop_name, mode_name, sweep_text};
@@ -113,6 +114,10 @@ pub struct Case {
     /// The check of its pictures. Null in results of versions that did not check them.
     #[serde(default)]
     pub check: Option<Check>,
+    /// What each pass invoked in one more frame, in which every pass ran that the scene needs. Null
+    /// without `--invocations`, and on devices without counters.
+    #[serde(default)]
+    pub invocations: Option<Vec<PassInvocations>>,
 }
 
 impl Case {

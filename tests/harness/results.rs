@@ -91,6 +91,7 @@ pub fn run(modes: Vec<Mode>) -> Run {
             counts: None,
             figure: None,
             check: None,
+            invocations: None,
         }],
         stages: None,
         chosen: Vec::new(),

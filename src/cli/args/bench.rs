@@ -89,6 +89,14 @@ pub struct BenchArgs {
     /// Do not check whether the device's pictures are right; the results then say so
     #[arg(long)]
     pub no_check: bool,
+    /// Count what each pass invokes: shaders, and triangles before and after clipping. One more
+    /// frame of each case counts them after its timed frames, so that no time changes
+    #[arg(long)]
+    pub invocations: bool,
+    /// Have RenderDoc capture this frame, counted from 0 over all frames of the command, warm-up
+    /// included; nimbus must have been started under RenderDoc, and times then mean little
+    #[arg(long, value_name = "N")]
+    pub capture: Option<u32>,
     /// Print run.json instead of the table
     #[arg(long)]
     pub json: bool,

@@ -55,6 +55,9 @@ pub struct RenderArgs {
     /// picture of each reflection alone (docs/reference/files.md)
     #[arg(long)]
     pub layers: bool,
+    /// Have RenderDoc capture the frame; nimbus must have been started under RenderDoc
+    #[arg(long, conflicts_with = "reference")]
+    pub capture: bool,
     /// Replace an existing file
     #[arg(long)]
     pub force: bool,

@@ -48,6 +48,7 @@ fn case(k: usize, ms: f64) -> Case {
         counts: None,
         figure: None,
         check: None,
+        invocations: None,
     }
 }
 

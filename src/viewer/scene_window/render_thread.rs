@@ -68,6 +68,7 @@ pub struct SceneRenderer {
     /// Frames until the window closes; `None`: no limit.
     n_left: Option<u32>,
     samples: LoopSamples,
+    has_told_capture: bool,
 }
 
 impl SceneRenderer {
@@ -97,6 +98,7 @@ impl SceneRenderer {
             failed_at: None,
             n_left: n_frames,
             samples: LoopSamples::default(),
+            has_told_capture: false,
         })
     }
 
@@ -273,6 +275,9 @@ impl SceneRenderer {
         };
         let ended = frames.run(&mut game, &mut renderer);
         self.target.finish();
+        let captured = self.target.gpu.device.captured();
+        let is_told = std::mem::replace(&mut self.has_told_capture, captured.is_some());
+        captured.filter(|_| !is_told).iter().for_each(|of| self.links.note(of.text()));
         lock(&self.links.status).variant_ms = None;
         ended
     }

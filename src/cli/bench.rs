@@ -189,7 +189,8 @@ fn bench_scene(
         _ => Vec::new(),
     };
     if let Some(stage) = &stage {
-        capture_note::print(&stage.device, recorder.args.capture, recorder.args.options.quiet);
+        let BenchArgs { capture, options, .. } = &recorder.args;
+        capture_note::print(stage.device.captured(), *capture, options.quiet);
     }
     let missed = stage.as_ref().map_or((0, 0), |stage| stage.device.executed());
     let wrong = bench_check::not_executed(&recorder.args, missed)

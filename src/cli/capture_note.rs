@@ -1,12 +1,12 @@
 //! What became of a capture that `--capture` asked for.
 
-use crate::gpu::Device;
+use crate::gpu::Captured;
 use crate::io::console::say;
 
 /// Prints where RenderDoc's capture is, or that there is none; nothing if no frame was asked for.
-pub fn print(device: &Device, frame: Option<u32>, is_quiet: bool) {
+pub fn print(captured: Option<Captured>, frame: Option<u32>, is_quiet: bool) {
     let Some(frame) = frame else { return };
-    match device.captured() {
+    match captured {
         Some(captured) if captured.is_done => {
             if !is_quiet {
                 say!("{}", captured.text());

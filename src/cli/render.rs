@@ -67,7 +67,7 @@ fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
     if let (Some(counts), true) = (&counts, args.options.verbose) {
         say!("  {}", counts.text());
     }
-    capture_note::print(&stage.device, choice.options.captured_frame, quiet);
+    capture_note::print(stage.device.captured(), choice.options.captured_frame, quiet);
     stage.close()?;
     let n_bad = match &layers {
         Some(layers) => layers.n_not_finite(),

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use serde_json::{Value, json};
 
 use super::args::ViewArgs;
+use super::capture_note;
 use super::interrupt::{self, PATIENCE_WITH_CHILDREN};
 use super::output::{self, header};
 use super::scene::{device_choice, load_with_files, typed_overrides};
@@ -29,7 +30,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
     let _keeping = interrupt::close_window(PATIENCE_WITH_CHILDREN);
     let mut choice = device_choice(&args.options);
     choice.options.captured_frame = args.capture;
-    let WindowTimes { loops, panels_ms } = scene_window::run(Options {
+    let WindowTimes { loops, panels_ms, captured } = scene_window::run(Options {
         source,
         choice,
         skips: !args.options.no_skip,
@@ -40,6 +41,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         has_panels: !args.no_panels,
         captures: args.captures.clone(),
     })?;
+    capture_note::print(captured, args.capture, args.options.quiet);
     if args.json {
         let rows: Vec<Value> = loops.iter().map(row).collect();
         let panels = Summary::of(&panels_ms).map(|s| numbers(&s));

@@ -63,12 +63,6 @@ fn wanted() -> vk::QueryPipelineStatisticFlags {
         | Count::COMPUTE_SHADER_INVOCATIONS
 }
 
-/// Returns whether a device has the counters.
-pub(super) fn has_counters(instance: &ash::Instance, physical: vk::PhysicalDevice) -> bool {
-    let features = unsafe { instance.get_physical_device_features(physical) };
-    features.pipeline_statistics_query == vk::TRUE
-}
-
 /// Queries around scopes. Recordings have none until they are switched on.
 pub(super) struct Counters {
     /// None unless the device was opened for counts and has counters.

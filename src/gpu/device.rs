@@ -11,7 +11,6 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::call::Call;
 use super::capture::{Capture, Captured};
-use super::counters::has_counters;
 use super::device_info::DeviceInfo;
 use super::device_options::DeviceOptions;
 use super::executed::Executed;
@@ -23,10 +22,6 @@ use super::over_limit::OverLimit;
 use super::pass_times::PassTimes;
 use super::statistics::{PipelineReport, Reports};
 use crate::error::{Error, Result};
-
-/// Most milliseconds of a submission to a GPU. Windows resets a GPU that does not answer for two
-/// seconds, other systems wait longer; a prediction may be off by a factor of four.
-const MAX_SUBMIT_MS: f64 = 500.0;
 
 /// An open device.
 ///
@@ -96,8 +91,7 @@ impl Device {
             info.limits.timestamp_valid_bits = 0;
         }
         let has_statistics = options.reports_pipelines && info.has_pipeline_statistics;
-        let counts_invocations =
-            options.counts_invocations && has_counters(&instance.vulkan.raw, info.physical);
+        let counts_invocations = options.counts_on(&instance.vulkan.raw, info.physical);
         let raw = create(instance, &info, options, has_statistics, counts_invocations)?;
         let queue = unsafe { raw.get_device_queue(info.queue_family, 0) };
         let mut debug_settings = gpu_allocator::AllocatorDebugSettings::default();
@@ -125,8 +119,6 @@ impl Device {
             info.tells_faults.then(|| ext::device_fault::Device::new(&instance.vulkan.raw, &raw));
         instance.messages().claim(raw.handle());
         instance.messages().claim(queue);
-        let of_kind = (info.kind != "cpu").then_some(MAX_SUBMIT_MS);
-        let max_submit_ms = options.max_submit_ms.or(of_kind);
         let shared = Arc::new(SharedDevice {
             raw,
             queue: Mutex::new(queue),
@@ -135,7 +127,7 @@ impl Device {
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             debug,
             guards: options.guard.then(Guards::default),
-            max_submit_ns: max_submit_ms.map(|ms| 1e6 * ms),
+            max_submit_ns: options.max_submit_ns(info.kind),
             over_limit: OverLimit::default(),
             pass_times: options.pass_times,
             executed: Executed::default(),

@@ -68,7 +68,6 @@ pub struct SceneRenderer {
     /// Frames until the window closes; `None`: no limit.
     n_left: Option<u32>,
     samples: LoopSamples,
-    has_told_capture: bool,
 }
 
 impl SceneRenderer {
@@ -98,7 +97,6 @@ impl SceneRenderer {
             failed_at: None,
             n_left: n_frames,
             samples: LoopSamples::default(),
-            has_told_capture: false,
         })
     }
 
@@ -141,6 +139,7 @@ impl SceneRenderer {
                 Err(error) => return Err(error),
             }
         }
+        lock(&self.links.status).captured = self.target.gpu.device.captured();
         self.target.close()?;
         Ok(loop_times(&self.samples))
     }
@@ -275,9 +274,6 @@ impl SceneRenderer {
         };
         let ended = frames.run(&mut game, &mut renderer);
         self.target.finish();
-        let captured = self.target.gpu.device.captured();
-        let is_told = std::mem::replace(&mut self.has_told_capture, captured.is_some());
-        captured.filter(|_| !is_told).iter().for_each(|of| self.links.note(of.text()));
         lock(&self.links.status).variant_ms = None;
         ended
     }

@@ -109,7 +109,9 @@ pub fn write(path: &Path, layers: &Layers) -> Result<()> {
     let attributes =
         LayerAttributes { software_name: Some("nimbus".into()), ..LayerAttributes::default() };
     let channels = AnyChannels::sort(list);
-    let layer = Layer::new((width, height), attributes, Encoding::FAST_LOSSLESS, channels);
+    // Lines, not tiles: every reader knows them.
+    let encoding = Encoding::SMALL_FAST_LOSSLESS;
+    let layer = Layer::new((width, height), attributes, encoding, channels);
     write_atomic(path, |writer| Image::from_layer(layer).write().to_buffered(writer))
 }
 

@@ -206,6 +206,7 @@ fn layers_are_those_of_the_reference_on_both_paths() {
         ("without light", "scenes/ground.toml", vec!["lighting.mode=\"none\"", F32]),
         ("over a floor", "scenes/ground.toml", vec![TILES, F32]),
         ("over a floor, sprites", "scenes/ground.toml", vec![SPRITES, F32]),
+        ("discs, of which some slots show nothing", "scenes/puff.toml", vec![F32]),
     ] {
         draw(file, &more).check(what);
     }

@@ -110,7 +110,7 @@ pub fn write(path: &Path, layers: &Layers) -> Result<()> {
         LayerAttributes { software_name: Some("nimbus".into()), ..LayerAttributes::default() };
     let channels = AnyChannels::sort(list);
     // Lines, not tiles: every reader knows them.
-    let encoding = Encoding::SMALL_FAST_LOSSLESS;
+    let encoding = Encoding::SMALL_LOSSLESS;
     let layer = Layer::new((width, height), attributes, encoding, channels);
     write_atomic(path, |writer| Image::from_layer(layer).write().to_buffered(writer))
 }

@@ -13,7 +13,7 @@
 `read` recognises what a path is and returns one of six classes:
 
     Run         nimbus bench --out DIR or --json, and the      frames, loops, passes, cases,
-                merged bench of nimbus farm                    parts
+                merged bench of nimbus farm                    invocations, parts
     Study       nimbus error --out DIR or --json               configurations, times
     Ledger      nimbus ledger --out DIR or --json              rows
     Stress      nimbus stress --json or --csv                  cases
@@ -886,11 +886,17 @@ class Run(_Result):
     are the parts of the drawing and of the light, each with its `_bound`; `settings_rms` is the
     change that the scene's settings of `draw` make. Results that were not checked have NaN.
 
+    `invocations`: a row for each pass of each case that nimbus bench --invocations counted: the
+    invocations of `compute`, `vertex` and `fragment` shaders in one frame, and triangles before
+    (`primitives`) and after clipping (`clipped_primitives`). Empty without that option.
+
     `parts`: a row for each part of a bench that a node of nimbus farm timed: its cases from `first`
     to before `end`, and the `node`. Empty if one process ran all.
     """
 
-    TABLES = ("frames", "loops", "passes", "cases", "parts")
+    TABLES = ("frames", "loops", "passes", "cases", "invocations", "parts")
+    INVOKED = ("compute", "vertex", "fragment", "primitives", "clipped_primitives")
+    """What nimbus bench --invocations counts."""
     QUANTITIES = (
         "frame_ms", "game_ms", "record_ms", "submit_ms", "wait_ms", "render_ms", "gpu_ms",
         "latency_ms",
@@ -905,6 +911,7 @@ class Run(_Result):
         loops, passes = self._loops(cases)
         self.loops = loops
         self.passes = passes
+        self.invocations = self._invocations(cases)
         stages = record.get("stages")
         self.failed_stages: Optional[List[str]] = None
         """The cases of nimbus stress that failed on the device; None if none were run."""
@@ -957,6 +964,16 @@ class Run(_Result):
         "rmse_high": float, "max": float, "magnitude": float, "drawing_rms": float,
         "drawing_bound": float, "settings_rms": float, "light_rms": float, "light_bound": float,
     }  # fmt: skip
+
+    def _invocations(self, cases: Sequence[_Node]) -> Table:
+        counted = [(i, case.get("invocations")) for i, case in enumerate(cases)]
+        rows = []
+        for i, passes in counted:
+            for of in passes.each() if passes.value is not None else []:
+                row: Dict[str, Any] = {"case": i, "name": of["name"].text()}
+                row.update((name, of[name].integer()) for name in self.INVOKED)
+                rows.append(row)
+        return _columns(rows, {"case": int, "name": str, **{name: int for name in self.INVOKED}})
 
     @staticmethod
     def _check(check: _Node) -> Dict[str, Any]:

@@ -257,7 +257,7 @@ class Tables(InFolder):
             ("serial, parallel, serial no-skip", lambda: run.times(loop="both")),
             ("no case 1", lambda: run.times(case=1)),
             ("render_ms", lambda: run.times("n_drawn")),
-            ("frames, loops, passes, cases", lambda: run.table("blocks")),
+            ("frames, loops, passes, cases, invocations, parts", lambda: run.table("blocks")),
         ):
             with self.assertRaisesRegex(ValueError, expected):
                 call()
@@ -460,6 +460,16 @@ class Others(InFolder):
         with open(folder / "frames.sha256", "a", encoding="utf-8") as listing:
             listing.write(f"{'0' * 64}  other.txt\n")
         self.refused("frames", "lists other.txt, which is no frame", verify=False)
+
+    def test_counts_of_invocations(self):
+        self.assertEqual(nr.read(self.folder / "run").invocations["compute"].size, 0)
+        counts = {"compute": 0, "vertex": 24, "fragment": 90, "primitives": 12,
+                  "clipped_primitives": 11}
+        passes = [{"name": "sprites", **counts}, {**counts, "name": "place", "compute": 64}]
+        self.edit_json("run/run.json", lambda run: run["cases"][0].update(invocations=passes))
+        found = nr.read(self.folder / "run").invocations
+        self.assertEqual(found["name"].tolist(), ["sprites", "place"])
+        self.assertEqual((found["compute"].tolist(), found["primitives"][0]), ([0, 64], 12))
 
     def test_a_merged_bench_has_its_parts(self):
         clocks = json.loads((self.folder / "run/run.json").read_text(encoding="utf-8"))["clocks"]

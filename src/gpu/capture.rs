@@ -5,7 +5,7 @@
 
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use ash::vk::{self, Handle};
@@ -40,6 +40,8 @@ impl Captured {
 pub(super) struct Capture {
     frame: u32,
     n_begun: AtomicU32,
+    /// Whether frames that begin count.
+    counts: AtomicBool,
     start: unsafe extern "C" fn(*mut c_void, *mut c_void),
     end: unsafe extern "C" fn(*mut c_void, *mut c_void) -> u32,
     n_captures: unsafe extern "C" fn() -> u32,
@@ -114,13 +116,20 @@ impl Capture {
                  expected RenderDoc 1.2 or later",
             )
         })?;
-        let (n_begun, done) = (AtomicU32::new(0), Mutex::default());
-        Ok(Capture { frame, n_begun, start, end, n_captures, capture, done })
+        let (n_begun, counts) = (AtomicU32::new(0), AtomicBool::new(true));
+        let done = Mutex::default();
+        Ok(Capture { frame, n_begun, counts, start, end, n_captures, capture, done })
+    }
+
+    /// Sets whether frames that begin count.
+    pub fn count_frames(&self, counts: bool) {
+        self.counts.store(counts, Ordering::Relaxed);
     }
 
     /// Counts a frame that begins, and starts the capture if it is the one. Returns whether it is.
     pub fn begin_frame(&self, instance: vk::Instance) -> bool {
-        let is_captured = self.n_begun.fetch_add(1, Ordering::Relaxed) == self.frame;
+        let is_captured = self.counts.load(Ordering::Relaxed)
+            && self.n_begun.fetch_add(1, Ordering::Relaxed) == self.frame;
         if is_captured {
             // SAFETY: RenderDoc takes any instance of Vulkan, and no window stands for all.
             unsafe { (self.start)(device_pointer(instance), ptr::null_mut()) };

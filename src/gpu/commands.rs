@@ -240,20 +240,6 @@ impl Commands {
         self.counters.read()
     }
 
-    /// Counts a frame that begins, and starts its capture if one is asked for. Returns whether the
-    /// frame is captured.
-    pub fn begin_frame(&self) -> bool {
-        let instance = self.shared.instance.vulkan.raw.handle();
-        self.shared.capture.as_ref().is_some_and(|capture| capture.begin_frame(instance))
-    }
-
-    /// Ends the capture of a frame that has ended.
-    pub fn end_captured_frame(&self) {
-        if let Some(capture) = &self.shared.capture {
-            capture.end_frame(self.shared.instance.vulkan.raw.handle());
-        }
-    }
-
     /// Starts the recorded commands and returns at once.
     ///
     /// # Errors

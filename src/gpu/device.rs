@@ -10,7 +10,7 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::call::Call;
-use super::capture::{Capture, Captured};
+use super::capture::Capture;
 use super::device_info::DeviceInfo;
 use super::device_options::DeviceOptions;
 use super::executed::Executed;
@@ -166,11 +166,6 @@ impl Device {
     /// Returns notes on work that takes longer than a submission is to take; each once.
     pub fn take_over_limit(&self) -> Vec<String> {
         self.shared.max_submit_ns.map_or(vec![], |limit| self.shared.over_limit.take(limit))
-    }
-
-    /// Returns the result of the capture that was asked for; none before its frame has ended.
-    pub fn captured(&self) -> Option<Captured> {
-        self.shared.capture.as_ref().and_then(Capture::result)
     }
 
     /// Returns the bytes allocated on the device at present.

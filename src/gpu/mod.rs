@@ -11,6 +11,7 @@ mod buffer;
 mod buffers;
 mod call;
 mod capture;
+mod captured_frames;
 mod clocks;
 mod commands;
 mod counters;

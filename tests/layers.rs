@@ -9,9 +9,10 @@ use std::path::Path;
 use exr::prelude::read_first_flat_layer_from_file;
 use glam::{DVec2, DVec3};
 use nimbus::frame::{DeviceChoice, GpuContext, scene_of_layers};
-use nimbus::io::layers::{CHANNELS, Layers};
+use nimbus::io::layers::CHANNELS;
 use nimbus::io::scene_file;
 use nimbus::model::film::FilmFormat;
+use nimbus::model::layers::Layers;
 use nimbus::model::scene::{DrawPath, LightingMode, Scene};
 use nimbus::reference::picture::{
     Emitters, FrameReference, Pixels, drawn_by_settings, sums_by_settings,
@@ -153,7 +154,8 @@ impl Drawn {
         assert!(n_beyond.iter().all(|n| *n <= most(n_shown)), "{what}: {n_beyond:?} of {n_shown}");
     }
 
-    /// Compares the picture with the sum of its reflections, by the bounds of docs/reference/files.md.
+    /// Compares the picture with the sum of its reflections, by the bounds of
+    /// docs/reference/files.md.
     fn check_sum_of_reflections(&self, what: &str, exact: [&Vec<f64>; 2]) {
         let Scene { film, draw, .. } = &self.scene;
         let unit = film.format.unit_roundoff();

@@ -2,7 +2,8 @@
 
 use super::args::RenderArgs;
 use crate::error::{Error, Result};
-use crate::io::layers::{self, Layers};
+use crate::io::layers;
+use crate::model::layers::Layers;
 use crate::reference::picture::{PictureLayers, ReferenceKind, to_f32};
 
 /// Fails if the arguments ask for layers that there are not, before any work.

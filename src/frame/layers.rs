@@ -14,8 +14,8 @@ use crate::error::{Error, Result};
 use crate::gpu::{
     Buffer, Compiler, Device, Image, LoadOp, MemoryUsage, RecordCount, Target, has_depth24,
 };
-use crate::io::layers::Layers;
 use crate::layout::facet::LitRecord;
+use crate::model::layers::Layers;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{DrawPath, Impostors, Scene};
 use crate::passes::blobs::BlobCount;

@@ -11,7 +11,7 @@ use super::times::OnFrame;
 use super::{parallel, serial};
 use crate::error::{Error, Result};
 use crate::gpu::{Compiler, Device, DeviceInfo, DeviceOptions, Instance, Sources};
-use crate::io::layers::Layers;
+use crate::model::layers::Layers;
 use crate::model::scene::{Scene, Threading};
 use crate::passes;
 

@@ -10,25 +10,7 @@ use exr::prelude::{
 use super::atomic::write_atomic;
 use super::image::ImageKind;
 use crate::error::{Error, Result};
-
-/// The layers of a picture, row 0 at the top.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Layers {
-    /// Columns and rows.
-    pub size: [u32; 2],
-    /// The picture, premultiplied linear RGBA.
-    pub beauty: Vec<f32>,
-    /// View depth of the nearest particle or surface, scene units; infinite where there is none.
-    pub depth: Vec<f32>,
-    /// Optical depth of all particles before the surface.
-    pub optical_depth: Vec<f32>,
-    /// Number of particles before the surface.
-    pub n_particles: Vec<f32>,
-    /// The picture of the first reflection alone, premultiplied linear RGB.
-    pub first: Vec<f32>,
-    /// The picture of the second reflection alone, premultiplied linear RGB.
-    pub second: Vec<f32>,
-}
+use crate::model::layers::Layers;
 
 /// The channels of the file, in the order of [`Layers`].
 pub const CHANNELS: [&str; 13] = [
@@ -47,39 +29,17 @@ pub const CHANNELS: [&str; 13] = [
     "second.B",
 ];
 
-impl Layers {
-    /// Returns the samples of every channel, in the order of [`CHANNELS`].
-    fn channels(&self) -> [Vec<f32>; CHANNELS.len()] {
-        let of = |pixels: &[f32], n: usize, k: usize| {
-            pixels.iter().skip(k).step_by(n).copied().collect::<Vec<f32>>()
-        };
-        let [r, g, b, a] = [0, 1, 2, 3].map(|k| of(&self.beauty, 4, k));
-        let [first_r, first_g, first_b] = [0, 1, 2].map(|k| of(&self.first, 3, k));
-        let [second_r, second_g, second_b] = [0, 1, 2].map(|k| of(&self.second, 3, k));
-        let (depth, optical_depth) = (self.depth.clone(), self.optical_depth.clone());
-        let n = self.n_particles.clone();
-        [
-            r,
-            g,
-            b,
-            a,
-            depth,
-            optical_depth,
-            n,
-            first_r,
-            first_g,
-            first_b,
-            second_r,
-            second_g,
-            second_b,
-        ]
-    }
-
-    /// Returns the number of values of the picture and its reflections that are not finite.
-    pub fn n_not_finite(&self) -> usize {
-        let all = [&self.beauty, &self.first, &self.second, &self.optical_depth];
-        all.into_iter().flatten().filter(|v| !v.is_finite()).count()
-    }
+/// Returns the samples of every channel, in the order of [`CHANNELS`].
+fn channels_of(layers: &Layers) -> [Vec<f32>; CHANNELS.len()] {
+    let of = |pixels: &[f32], n: usize, k: usize| {
+        pixels.iter().skip(k).step_by(n).copied().collect::<Vec<f32>>()
+    };
+    let Layers { beauty, depth, optical_depth, n_particles, first, second, .. } = layers;
+    let [r, g, b, a] = [0, 1, 2, 3].map(|k| of(beauty, 4, k));
+    let [z, tau, n] = [depth, optical_depth, n_particles].map(Vec::clone);
+    let [first_r, first_g, first_b] = [0, 1, 2].map(|k| of(first, 3, k));
+    let [second_r, second_g, second_b] = [0, 1, 2].map(|k| of(second, 3, k));
+    [r, g, b, a, z, tau, n, first_r, first_g, first_b, second_r, second_g, second_b]
 }
 
 /// Fails unless `path` names a file that can hold layers. Callers ask before they render.
@@ -105,7 +65,7 @@ pub fn write(path: &Path, layers: &Layers) -> Result<()> {
     let [width, height] = layers.size.map(|n| n as usize);
     let channel =
         |(name, samples): (&str, Vec<f32>)| AnyChannel::new(name, FlatSamples::F32(samples));
-    let list: SmallVec<_> = CHANNELS.into_iter().zip(layers.channels()).map(channel).collect();
+    let list: SmallVec<_> = CHANNELS.into_iter().zip(channels_of(layers)).map(channel).collect();
     let attributes =
         LayerAttributes { software_name: Some("nimbus".into()), ..LayerAttributes::default() };
     let channels = AnyChannels::sort(list);

@@ -49,7 +49,7 @@ impl SpriteSums {
     /// Adds a layer, whose depth a device has within `off`.
     fn add(&mut self, layer: &Layer, off: f64, rounding: &Rounding) {
         // A blob without optical depth is no layer.
-        if !(layer.tau > 0.0) {
+        if layer.tau.is_nan() || layer.tau <= 0.0 {
             return;
         }
         if layer.is_drawn {

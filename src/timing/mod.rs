@@ -6,8 +6,9 @@
 //! `frames.csv` ([`frame_rows`]), which [`results`] writes and reads with the files beside them
 //! ([`attachments`]). [`still`] remarks on scenes in which nothing moves. [`compare`] decides which
 //! of two results is faster; [`difference`] lists what else differs between them. [`parts`] joins a
-//! bench that several nodes timed. [`invocations`] counts what passes invoke. [`trace`] writes the frames as a time line. [`machine`],
-//! [`names`] and [`json`] serve all of them, and the studies too.
+//! bench that several nodes timed. [`invocations`] counts what passes invoke. [`trace`] writes the
+//! frames as a time line. [`machine`], [`names`] and [`json`] serve all of them, and the studies
+//! too.
 
 pub mod attachments;
 pub mod blocks;

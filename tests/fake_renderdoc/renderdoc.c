@@ -1,6 +1,6 @@
 // A library with RenderDoc's in-application API that captures nothing. It appends a line for each
-// call to the file NIMBUS_FAKE_RENDERDOC_LOG. NIMBUS_FAKE_RENDERDOC_FAULT may be "old", which has no
-// version of the API, or "full", with which no capture succeeds.
+// call to the file NIMBUS_FAKE_RENDERDOC_LOG. NIMBUS_FAKE_RENDERDOC_FAULT may be "old",
+// for a library without that version of the API, or "full", with which no capture succeeds.
 
 #include <stdint.h>
 #include <stdio.h>

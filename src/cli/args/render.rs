@@ -18,8 +18,8 @@ use crate::reference::picture::ReferenceKind;
     --set 'cloud.0.texture=\"none\"' -o volume.exr\n  \
     nimbus compare thin.exr drawn.exr\n  nimbus compare volume.exr thin.exr\n\n\
     The picture of a device and of its reference, layer by layer:\n  \
-    nimbus render scenes/hello.toml --layers -o drawn.exr\n  \
-    nimbus render scenes/hello.toml --layers --reference thin -o thin.exr\n\n\
+    nimbus render scenes/hello.toml --layers -o layers.exr\n  \
+    nimbus render scenes/hello.toml --layers --reference thin -o f64.exr\n\n\
     The second reflection of a reference is integrated over areas, which takes minutes for \
     hundreds of facets. \
     --set 'lighting.mode=\"first\"' leaves it out.")]

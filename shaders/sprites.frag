@@ -16,6 +16,9 @@ TEXELS(8, pool)
 
 #include "sprites.glsl"
 
+// 1: writes the layer's optical depth, 1, 0 and its depth near/z in place of colour and opacity.
+layout(constant_id = 8) const uint SUMS = 0;
+
 layout(location = 0) flat in vec4 in_blob;
 layout(location = 1) flat in vec3 in_radiance;
 layout(location = 2) flat in vec4 in_turn;
@@ -54,12 +57,16 @@ void main() {
         }
     }
     float alpha = 0.0;
+    vec4 sums = vec4(0.0);
     if (e <= cut) {
         float exponent = -e;
         if (TEXTURED != 0) {
             exponent += texture_exponent(delta, in_turn, in_place, in_gain);
         }
         alpha = one_minus_exp(tau * exp(exponent));
+        if (SUMS != 0) {
+            sums = vec4(tau * exp(exponent), 1.0, 0.0, gl_FragCoord.z);
+        }
     }
-    out_color = vec4(in_radiance * alpha, alpha);
+    out_color = SUMS != 0 ? sums : vec4(in_radiance * alpha, alpha);
 }

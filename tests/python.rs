@@ -131,6 +131,18 @@ fn statistics_of_a_fresh_bench_are_those_of_run_json() {
         }
     }
 
+    // The error that the table has is that of the check.
+    let check = &written["cases"][0]["check"];
+    assert_eq!(read[0]["tables"]["cases"][0]["rmse"], check["rmse"]["value"], "{check}");
+    assert!(check["rmse"]["value"].is_f64() && check["verdict"] == "right", "{check}");
+
+    // A comparison of the run with itself.
+    let compared = program::path(&dir, "compared.json");
+    fs::write(&compared, nimbus(&["compare", &run, &run, "--json"])).expect("a file");
+    let table = succeed(&[READER, &compared]);
+    let n_loops = table.lines().filter(|line| line.contains("  frame  ")).count();
+    assert!(n_loops >= 4 && table.contains("frame decides"), "{table}");
+
     // A median that is not that of the frames is noticed.
     let median = written["cases"][0]["modes"][0]["frame_ms"]["p50"].to_string();
     let wrong = record.replacen(&format!("\"p50\": {median}"), "\"p50\": 0.125", 1);

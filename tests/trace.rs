@@ -43,6 +43,7 @@ fn benched(zones: &Zones) -> (Vec<Sample>, Stage, Collected) {
         pictures: false,
         checked: None,
         cold_bytes: None,
+        counts_invocations: false,
     };
     let outcome = Mutex::default();
     let ran = running::run(stage, &cases, &plan, &AtomicBool::new(false), &outcome, &mut |_| {});

@@ -7,14 +7,18 @@
     run.metadata.device, run.metadata.pass_times
     run.frames["frame_ms"]                   # a column of frames.csv, warm-up included
     nr.summary(run.times("frame_ms", loop="serial"))["p50"]
+    run.cases["rmse"]                        # the error beside the time
     run.to_pandas("passes")                  # with pandas installed
 
-`read` recognises what a path is and returns one of four classes:
+`read` recognises what a path is and returns one of six classes:
 
-    Run     nimbus bench --out DIR, nimbus bench --json     frames, loops, passes, cases
-    Study   nimbus error --out DIR, nimbus error --json     configurations, times
-    Ledger  nimbus ledger --out DIR, nimbus ledger --json   rows
-    Stress  nimbus stress --json, nimbus stress --csv       cases
+    Run         nimbus bench --out DIR or --json, and the      frames, loops, passes, cases,
+                merged bench of nimbus farm                    invocations, parts
+    Study       nimbus error --out DIR or --json               configurations, times
+    Ledger      nimbus ledger --out DIR or --json              rows
+    Stress      nimbus stress --json or --csv                  cases
+    Comparison  nimbus compare A B --json                      measures
+    Frames      nimbus farm merge of pictures                  pictures
 
 A table is a dict of numpy arrays by column. Numbers that were not measured are NaN, and texts are
 object arrays. Times are in milliseconds and errors in units of full scale (premultiplied linear
@@ -51,6 +55,8 @@ except ImportError:
     raise ImportError(NEEDS) from None
 
 __all__ = [
+    "Comparison",
+    "Frames",
     "Interval",
     "Ledger",
     "Metadata",
@@ -73,7 +79,13 @@ Table = Dict[str, np.ndarray]
 SCHEMAS = {"run": 3, "study": 1, "ledger": 1, "stress": 1}
 """The schema version that this file reads, by kind of result."""
 
-COMMANDS = {"run": "bench", "study": "error", "ledger": "ledger", "stress": "stress"}
+COMPARISON_SCHEMAS = (2, 3)
+"""The schema versions of nimbus compare --json that this file reads."""
+
+COMMANDS = {
+    "run": "bench", "study": "error", "ledger": "ledger", "stress": "stress",
+    "comparison": "compare", "frames": "farm merge",
+}  # fmt: skip
 """The command of nimbus that writes a kind of result."""
 
 
@@ -496,9 +508,14 @@ def _kind_of(record: _Node) -> str:
         for kind, key in (("run", "block_order"), ("study", "configurations"), ("ledger", "rows")):
             if key in record.value:
                 return kind
+        if "modes" in record.value or "matrix" in record.value:
+            return "comparison"
         if "cases" in record.value and "scene" not in record.value:
             return "stress"
-    what = "is no result of nimbus; expected JSON of nimbus bench, error, ledger or stress"
+    if isinstance(record.value, dict) and "metrics" in record.value:
+        what = "compares two pictures; its `metrics` are a table already, which json.load reads"
+        raise _error(record.path, what)
+    what = "is no result of nimbus; expected JSON of nimbus bench, error, ledger, stress or compare"
     raise _error(record.path, what)
 
 
@@ -507,12 +524,13 @@ def _check_schema(record: _Node, kind: str) -> None:
     if not isinstance(record.value, dict) or "schema" not in record.value:
         what = f"names no schema version; expected the JSON of nimbus {COMMANDS[kind]}"
         raise _error(record.path, what)
-    version, known = record["schema"].integer(), SCHEMAS[kind]
-    if version > known:
-        what = f"has schema {version}, newer than {known}, which this reader knows"
+    known = COMPARISON_SCHEMAS if kind == "comparison" else (SCHEMAS[kind],)
+    version = record["schema"].integer()
+    if version > known[-1]:
+        what = f"has schema {version}, newer than {known[-1]}, which this reader knows"
         raise _error(record.path, f"{what}; use the tools/nimbus_results.py of that version")
-    if version < known:
-        what = f"has schema {version} of an older nimbus, and this reader expects {known}"
+    if version < known[0]:
+        what = f"has schema {version} of an older nimbus, and this reader expects {known[0]}"
         raise _error(record.path, f"{what}; use the tools/nimbus_results.py of that version")
 
 
@@ -669,7 +687,7 @@ class Metadata:
     """The conditions of a result. None: the file does not name them."""
 
     kind: str
-    """run, study, ledger or stress."""
+    """run, study, ledger, stress, comparison or frames."""
     path: str
     """The file or folder, as it was named."""
     nimbus: Optional[str] = None
@@ -861,10 +879,24 @@ class Run(_Result):
     frames that ran it, its `share` of the GPU time, and `saved_ms` a frame.
 
     `cases`: a row for each phase of the scene and point of the sweep, with one column for each
-    swept key. `ratio` is parallel by serial median frame time.
+    swept key. `ratio` is parallel by serial median frame time. `verdict` says whether the pictures
+    were right (right, wrong or not_checked), and `reason` why they are not. `rmse` is their root
+    mean square error against the f64 reference, with its 95 % interval, `max` the greatest error of
+    a number, and `magnitude` the root mean square of the reference. `drawing_rms` and `light_rms`
+    are the parts of the drawing and of the light, each with its `_bound`; `settings_rms` is the
+    change that the scene's settings of `draw` make. Results that were not checked have NaN.
+
+    `invocations`: a row for each pass of each case that nimbus bench --invocations counted: the
+    invocations of `compute`, `vertex` and `fragment` shaders in one frame, and triangles before
+    (`primitives`) and after clipping (`clipped_primitives`). Empty without that option.
+
+    `parts`: a row for each part of a bench that a node of nimbus farm timed: its cases from `first`
+    to before `end`, and the `node`. Empty if one process ran all.
     """
 
-    TABLES = ("frames", "loops", "passes", "cases")
+    TABLES = ("frames", "loops", "passes", "cases", "invocations", "parts")
+    INVOKED = ("compute", "vertex", "fragment", "primitives", "clipped_primitives")
+    """What nimbus bench --invocations counts."""
     QUANTITIES = (
         "frame_ms", "game_ms", "record_ms", "submit_ms", "wait_ms", "render_ms", "gpu_ms",
         "latency_ms",
@@ -879,13 +911,30 @@ class Run(_Result):
         loops, passes = self._loops(cases)
         self.loops = loops
         self.passes = passes
+        self.invocations = self._invocations(cases)
+        stages = record.get("stages")
+        self.failed_stages: Optional[List[str]] = None
+        """The cases of nimbus stress that failed on the device; None if none were run."""
+        if stages.value is not None:
+            self.failed_stages = [name.text() for name in stages["failed"].each()]
+        parts = record.get("parts")
+        rows = [
+            {
+                "first": part["first"].integer(),
+                "end": part["end"].integer(),
+                "node": part["node"].text(),
+                "date": part["date"].text(),
+            }
+            for part in (parts.each() if parts.value is not None else [])
+        ]
+        self.parts = _columns(rows, {"first": int, "end": int, "node": str, "date": str})
 
     def _cases(self, cases: Sequence[_Node]) -> Table:
         types = {
             "case": int, "phase": str, "sweep": str, "scene_hash": str, "particles": int,
             "width": int, "height": int, "figure": str, "ratio": float, "ratio_low": float,
             "ratio_high": float, "bound_ms": float, "reached": float, "gpu_ms_mean": float,
-            "gpu_no_skip_ms_mean": float,
+            "gpu_no_skip_ms_mean": float, **self.CHECK_TYPES,
         }  # fmt: skip
         rows = [
             {
@@ -904,10 +953,42 @@ class Run(_Result):
                 "reached": case["overlap"].get("reached", "share").number(),
                 "gpu_ms_mean": case["skipping"].get("gpu_ms").number(),
                 "gpu_no_skip_ms_mean": case["skipping"].get("gpu_no_skip_ms").number(),
+                **self._check(case.get("check")),
             }
             for i, case in enumerate(cases)
         ]
         return {**_columns(rows, types), **_settings([case["sweep"].each() for case in cases])}
+
+    CHECK_TYPES = {
+        "verdict": str, "reason": str, "n_pixels": float, "rmse": float, "rmse_low": float,
+        "rmse_high": float, "max": float, "magnitude": float, "drawing_rms": float,
+        "drawing_bound": float, "settings_rms": float, "light_rms": float, "light_bound": float,
+    }  # fmt: skip
+
+    def _invocations(self, cases: Sequence[_Node]) -> Table:
+        counted = [(i, case.get("invocations")) for i, case in enumerate(cases)]
+        rows = []
+        for i, passes in counted:
+            for of in passes.each() if passes.value is not None else []:
+                row: Dict[str, Any] = {"case": i, "name": of["name"].text()}
+                row.update((name, of[name].integer()) for name in self.INVOKED)
+                rows.append(row)
+        return _columns(rows, {"case": int, "name": str, **{name: int for name in self.INVOKED}})
+
+    @staticmethod
+    def _check(check: _Node) -> Dict[str, Any]:
+        """Returns the columns of the check of a case's pictures."""
+        row: Dict[str, Any] = {"verdict": "not_checked"}
+        if check.value is not None:
+            row["verdict"] = check["verdict"].one_of("right", "wrong", "not_checked")
+        row["reason"] = check.get("reason").text_or_empty()
+        row["n_pixels"] = check.get("n_pixels").number()
+        row.update(_figure(check.get("rmse"), "rmse"))
+        row.update((key, check.get(key).number()) for key in ("max", "magnitude", "settings_rms"))
+        for part in ("drawing", "light"):
+            row[f"{part}_rms"] = check.get(part, "rms").number()
+            row[f"{part}_bound"] = check.get(part, "bound").number()
+        return row
 
     @staticmethod
     def _sweep(case: _Node) -> str:
@@ -1037,14 +1118,24 @@ class Run(_Result):
         return axes
 
     def _lines(self) -> List[str]:
-        rows = [["case", "loop", "n", "frame ms", "95 %", "game ms", "render ms", "gpu ms"]]
+        header = ["case", "loop", "n", "frame ms", "95 %", "game ms", "render ms", "gpu ms"]
+        rows = [header + ["RMSE", "95 %"]]
         for of in _rows(self.loops):
             case = ", ".join(part for part in (of["phase"], of["sweep"]) if part)
             interval = _between(of["frame_ms_low"], of["frame_ms_high"], _number)
             rest = [_number(of[name]) for name in ("game_ms", "render_ms", "gpu_ms")]
+            ends = (self.cases[f"rmse{end}"][of["case"]] for end in ("", "_low", "_high"))
+            rmse, low, high = ends
+            error = [_small(rmse), _between(low, high, _small)]
             first = [case or "-", of["loop"], str(of["frames"])]
-            rows.append(first + [_number(of["frame_ms"]), interval] + rest)
-        return _aligned(rows, 2)
+            rows.append(first + [_number(of["frame_ms"]), interval] + rest + error)
+        lines = _aligned(rows, 2)
+        for of in _rows(self.cases):
+            if of["verdict"] == "wrong":
+                lines.append(f"case {of['case']}: the picture is wrong: {_plain(of['reason'])}")
+        if self.failed_stages:
+            lines.append(f"stages that failed: {_plain(', '.join(self.failed_stages))}")
+        return lines
 
 
 class Study(_Result):
@@ -1270,7 +1361,128 @@ class Stress(_Result):
         return _aligned(rows, 1)
 
 
-Result = Union[Run, Study, Ledger, Stress]
+class Comparison(_Result):
+    """The results of `nimbus compare A B --json`, of two benches.
+
+    `measures`: a row for each measure of each loop that both ran, `frame` first: the medians
+    `a_ms` and `b_ms` of `n_a` and `n_b` times, `b_by_a`, their ratio with its 95 % interval, and
+    the `verdict`, in the words of nimbus. `more_frames` is about how many more frames would decide;
+    NaN if the verdict is decided or the version of nimbus did not say.
+
+    `errors`: a row for each case whose pictures both runs checked: the RMSE `a` and `b`, their
+    ratio `b_by_a` and the `verdict`. Empty if the version of nimbus did not compare them.
+    """
+
+    TABLES = ("measures", "errors")
+
+    def __init__(self, metadata: Metadata, record: _Node) -> None:
+        super().__init__(metadata, record)
+        if "matrix" in record.object():
+            what = "compares more than two runs; expected the output of nimbus compare A B --json"
+            raise _error(record.path, what)
+        self.headline = record["headline"].text()
+        """The measure that decides; the others are not corrected for many comparisons."""
+        self.margin = record.get("margin").number()
+        """Relative difference up to which times count as the same; NaN if there is none."""
+        self.sides = {side: record[side].object() for side in ("a", "b")}
+        """Folder, date, version, device and scene of A and B."""
+        rows = [
+            self._row(loop["name"].text(), of)
+            for loop in record["modes"].each()
+            for of in loop["measures"].each()
+        ]
+        types = {
+            "loop": str, "measure": str, "n_a": int, "n_b": int, "a_ms": float, "b_ms": float,
+            **self.RATIO_TYPES, "verdict": str, "more_frames": float,
+        }  # fmt: skip
+        self.measures = _columns(rows, types)
+        errors = record.get("errors")
+        rows = [self._error(of) for of in (errors.each() if errors.value is not None else [])]
+        types = {"case": str, "a": float, "b": float, **self.RATIO_TYPES, "verdict": str}
+        self.errors = _columns(rows, types)
+
+    RATIO_TYPES = {"b_by_a": float, "b_by_a_low": float, "b_by_a_high": float}
+
+    @staticmethod
+    def _ratio(of: _Node) -> Dict[str, float]:
+        ends = (("", "estimate"), ("_low", "low"), ("_high", "high"))
+        return {f"b_by_a{end}": of["b_by_a"].get(key).number() for end, key in ends}
+
+    @classmethod
+    def _error(cls, of: _Node) -> Dict[str, Any]:
+        numbers = {key: of[key].number() for key in ("a", "b")}
+        row = {"case": of["name"].text(), **numbers, **cls._ratio(of)}
+        return {**row, "verdict": of["verdict"].text()}
+
+    @classmethod
+    def _row(cls, loop: str, of: _Node) -> Dict[str, Any]:
+        row: Dict[str, Any] = {"loop": loop}
+        row.update((key, of[key].text()) for key in ("measure", "verdict"))
+        row.update((key, of[key].integer()) for key in ("n_a", "n_b"))
+        row.update((key, of[key].number()) for key in ("a_ms", "b_ms"))
+        row.update(cls._ratio(of))
+        row["more_frames"] = of.get("more_frames").number()
+        return row
+
+    def _lines(self) -> List[str]:
+        rows = [["loop", "measure", "A ms", "B ms", "B / A", "95 %", "B is"]]
+        for of in _rows(self.measures):
+            interval = _between(of["b_by_a_low"], of["b_by_a_high"], _number)
+            times = [_number(of[key]) for key in ("a_ms", "b_ms", "b_by_a")]
+            verdict = of["verdict"].replace("_", " ")
+            rows.append([of["loop"], of["measure"], *times, interval, verdict])
+        names = [f"{side.upper()}  {_plain(of.get('folder'))}" for side, of in self.sides.items()]
+        return names + _aligned(rows, 2) + [f"{_plain(self.headline)} decides"]
+
+
+class Frames(_Result):
+    """The merged frames of `nimbus farm merge`: an animation, a picture a file.
+
+    `pictures`: a row for each picture, in the order of frames: its number, `file`, `format` (png or
+    exr), `bytes`, and `sha256` as frames.sha256 lists it. `missing` has the numbers between the
+    first and the last frame that have no picture.
+    """
+
+    TABLES = ("pictures",)
+
+    def __init__(self, metadata: Metadata, folder: Path, listed: Dict[str, str]) -> None:
+        super().__init__(metadata, None)
+        rows = []
+        for name, sha256 in listed.items():
+            stem, _, form = name.rpartition(".")
+            number = stem[len("frame-") :]
+            is_frame = stem.startswith("frame-") and number.isascii() and number.isdigit()
+            if not is_frame or form not in ("png", "exr"):
+                what = f"lists {_plain(name)}, which is no frame such as frame-00000007.png"
+                raise _error(folder / "frames.sha256", what)
+            size = (folder / name).stat().st_size if (folder / name).is_file() else -1
+            if size < 0:
+                raise _error(folder / name, "is missing, and frames.sha256 lists it")
+            row = {"frame": int(number), "file": name, "format": form, "bytes": size}
+            rows.append({**row, "sha256": sha256})
+        rows.sort(key=lambda row: row["frame"])
+        types = {"frame": int, "file": str, "format": str, "bytes": int, "sha256": str}
+        self.pictures = _columns(rows, types)
+        numbers = [row["frame"] for row in rows]
+        span = range(numbers[0], numbers[-1] + 1) if numbers else range(0)
+        self.missing: List[int] = [] if len(span) == len(numbers) else sorted(
+            set(span) - set(numbers)
+        )
+        """Numbers between the first and the last frame that have no picture."""
+
+    def _lines(self) -> List[str]:
+        of = self.pictures
+        n = of["frame"].size
+        if n == 0:
+            return ["no frames"]
+        span = f"{n} frames, {of['frame'][0]} to {of['frame'][-1]}"
+        lines = [f"{span}, {int(of['bytes'].sum())} bytes"]
+        if self.missing:
+            lines.append(f"missing: {', '.join(str(number) for number in self.missing[:20])}")
+        return lines
+
+
+Result = Union[Run, Study, Ledger, Stress, Comparison, Frames]
 
 
 def _times_of_study(path: Path, record: _Node) -> Table:
@@ -1289,6 +1501,8 @@ def _read_record(record_path: Path, path: Path, folder: Optional[Path], verify: 
     record = _json_of(record_path)
     kind = record_path.stem if folder is not None else _kind_of(record)
     _check_schema(record, kind)
+    if kind == "comparison":
+        return Comparison(_metadata(kind, path, None, False), record)
     verified = folder is not None and verify and _check_list(folder, kind)
     metadata = _metadata(kind, path, record, verified)
     if kind == "run":
@@ -1310,6 +1524,15 @@ def _read_record(record_path: Path, path: Path, folder: Optional[Path], verify: 
     return Stress(metadata, record, Stress._of_json(record))
 
 
+def _read_frames(folder: Path, path: Path, verify: bool) -> Frames:
+    """Reads the merged pictures of a farm."""
+    verified = verify and _check_list(folder, "frames")
+    lines = _text_of(folder / "frames.sha256").rstrip("\n").split("\n")
+    pairs = (line.partition("  ") for line in lines if line)
+    listed = {name: sha256 for sha256, _, name in pairs}
+    return Frames(_metadata("frames", path, None, verified), folder, listed)
+
+
 def _record_of_folder(folder: Path) -> Path:
     """Returns the record of a folder of results."""
     try:
@@ -1323,7 +1546,7 @@ def _record_of_folder(folder: Path) -> Path:
     if records:
         found = ", ".join(record.name for record in records)
         raise _error(folder, f"holds several results, {found}; name one of these files")
-    expected = "expected a folder that nimbus bench, error or ledger wrote with --out"
+    expected = "expected a folder that nimbus bench, error, ledger or farm merge wrote"
     deeper = [of for of in entries if any((of / name).exists() for name in names)]
     if deeper:
         expected = f"it has folders of results in it: name one, such as {_shown(deeper[0])}"
@@ -1331,11 +1554,11 @@ def _record_of_folder(folder: Path) -> Path:
 
 
 def read(path: Union[str, "os.PathLike[str]"], verify: bool = True) -> Result:
-    """Reads a result of nimbus and returns a Run, Study, Ledger or Stress.
+    """Reads a result of nimbus and returns a Run, Study, Ledger, Stress, Comparison or Frames.
 
-    `path`: a folder of --out, its run.json, study.json or ledger.json, a file with the output of
-    --json, or one with that of nimbus stress --csv. `verify`: whether the files must have the
-    SHA-256 that the folder's list names, if it has a list.
+    `path`: a folder of --out or of farm merge, its run.json, study.json or ledger.json, a file with
+    the output of --json, or one with that of nimbus stress --csv. `verify`: whether the files must
+    have the SHA-256 that the folder's list names, if it has a list.
 
     Raises ResultsError if something is missing, damaged, or of another schema version.
     """
@@ -1344,6 +1567,8 @@ def read(path: Union[str, "os.PathLike[str]"], verify: bool = True) -> Result:
         is_there, is_folder = path.exists(), path.is_dir()
     except (OSError, ValueError) as cause:
         raise _error(path, f"cannot be read: {_plain(cause)}") from None
+    if is_folder and (path / "frames.sha256").exists():
+        return _read_frames(path, path, verify)
     if is_folder:
         return _read_record(_record_of_folder(path), path, path, verify)
     if not is_there:
@@ -1369,8 +1594,9 @@ DESCRIPTION = """\
 Prints a short table of each result of nimbus.
 
 PATH is one of:
-  a folder of        nimbus bench --out, nimbus error --out or nimbus ledger --out
-  a JSON file from   nimbus bench, error, ledger or stress with --json
+  a folder of        nimbus bench --out, nimbus error --out or nimbus ledger --out,
+                     or of nimbus farm merge
+  a JSON file from   nimbus bench, error, ledger, stress or compare with --json
   a CSV file from    nimbus stress --csv
 """
 

@@ -10,6 +10,7 @@ use clap::ColorChoice;
 use super::args::{BenchArgs, SceneArgs};
 use super::bench_cases::{BenchCases, bench_cases, plan};
 use super::bench_record::{Recorder, Runs, print_json};
+use super::capture_note;
 use super::interrupt::{self, PATIENCE};
 use super::output::{SharedFolder, check_out, claim_file, lock_folder};
 use super::progress::progress;
@@ -60,7 +61,11 @@ pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
 /// Runs the benches of all scenes in this process.
 fn run_here(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
     let n_scenes = args.scenes.len();
-    for (flag, is_set) in [("--part", args.part.is_some()), ("--trace", args.trace.is_some())] {
+    for (flag, is_set) in [
+        ("--part", args.part.is_some()),
+        ("--trace", args.trace.is_some()),
+        ("--capture", args.capture.is_some()),
+    ] {
         if is_set && n_scenes > 1 {
             return Err(Error::usage(format!("{flag} takes one scene, found {n_scenes}")));
         }
@@ -114,9 +119,22 @@ pub fn out_dirs(args: &BenchArgs) -> Result<Vec<Option<PathBuf>>> {
     Ok(names.into_iter().map(|n| Some(out.join(n))).collect())
 }
 
+/// Fails if `--capture` names a frame beyond the last one.
+fn check_capture(args: &BenchArgs, n_frames: u64) -> Result<()> {
+    match args.capture.filter(|frame| u64::from(*frame) >= n_frames) {
+        None => Ok(()),
+        Some(frame) => Err(Error::usage(format!(
+            "--capture {frame}: the bench draws {n_frames} frames; expected a number from 0 to {}",
+            n_frames - 1
+        ))),
+    }
+}
+
 /// Opens the device, and checks that every case fits on it.
 fn open(args: &BenchArgs, cases: &[Case]) -> Result<Stage> {
-    let (choice, skip) = (device_choice(&args.options), cases[0].loops[0].skip);
+    let (mut choice, skip) = (device_choice(&args.options), cases[0].loops[0].skip);
+    choice.options.counts_invocations = args.invocations;
+    choice.options.captured_frame = args.capture;
     let stage = Stage::new(cases[0].scene.clone(), &choice, skip)?;
     for case in &cases[1..] {
         limits::check(&case.scene, stage.device.limits()).map_err(|e| e.within(&case.name()))?;
@@ -135,6 +153,7 @@ fn bench_scene(
     let date = machine::utc_now();
     let BenchCases { cases, scene_hash, resolved } = bench_cases(args, path, &args.options)?;
     let mut plan = plan(args);
+    check_capture(args, blocks::n_frames_at_least(&cases, &plan))?;
     let mut stage = open(args, &cases)?;
     if args.options.verbose {
         print_sizes(&stage.scene, Some(&stage));
@@ -205,6 +224,10 @@ fn bench_scene(
         (Some(_), Some(stage)) => stage.device.read_clocks(N_CLOCK_READINGS)?,
         _ => Vec::new(),
     };
+    if let Some(stage) = &stage {
+        let BenchArgs { capture, options, .. } = &recorder.args;
+        capture_note::print(stage.device.captured(), *capture, options.quiet);
+    }
     let missed = stage.as_ref().map_or((0, 0), |stage| stage.device.executed());
     let wrong = bench_check::not_executed(&recorder.args, missed)
         .or_else(|| bench_check::wrong(&outcome, &recorder.cases));

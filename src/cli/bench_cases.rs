@@ -78,6 +78,7 @@ pub fn plan(args: &BenchArgs) -> BenchPlan {
         pictures: args.out.is_some(),
         checked: (!args.no_check).then_some(|w, h| checked_pixels(w, h).at),
         cold_bytes: args.cold.map(|mib| u64::from(mib) << 20),
+        counts_invocations: args.invocations,
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::bench_invocations;
 use super::bench_remarks::{
     clocks_line, drawn_line, empty_line, error_lines, latency_line, missing_lines, ms,
     overlap_lines, precision_lines, skipping_line, spread_lines, state_lines, still_line,
@@ -83,6 +84,7 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
         out += &table(&rows);
         out.push('\n');
     }
+    out += &bench_invocations::text(case);
     if case.is_still() {
         return out + &still_line(case) + &last_frame_lines(case, same);
     }

@@ -5,12 +5,13 @@ use serde_json::{Value, json};
 use super::args::RenderArgs;
 use super::progress::spinner;
 use super::scene::{check_time, device_choice, load, print_notes, print_sizes, print_unseen};
-use super::{output, render_reference};
+use super::{capture_note, output, render_layers, render_reference};
 use crate::error::Result;
 use crate::frame::plan::Pass;
-use crate::frame::{Counts, DrawnFrame, Rendered, Stage};
+use crate::frame::{Counts, DrawnFrame, Rendered, Stage, scene_of_layers};
 use crate::io::console::say;
 use crate::io::image::{self, ImageKind, image_hash};
+use crate::io::layers::{self, CHANNELS};
 use crate::model::film::FilmFormat;
 use crate::model::scene::Scene;
 use crate::timing::machine::device_record;
@@ -22,11 +23,13 @@ use crate::timing::machine::device_record;
 pub fn run(args: &RenderArgs) -> Result<()> {
     // Faults of the arguments are reported before any work.
     ImageKind::of(&args.output)?;
+    render_layers::check(args)?;
     output::refuse_existing(&args.output, args.force)?;
     let loaded = load(&args.scene, &args.options)?;
     let time_s = args.time.unwrap_or_else(|| loaded.scene.time.at(args.frame));
     let i_frame = args.time.map_or(args.frame, |time_s| loaded.scene.time.frame_at(time_s));
     let scene = loaded.at_frame(i_frame);
+    let scene = if args.layers { scene_of_layers(scene)? } else { scene };
     check_time(&scene, time_s)?;
     let _claim = output::claim_file(&args.output, args.force)?;
     match args.reference {
@@ -39,10 +42,13 @@ fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
     let film = scene.film;
     let quiet = args.options.quiet;
     let drawing = spinner("drawing", quiet);
-    let mut stage = Stage::new(scene, &device_choice(&args.options), !args.options.no_skip)?;
+    let mut choice = device_choice(&args.options);
+    choice.options.captured_frame = args.capture.then_some(0);
+    let mut stage = Stage::new(scene, &choice, !args.options.no_skip)?;
     let packet = stage.game.step_at(args.frame, time_s)?;
     let rendered = stage.renderer.step(packet)?;
     let rgba = stage.renderer.image()?;
+    let layers = args.layers.then(|| stage.layers()).transpose()?;
     drop(drawing);
     print_notes(&mut stage, &args.options)?;
     print_unseen(&stage.scene, DrawnFrame::of(time_s, &rendered), &rgba, quiet)?;
@@ -61,13 +67,20 @@ fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
     if let (Some(counts), true) = (&counts, args.options.verbose) {
         say!("  {}", counts.text());
     }
+    capture_note::print(stage.device.captured(), choice.options.captured_frame, quiet);
     stage.close()?;
-    let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
+    let n_bad = match &layers {
+        Some(layers) => layers.n_not_finite(),
+        None => rgba.iter().filter(|v| !v.is_finite()).count(),
+    };
     if n_bad > 0 && !quiet {
         say!("warning: {}", not_finite(n_bad, rgba.len(), film.format));
     }
     let writing = spinner("writing", quiet);
-    image::write(&args.output, &film, film.width, film.height, &rgba)?;
+    match &layers {
+        Some(layers) => layers::write(&args.output, layers)?,
+        None => image::write(&args.output, &film, film.width, film.height, &rgba)?,
+    }
     let hash = args.json.then(|| image_hash(&rgba));
     drop(writing);
     output::wrote_picture(&args.output, film.width, film.height, quiet);
@@ -77,7 +90,7 @@ fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
         "image_hash": hash, "device": device,
         // A time that was asked for belongs to no frame.
         "frame": args.time.is_none().then_some(args.frame), "time_s": time_s,
-        "not_finite": n_bad, "counts": counts,
+        "not_finite": n_bad, "counts": counts, "channels": layers.map(|_| CHANNELS),
         "passes": Pass::ALL.map(|pass| pass_json(&rendered, pass)),
     }))
 }

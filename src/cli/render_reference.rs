@@ -5,16 +5,17 @@ use std::sync::atomic::AtomicBool;
 use serde_json::{Value, json};
 
 use super::args::RenderArgs;
-use super::output;
 use super::progress::ReferenceProgress;
 use super::scene::print_sizes;
+use super::{output, render_layers};
 use crate::error::Result;
 use crate::io::console::say;
 use crate::io::image::{self, image_hash};
+use crate::io::layers::{self, CHANNELS};
 use crate::model::scene::Scene;
 use crate::reference::picture::{
     self, BlobModel, DrawnPicture, Pixels, ReferenceKind, ReferenceRequest, check_memory,
-    drawn_as_set,
+    drawn_as_set, layers_as_set,
 };
 
 /// A picture in f64 and the JSON keys that only its kind has.
@@ -39,24 +40,56 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
         ReferenceKind::Volume => Some(BlobModel::Volume),
         _ => None,
     };
+    if args.layers {
+        return with_layers(args, scene, time_s);
+    }
     let Computed { rgba, keys } = match drawing.filter(|_| args.samples == 1) {
         Some(drawing) => at_centers(args, drawing, scene, time_s)?,
         None => sampled(args, kind, scene, time_s)?,
     };
     let rgba = picture::to_f32(&rgba);
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
+    warn_of_bad(args, n_bad, rgba.len());
+    image::write(&args.output, &film, film.width, film.height, &rgba)?;
+    let hash = image_hash(&rgba);
+    tell(args, (kind, scene, time_s), (hash, n_bad), keys)
+}
+
+/// Draws the layers of the reference "thin" and writes them.
+fn with_layers(args: &RenderArgs, scene: &Scene, time_s: f64) -> Result<()> {
+    let shown = ReferenceProgress::new(args.options.quiet);
+    let drawn = layers_as_set(scene, time_s, &|work, n| shown.advance(work, n))?;
+    drop(shown);
+    let layers = render_layers::of_reference([scene.film.width, scene.film.height], &drawn);
+    let n_bad = layers.n_not_finite();
+    warn_of_bad(args, n_bad, layers.beauty.len());
+    layers::write(&args.output, &layers)?;
+    let hash = image_hash(&layers.beauty);
+    let keys = json!({ "channels": CHANNELS });
+    tell(args, (ReferenceKind::Thin, scene, time_s), (hash, n_bad), keys)
+}
+
+fn warn_of_bad(args: &RenderArgs, n_bad: usize, n: usize) {
     if n_bad > 0 && !args.options.quiet {
-        let n = rgba.len();
         say!("warning: {n_bad} of {n} values of the picture are not finite");
     }
-    image::write(&args.output, &film, film.width, film.height, &rgba)?;
+}
+
+/// Prints that the picture is written and, with `--json`, its keys.
+fn tell(
+    args: &RenderArgs,
+    (kind, scene, time_s): (ReferenceKind, &Scene, f64),
+    (hash, n_bad): (String, usize),
+    keys: Value,
+) -> Result<()> {
+    let film = scene.film;
     output::wrote_picture(&args.output, film.width, film.height, args.options.quiet);
     if !args.json {
         return Ok(());
     }
     let mut all = json!({
         "file": args.output.display().to_string(), "width": film.width, "height": film.height,
-        "image_hash": image_hash(&rgba), "reference": kind.to_string(),
+        "image_hash": hash, "reference": kind.to_string(),
         "frame": args.time.is_none().then_some(args.frame), "time_s": time_s, "not_finite": n_bad,
     });
     if let (Value::Object(all), Value::Object(keys)) = (&mut all, keys) {

@@ -181,6 +181,7 @@ pub fn device_choice(args: &SceneArgs) -> DeviceChoice {
             max_submit_ms: args.max_submit_ms,
             reports_pipelines: false,
             pass_times: args.pass_times,
+            ..DeviceOptions::default()
         },
     }
 }

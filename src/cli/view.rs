@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use serde_json::{Value, json};
 
 use super::args::ViewArgs;
+use super::capture_note;
 use super::interrupt::{self, PATIENCE_WITH_CHILDREN};
 use super::output::{self, header};
 use super::scene::{device_choice, load_with_files, typed_overrides};
@@ -27,9 +28,11 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         files,
     };
     let _keeping = interrupt::close_window(PATIENCE_WITH_CHILDREN);
-    let WindowTimes { loops, panels_ms } = scene_window::run(Options {
+    let mut choice = device_choice(&args.options);
+    choice.options.captured_frame = args.capture;
+    let WindowTimes { loops, panels_ms, captured } = scene_window::run(Options {
         source,
-        choice: device_choice(&args.options),
+        choice,
         skips: !args.options.no_skip,
         mode: args.present,
         n_frames: args.frames,
@@ -38,6 +41,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         has_panels: !args.no_panels,
         captures: args.captures.clone(),
     })?;
+    capture_note::print(captured, args.capture, args.options.quiet);
     if args.json {
         let rows: Vec<Value> = loops.iter().map(row).collect();
         let panels = Summary::of(&panels_ms).map(|s| numbers(&s));

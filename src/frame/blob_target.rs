@@ -135,6 +135,11 @@ impl BlobTarget {
         self.images.get_mut(i).map(|color| Target { color, depth: self.depth.as_mut() })
     }
 
+    /// Returns the depth that surfaces and terrain have drawn.
+    pub fn depth(&mut self) -> Option<&mut Image> {
+        self.depth.as_mut()
+    }
+
     /// Draws the first `count` entries into picture `i`: over what it holds if it has depth or
     /// `has_layer` says that an impostor layer has been drawn, else over nothing.
     pub fn record_blobs(

@@ -21,6 +21,7 @@ mod gather;
 mod gather_lists;
 mod impostor_cache;
 mod impostors;
+mod layers;
 mod light_notes;
 pub mod limits;
 mod live;
@@ -58,6 +59,7 @@ pub use features::{
     SceneFeatures, Tensors, gathers_from_tree, is_glossy, saturation_bound, target_format,
 };
 pub use game::{Game, Viewpoint};
+pub use layers::scene_of_layers;
 pub use light_notes::light_notes;
 pub use packet::Packet;
 pub use pipelines::pipelines;

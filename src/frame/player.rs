@@ -35,10 +35,14 @@ impl Player {
         scene: Arc<Scene>,
         skip: bool,
     ) -> Result<Player> {
-        match scene.draw.impostors {
+        // Frames of trials are none of the scene's.
+        device.count_frames(false);
+        let player = match scene.draw.impostors {
             Impostors::Auto => with_faster_impostors(device, compiler, &scene, skip),
             _ => with_given_impostors(device, compiler, scene, skip),
-        }
+        };
+        device.count_frames(true);
+        player
     }
 }
 

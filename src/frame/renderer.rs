@@ -14,7 +14,8 @@ use super::plan::{Pass, Plan, Skipping, plan};
 use super::staging::IN_FLIGHT;
 use crate::error::{Error, Result};
 use crate::gpu::{
-    Barriers, Buffer, ColdCaches, Commands, Compiler, Device, MemoryUsage, ScopeTime, Submission,
+    Barriers, Buffer, ColdCaches, Commands, Compiler, Device, Invocations, MemoryUsage, ScopeTime,
+    Submission,
 };
 use crate::layout::frame::CameraRecord;
 use crate::model::scene::Scene;
@@ -48,6 +49,7 @@ struct InFlight {
     plan: Plan,
     recorded: [Instant; 2],
     submitted: Instant,
+    is_captured: bool,
 }
 
 /// The results of a render step.
@@ -113,6 +115,30 @@ impl Renderer {
         self.end()
     }
 
+    /// Draws one frame in which every pass runs that the scene needs, and returns what each of them
+    /// invoked; none if the device does not count that.
+    ///
+    /// # Errors
+    /// Fails as [`Renderer::step`] does, or if frames are in flight.
+    pub fn count_invocations(
+        &mut self,
+        packet: Packet,
+    ) -> Result<Option<Vec<(&'static str, Invocations)>>> {
+        self.check_idle()?;
+        self.reset();
+        let slot = self.slot();
+        self.frames[slot].count_invocations(true);
+        let stepped = self.step(packet);
+        let counted = stepped.and_then(|_| self.frames[slot].invocations());
+        self.frames[slot].count_invocations(false);
+        counted
+    }
+
+    /// Returns the place of the next frame.
+    fn slot(&self) -> usize {
+        (self.n_begun % IN_FLIGHT as u64) as usize
+    }
+
     /// Uploads, records and submits a frame, and returns a handle to wait for it. At most
     /// [`IN_FLIGHT`] frames may have begun and not ended.
     ///
@@ -136,18 +162,20 @@ impl Renderer {
         let begin = Instant::now();
         let _zone = info_span!("render step").entered();
         let plan = info_span!("plan").in_scope(|| self.plan(&packet));
-        let slot = (self.n_begun % IN_FLIGHT as u64) as usize;
+        let slot = self.slot();
         let draws = [Pass::Surfaces, Pass::Terrain, Pass::Sprites, Pass::Tiles];
         if draws.into_iter().any(|pass| plan.runs(pass)) {
             self.passes.picture.flip();
         }
         info_span!("upload").in_scope(|| self.passes.write(slot, &packet))?;
         let (frame, passes) = (&mut self.frames[slot], &mut self.passes);
+        let is_captured = frame.begin_frame();
         frame.record(self.barriers, |rec| passes.record(rec, slot, &packet, &plan))?;
         let recorded = [begin, Instant::now()];
         let pending = frame.submit()?;
         let (i_picture, submitted) = (passes.picture.i, Instant::now());
-        self.in_flight.push_back(InFlight { slot, i_picture, plan, recorded, submitted });
+        let frame = InFlight { slot, i_picture, plan, recorded, submitted, is_captured };
+        self.in_flight.push_back(frame);
         self.n_begun += 1;
         self.last = Some(packet);
         Ok(pending)
@@ -170,6 +198,9 @@ impl Renderer {
             self.in_flight.pop_front().ok_or_else(|| Error::usage("no frame is in flight"))?;
         self.failed = true;
         let passes = self.frames[frame.slot].wait()?;
+        if frame.is_captured {
+            self.frames[frame.slot].end_captured_frame();
+        }
         self.failed = false;
         self.i_ended_picture = frame.i_picture;
         let now = Instant::now();

@@ -11,6 +11,7 @@ use super::times::OnFrame;
 use super::{parallel, serial};
 use crate::error::{Error, Result};
 use crate::gpu::{Compiler, Device, DeviceInfo, DeviceOptions, Instance, Sources};
+use crate::model::layers::Layers;
 use crate::model::scene::{Scene, Threading};
 use crate::passes;
 
@@ -216,6 +217,14 @@ impl Stage {
     /// Fails if the device has too little memory.
     pub fn set_cold(&mut self, bytes: u64) -> Result<()> {
         self.renderer.set_cold(&self.device, &self.compiler, bytes)
+    }
+
+    /// Draws the layers of the last frame.
+    ///
+    /// # Errors
+    /// Fails as [`Renderer::layers`] does.
+    pub fn layers(&mut self) -> Result<Layers> {
+        self.renderer.layers(&self.device, &self.compiler, &self.scene)
     }
 
     /// Returns the device's name, type and driver.

@@ -8,6 +8,7 @@ use tracing::info_span;
 use super::barriers::{Scope, stage_barrier};
 use super::call::Call;
 use super::cold::ColdCaches;
+use super::counters::{Counters, Invocations};
 use super::descriptors::DescriptorPools;
 use super::device::{Device, Owned, SharedDevice};
 use super::rate::Pace;
@@ -42,6 +43,9 @@ pub struct Commands {
     labels: Vec<&'static str>,
     pub(super) descriptors: DescriptorPools,
     pub(super) timer: Timer,
+    pub(super) counters: Counters,
+    /// The scope whose invocations were counted when the last part ended.
+    counted: Option<&'static str>,
     pub(super) stamp: Stamp,
     /// What is written before each scope, where caches are to be cold.
     pub(super) cold: Option<Arc<ColdCaches>>,
@@ -103,6 +107,7 @@ impl Commands {
     pub fn new(device: &Device, name: &str) -> Result<Commands> {
         let shared = device.shared();
         let timer = Timer::new(device, name, MAX_SCOPES)?;
+        let counters = Counters::new(device, name)?;
         let stamp = Stamp::new(device, name)?;
         let pool = shared.command_pool(name)?;
         let semaphore = Arc::new(shared.semaphore(name, vk::SemaphoreType::TIMELINE)?);
@@ -118,6 +123,8 @@ impl Commands {
             labels: vec![],
             descriptors,
             timer,
+            counters,
+            counted: None,
             stamp,
             cold: None,
             value: 0,
@@ -203,6 +210,7 @@ impl Commands {
 
     /// Ends a command buffer whose labels go on in the next one.
     fn end_part(&mut self) -> Result<()> {
+        self.counted = self.counters.pause(self.buffer());
         self.labels.iter().for_each(|_| self.shared.end_label(self.buffer()));
         self.end()
     }
@@ -210,6 +218,8 @@ impl Commands {
     fn continue_part(&mut self) -> Result<()> {
         self.begin_buffer()?;
         self.labels.iter().for_each(|name| self.shared.begin_label(self.buffer(), name));
+        let (buffer, counted) = (self.buffer(), self.counted.take());
+        self.counters.resume(buffer, counted);
         Ok(())
     }
 
@@ -222,6 +232,21 @@ impl Commands {
     pub(super) fn end_label(&mut self) {
         self.labels.pop();
         self.shared.end_label(self.buffer());
+    }
+
+    /// Switches the counting of invocations in the next recordings on or off. It does nothing
+    /// unless the device was opened for it and has counters.
+    pub fn count_invocations(&mut self, is_on: bool) {
+        self.counters.switch(is_on);
+    }
+
+    /// Returns what each scope of the last submission, which must have been waited for, invoked;
+    /// none if that was not counted.
+    ///
+    /// # Errors
+    /// The device is lost.
+    pub fn invocations(&self) -> Result<Option<Vec<(&'static str, Invocations)>>> {
+        self.counters.read()
     }
 
     /// Starts the recorded commands and returns at once.

@@ -10,40 +10,21 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::call::Call;
+use super::capture::Capture;
 use super::device_info::DeviceInfo;
+use super::device_options::DeviceOptions;
 use super::executed::Executed;
 use super::fault;
 use super::features;
 use super::guard::Guards;
 use super::instance::Instance;
 use super::limits::Limits;
-use super::lowered::LoweredLimits;
 use super::memory_count::MemoryCount;
 use super::over_limit::OverLimit;
 use super::pass_times::PassTimes;
 use super::statistics::{PipelineReport, Reports};
 use super::tick_clock::TickClock;
 use crate::error::{Error, Result};
-
-/// The way in which a device is opened.
-#[derive(Debug, Clone, Default)]
-pub struct DeviceOptions {
-    /// Limits of another device that the device is lowered to.
-    pub limits: Option<LoweredLimits>,
-    /// The device keeps a report on every pipeline that it makes.
-    pub reports_pipelines: bool,
-    /// Buffers are filled with NaN and have guard bands, which are checked after each pass.
-    pub guard: bool,
-    /// Most milliseconds that a submission is predicted to take; without, 500 on a device that is
-    /// no CPU, and any time on a CPU.
-    pub max_submit_ms: Option<f64>,
-    /// The way in which the times of passes are taken.
-    pub pass_times: PassTimes,
-}
-
-/// Most milliseconds of a submission to a GPU. Windows resets a GPU that does not answer for two
-/// seconds, other systems wait longer; a prediction may be off by a factor of four.
-const MAX_SUBMIT_MS: f64 = 500.0;
 
 /// An open device.
 ///
@@ -78,6 +59,10 @@ pub(super) struct SharedDevice {
     pub executed: Executed,
     /// Whether the device may be at work for ever, so that nothing that it may use can be freed.
     is_abandoned: AtomicBool,
+    /// Whether commands can count invocations.
+    pub counts_invocations: bool,
+    /// The frame to capture, if one is to be captured.
+    pub capture: Option<Capture>,
     /// Reports on new pipelines, where they are wanted.
     pub reports: Option<Reports>,
     /// Where the driver says why the device was lost, if it does.
@@ -103,6 +88,7 @@ impl Device {
         choice: Option<&str>,
         options: &DeviceOptions,
     ) -> Result<Device> {
+        let capture = options.captured_frame.map(Capture::new).transpose()?;
         let info = DeviceInfo::choose(DeviceInfo::list(instance)?, choice)?;
         let mut info = match &options.limits {
             Some(limits) => info.lowered(limits),
@@ -112,7 +98,8 @@ impl Device {
             info.limits.timestamp_valid_bits = 0;
         }
         let has_statistics = options.reports_pipelines && info.has_pipeline_statistics;
-        let raw = create(instance, &info, options, has_statistics)?;
+        let counts_invocations = options.counts_on(&instance.vulkan.raw, info.physical);
+        let raw = create(instance, &info, options, has_statistics, counts_invocations)?;
         let queue = unsafe { raw.get_device_queue(info.queue_family, 0) };
         let mut debug_settings = gpu_allocator::AllocatorDebugSettings::default();
         // Device::drop reports leaks itself, into the messages that tests read.
@@ -139,8 +126,6 @@ impl Device {
             info.tells_faults.then(|| ext::device_fault::Device::new(&instance.vulkan.raw, &raw));
         instance.messages().claim(raw.handle());
         instance.messages().claim(queue);
-        let of_kind = (info.kind != "cpu").then_some(MAX_SUBMIT_MS);
-        let max_submit_ms = options.max_submit_ms.or(of_kind);
         let shared = Arc::new(SharedDevice {
             raw,
             queue: Mutex::new(queue),
@@ -151,11 +136,13 @@ impl Device {
             tick_clock: TickClock::new(&info.limits),
             debug,
             guards: options.guard.then(Guards::default),
-            max_submit_ns: max_submit_ms.map(|ms| 1e6 * ms),
+            max_submit_ns: options.max_submit_ns(info.kind),
             over_limit: OverLimit::default(),
             pass_times: options.pass_times,
             executed: Executed::default(),
             is_abandoned: AtomicBool::new(false),
+            counts_invocations,
+            capture,
             reports: options.reports_pipelines.then(|| Reports::new(statistics)),
             faults,
             instance: instance.clone(),
@@ -341,6 +328,7 @@ fn create(
     info: &DeviceInfo,
     options: &DeviceOptions,
     has_statistics: bool,
+    counts_invocations: bool,
 ) -> Result<ash::Device> {
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default()
@@ -362,6 +350,7 @@ fn create(
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(info.limits.has_int64)
         .shader_float64(info.limits.has_float64)
+        .pipeline_statistics_query(counts_invocations)
         // A read far beyond the end must not end the process.
         .robust_buffer_access(options.guard);
     let mut create = vk::DeviceCreateInfo::default()

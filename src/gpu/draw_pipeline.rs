@@ -29,6 +29,10 @@ pub enum BlendMode {
     OverTested,
     /// Depth-tested and blended under the target; writes no depth.
     UnderTested,
+    /// Colours are added, and the greatest alpha is kept; the target has no depth.
+    Sum,
+    /// The same, depth-tested; writes no depth.
+    SumTested,
     /// Depth-tested, replaces colour and depth; of equal depths the last stays.
     Opaque,
     /// Depth-tested, writes depth alone.
@@ -37,7 +41,7 @@ pub enum BlendMode {
 
 impl BlendMode {
     fn has_depth(self) -> bool {
-        self != BlendMode::Over
+        !matches!(self, BlendMode::Over | BlendMode::Sum)
     }
 
     fn writes_depth(self) -> bool {
@@ -47,6 +51,7 @@ impl BlendMode {
     fn attachment(self) -> vk::PipelineColorBlendAttachmentState {
         let (src, dst) = match self {
             BlendMode::UnderTested => (vk::BlendFactor::ONE_MINUS_DST_ALPHA, vk::BlendFactor::ONE),
+            BlendMode::Sum | BlendMode::SumTested => (vk::BlendFactor::ONE, vk::BlendFactor::ONE),
             _ => (vk::BlendFactor::ONE, vk::BlendFactor::ONE_MINUS_SRC_ALPHA),
         };
         vk::PipelineColorBlendAttachmentState::default()
@@ -55,6 +60,10 @@ impl BlendMode {
             .dst_color_blend_factor(dst)
             .src_alpha_blend_factor(src)
             .dst_alpha_blend_factor(dst)
+            .alpha_blend_op(match self {
+                BlendMode::Sum | BlendMode::SumTested => vk::BlendOp::MAX,
+                _ => vk::BlendOp::ADD,
+            })
             .color_write_mask(match self {
                 BlendMode::DepthOnly => vk::ColorComponentFlags::empty(),
                 _ => vk::ColorComponentFlags::RGBA,

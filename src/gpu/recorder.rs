@@ -61,6 +61,8 @@ impl Commands {
         let _zone = info_span!("record").entered();
         self.begin()?;
         self.timer.reset(self.buffer());
+        let buffer = self.buffer();
+        self.counters.reset(buffer);
         // Orders this submission after the earlier ones, which may still be under way.
         // Synchronization validation of 1.3.239 does not look across submissions, so no test would
         // notice if this line were missing.
@@ -68,6 +70,7 @@ impl Commands {
         let (uses, scope, i_scope) = (Uses::default(), "", None);
         f(&mut Recorder { commands: self, uses, barriers, scope, i_scope })?;
         self.timer.copy(self.buffer());
+        self.counters.copy(self.buffer());
         let buffer = self.buffer();
         self.stamp.write(buffer);
         self.end()
@@ -103,12 +106,16 @@ impl Recorder<'_> {
         }
         let commands = &mut self.commands;
         commands.begin_label(name);
-        let i = commands.timer.begin(commands.buffer(), name);
+        let buffer = commands.buffer();
+        let i = commands.timer.begin(buffer, name);
+        let is_counted = commands.counters.begin(buffer, name);
         let outer = (self.scope, self.i_scope);
         (self.scope, self.i_scope) = (name, i);
         let done = f(self);
         (self.scope, self.i_scope) = outer;
-        self.commands.timer.end(self.commands.buffer(), i);
+        let buffer = self.commands.buffer();
+        self.commands.counters.end(buffer, is_counted);
+        self.commands.timer.end(buffer, i);
         self.commands.end_label();
         done?;
         let Commands { is_divisible, shared, .. } = &*self.commands;

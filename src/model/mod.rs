@@ -21,6 +21,7 @@ pub mod growth;
 pub mod gust;
 pub mod gust_lanes;
 pub mod impostor;
+pub mod layers;
 pub mod light;
 mod lighting;
 pub mod material;

@@ -33,6 +33,11 @@ record! {
     }
 }
 
+/// The specialization constant of `sprites.frag` that asks for sums in place of colours.
+const SUMS: u32 = 8;
+/// Format of a target of sums. Half floats would lose layers from 2048 on.
+pub const SUMS_FORMAT: TargetFormat = TargetFormat::Rgba32f;
+
 /// The pipeline of the pass.
 pub struct Sprites {
     pipeline: DrawPipeline,
@@ -66,6 +71,24 @@ impl Sprites {
             [&[(1, u32::from(blend != BlendMode::Over))], &variant.constants()[..]].concat();
         let (fields, blend) = (Push::FIELDS, (format, blend));
         let pipeline = DrawPipeline::new(device, compiler, "sprites", fields, &constants, blend)?;
+        Ok(Sprites { pipeline })
+    }
+
+    /// Creates the pipeline that sums over the layers of each pixel: it adds up optical depths in
+    /// the first channel and layers in the second, and keeps the greatest near/z in the fourth.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or the pipeline cannot be created.
+    pub fn sums(
+        device: &Device,
+        compiler: &Compiler,
+        variant: BlobVariant,
+        has_depth: bool,
+    ) -> Result<Sprites> {
+        let constants = [&[(1, 1), (SUMS, 1)], &variant.constants()[..]].concat();
+        let blend = if has_depth { BlendMode::SumTested } else { BlendMode::Sum };
+        let (fields, target) = (Push::FIELDS, (SUMS_FORMAT, blend));
+        let pipeline = DrawPipeline::new(device, compiler, "sprites", fields, &constants, target)?;
         Ok(Sprites { pipeline })
     }
 

@@ -29,6 +29,7 @@ pub mod place;
 pub mod present;
 pub mod rounding;
 pub mod sort;
+pub mod sprite_sums;
 pub mod sprites;
 pub mod surfaces;
 pub mod terrain;

@@ -146,7 +146,7 @@ pub fn shares_at(
 
 /// Composes the layers of every pixel of `raster` far to near: `start` makes a pixel of what is
 /// behind, `over` lays a blob's layer over it.
-fn composed<P: Send + Clone>(
+pub(super) fn composed<P: Send + Clone>(
     view: &View,
     raster: &Raster<'_>,
     opaque: &[OpaquePixel],
@@ -211,6 +211,14 @@ pub(super) struct Layer {
     pub alpha: f64,
     /// By how much a device's opacity may differ.
     pub off: f64,
+    /// Optical depth, whether or not it is drawn.
+    pub tau: f64,
+    /// View depth of the blob's centre.
+    pub depth: f64,
+    /// Whether the law draws the layer.
+    pub is_drawn: bool,
+    /// Whether rounding decides if the layer is drawn.
+    pub is_uncertain: bool,
 }
 
 impl Seen {
@@ -248,11 +256,13 @@ impl Seen {
             return None;
         }
         let delta = view.slopes_of(ray) - view.slopes_of(self.c);
-        let alpha = alpha(sprites.factor(j, delta) * line.tau());
+        let tau = sprites.factor(j, delta) * line.tau();
+        let alpha = alpha(tau);
         let is_uncertain = on_edge || at_opaque || self.of_size;
         let off = if is_uncertain { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
         let is_drawn = is_in && self.depth <= opaque && self.above >= 0.0;
-        Some(Layer { alpha: if is_drawn { alpha } else { 0.0 }, off })
+        let alpha = if is_drawn { alpha } else { 0.0 };
+        Some(Layer { alpha, off, tau, depth: self.depth, is_drawn, is_uncertain })
     }
 }
 

@@ -6,6 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::attachments::CasePicture;
 use super::cases::{Case, Loop};
 use super::check::{Check, DevicePicture, Stages};
+use super::invocations::PassInvocations;
 use super::precision::Reached;
 use super::schedule::{Rounds, n_frames_of};
 use super::state::{BenchState, BlockWatch, FrameMark};
@@ -28,6 +29,8 @@ pub struct BenchPlan {
     pub checked: Option<PixelsOf>,
     /// Bytes that the device writes before each pass, so that caches are cold.
     pub cold_bytes: Option<u64>,
+    /// Whether one more frame of every case, after its blocks, counts what its passes invoke.
+    pub counts_invocations: bool,
 }
 
 /// Returns pixels of a film of some width and height.
@@ -89,6 +92,8 @@ pub struct Outcome {
     pub checks: BTreeMap<usize, Check>,
     /// How narrow the intervals of each case are that has ended, if a precision was asked for.
     pub reached: BTreeMap<usize, Reached>,
+    /// What the passes of each case invoked in a frame of their own, where that was counted.
+    pub invocations: BTreeMap<usize, Vec<PassInvocations>>,
     /// Whether Ctrl-C came before the end.
     pub interrupted: bool,
     /// Is told which block runs, without waiting for it.

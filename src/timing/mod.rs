@@ -11,8 +11,9 @@
 //! nodes timed, and [`starts`] one that several processes ran. [`trace`] writes the frames as a time
 //! line. [`state`] reads the clocks and the load of the machine beside the frames, and
 //! [`bench_state`] judges the frames by them. [`roofs`] are what a device can do at most, [`caches`]
-//! the size of its last cache level, and [`shares`] compares passes with both. [`machine`],
-//! [`names`] and [`json`] serve all of them, and the studies too.
+//! the size of its last cache level, and [`shares`] compares passes with both. [`invocations`]
+//! counts what passes invoke. [`machine`], [`names`] and [`json`] serve all of them, and the studies
+//! too.
 
 pub mod attachments;
 pub mod bench_state;
@@ -25,6 +26,7 @@ pub mod difference;
 pub mod frame_rows;
 pub mod history;
 mod intervals;
+pub mod invocations;
 pub mod json;
 pub mod limits;
 pub mod machine;

@@ -143,6 +143,7 @@ impl Outcome {
             check: self.checks.get(&i).cloned(),
             precision: self.reached.get(&i).copied(),
             state: self.state.as_ref().and_then(|state| state.cases.get(&i).cloned()),
+            invocations: self.invocations.get(&i).cloned(),
         };
         record.figure = record.figure_mode().map(Mode::name);
         record

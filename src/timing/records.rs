@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::{Deserialize, Serialize};
 
 use super::check::{Check, Stages};
+use super::invocations::PassInvocations;
 use super::json::ResultFile;
 use super::machine::{Clocks, Cpu, Device};
 use super::names::{Setting, case_name, loop_name, mode_name, sweep_text};
@@ -150,6 +151,10 @@ pub struct Case {
     /// The state of the machine while its timed frames ran; null if it was not read.
     #[serde(default)]
     pub state: Option<CaseState>,
+    /// What each pass invoked in one more frame, in which every pass ran that the scene needs. Null
+    /// without `--invocations`, and on devices without counters.
+    #[serde(default)]
+    pub invocations: Option<Vec<PassInvocations>>,
 }
 
 impl Case {

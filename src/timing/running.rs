@@ -10,6 +10,7 @@ use super::attachments::CasePicture;
 use super::blocks::{BenchPlan, Block, Outcome, PixelsOf, Sample, lock, n_rounds_at_least};
 use super::cases::Case;
 use super::check::DevicePicture;
+use super::invocations::{self, NO_COUNTERS};
 use super::limits::{MOST_BLOCKS, MOST_FRAMES};
 use super::precision::{Limit, Precision, Reached, look, n_segments};
 use super::schedule::{self, PlannedBlock, Rounds, n_frames_of};
@@ -226,7 +227,16 @@ impl Bench<'_> {
         let scene = stage.scene.clone();
         let amounts = Amounts::measured(&mut stage.renderer, &stage.device, &scene)?;
         lock(self.outcome).amounts.extend(amounts.map(|amounts| (i_case, amounts)));
-        if self.plan.pictures && !self.stop.load(Ordering::Relaxed) {
+        let is_stopped = self.stop.load(Ordering::Relaxed);
+        if let Some(frame) = last.filter(|_| self.plan.counts_invocations && !is_stopped) {
+            let counted = invocations::count(stage, frame.time_s)?;
+            let mut outcome = lock(self.outcome);
+            if counted.is_none() && !outcome.notes.iter().any(|n| n == NO_COUNTERS) {
+                outcome.notes.push(NO_COUNTERS.to_owned());
+            }
+            outcome.invocations.extend(counted.map(|of| (i_case, of)));
+        }
+        if self.plan.pictures && !is_stopped {
             let film = case.scene.film;
             let (width, height) = (film.width, film.height);
             let rgb = display_bytes(&film, width, height, &rgba);

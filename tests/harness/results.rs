@@ -94,6 +94,7 @@ pub fn run(modes: Vec<Mode>) -> Run {
             check: None,
             precision: None,
             state: None,
+            invocations: None,
         }],
         stages: None,
         chosen: Vec::new(),

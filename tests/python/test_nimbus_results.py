@@ -257,7 +257,7 @@ class Tables(InFolder):
             ("serial, parallel, serial no-skip", lambda: run.times(loop="both")),
             ("no case 1", lambda: run.times(case=1)),
             ("render_ms", lambda: run.times("n_drawn")),
-            ("frames, loops, passes, cases", lambda: run.table("blocks")),
+            ("frames, loops, passes, cases, invocations, parts", lambda: run.table("blocks")),
         ):
             with self.assertRaisesRegex(ValueError, expected):
                 call()
@@ -320,6 +320,165 @@ class Tables(InFolder):
             except ImportError:
                 continue
             self.assertIsNotNone(call())
+
+
+CHECK = {
+    "verdict": "right", "reason": None, "frame": 7, "n_pixels": 3072,
+    "rmse": {"value": 2e-3, "low": 1e-3, "high": 3e-3}, "max": 0.25, "magnitude": 0.5,
+    "drawing": {"rms": 1e-5, "bound": 4e-5, "n_shown": 100, "n_beyond": 0, "most_beyond": 1},
+    "settings_rms": 1.5e-3, "light": None, "n_second": 0, "is_light_whole": True, "seconds": 0.5,
+    "from_cache": False,
+}  # fmt: skip
+
+
+def comparison(schema, **more):
+    """Returns the JSON of nimbus compare of two runs."""
+    side = {"folder": "one", "date": "2026-01-01T00:00:00Z", "nimbus": "0.1.0",
+            "revision": "abc", "device": "a device", "scene_hash": "0" * 64}
+    frame = {"measure": "frame", "n_a": 60, "n_b": 50, "a_ms": 8.0, "b_ms": 4.0,
+             "b_by_a": {"estimate": 0.5, "low": 0.45, "high": 0.55}, "block_len": 8,
+             "verdict": "faster"}
+    gpu = {**frame, "measure": "gpu", "n_b": 0, "b_ms": None, "b_by_a": None,
+           "verdict": "not_measured_in_b"}
+    modes = [{"name": "serial", "measures": [frame, gpu]}]
+    return {"schema": schema, "a": side, "b": {**side, "folder": "two"}, "allowed": [],
+            "n_resamples": 2000, "headline": "frame", "modes": modes, "remarks": [], **more}
+
+
+class Errors(InFolder):
+    """The error beside the time."""
+
+    def with_check(self, **changes):
+        check = {**CHECK, **changes}
+        self.edit_json("run/run.json", lambda run: run["cases"][0].update(check=check))
+        return nr.read(self.folder / "run")
+
+    def test_the_check_of_a_case_has_columns(self):
+        run = self.with_check()
+        of = {name: column[0] for name, column in run.cases.items()}
+        self.assertEqual((of["verdict"], of["reason"], of["n_pixels"]), ("right", "", 3072.0))
+        self.assertEqual((of["rmse"], of["rmse_low"], of["rmse_high"]), (2e-3, 1e-3, 3e-3))
+        self.assertEqual((of["max"], of["magnitude"], of["settings_rms"]), (0.25, 0.5, 1.5e-3))
+        self.assertEqual((of["drawing_rms"], of["drawing_bound"]), (1e-5, 4e-5))
+        self.assertTrue(math.isnan(of["light_rms"]) and math.isnan(of["light_bound"]))
+        lines = str(run).splitlines()
+        self.assertTrue(all("2.00e-03  1.00e-03 to 3.00e-03" in line for line in lines[-3:]))
+
+    def test_a_wrong_picture_is_told(self):
+        run = self.with_check(verdict="wrong", reason="its light differs", rmse=None)
+        self.assertTrue(math.isnan(run.cases["rmse"][0]))
+        self.assertIn("case 0: the picture is wrong: its light differs", str(run))
+        stages = {"n_cases": 9, "failed": ["brdf/lobe"], "seconds": 2.0, "from_cache": False}
+        self.edit_json("run/run.json", lambda run: run.update(stages=stages))
+        run = nr.read(self.folder / "run")
+        self.assertEqual(run.failed_stages, ["brdf/lobe"])
+        self.assertIn("stages that failed: brdf/lobe", str(run))
+
+    def test_results_without_a_check_are_read(self):
+        def unchecked(run):
+            run.pop("stages", None)
+            run["cases"][0].pop("check", None)
+
+        self.with_check()
+        self.edit_json("run/run.json", unchecked)
+        run = nr.read(self.folder / "run")
+        self.assertEqual((run.cases["verdict"][0], run.failed_stages), ("not_checked", None))
+        self.assertTrue(math.isnan(run.cases["rmse"][0]))
+
+    def test_a_damaged_check_is_refused_with_its_place(self):
+        self.with_check()
+        self.edit_json("run/run.json", lambda run: run["cases"][0]["check"].update(verdict="fine"))
+        self.refused("run", "cases.0.check.verdict`: expected one of right, wrong, not_checked")
+        self.edit_json("run/run.json", lambda run: run["cases"][0].update(check={"rmse": 1}))
+        self.refused("run", "`cases.0.check` has no key `verdict`")
+
+
+class Others(InFolder):
+    """Comparisons, and what a farm has merged."""
+
+    def write(self, name, value):
+        (self.folder / name).write_text(json.dumps(value), encoding="utf-8")
+        return self.folder / name
+
+    def test_a_comparison_of_two_runs(self):
+        for schema in nr.COMPARISON_SCHEMAS:
+            found = nr.read(self.write("compared.json", comparison(schema)))
+            of = found.measures
+            self.assertEqual(of["measure"].tolist(), ["frame", "gpu"])
+            self.assertEqual((of["b_by_a"][0], of["b_by_a_low"][0], of["n_b"][0]), (0.5, 0.45, 50))
+            self.assertTrue(math.isnan(of["b_ms"][1]) and math.isnan(of["b_by_a"][1]))
+            self.assertEqual((found.errors["a"].size, math.isnan(found.margin)), (0, True))
+            self.assertIn("not measured in b", str(found))
+            self.assertIn("B  two", str(found))
+        errors = [{"name": "dense", "a": 1e-3, "b": 2e-3, "b_by_a": None, "verdict": "larger"}]
+        value = comparison(3, margin=0.01, errors=errors)
+        value["modes"][0]["measures"][0]["more_frames"] = 12
+        found = nr.read(self.write("compared.json", value))
+        self.assertEqual((found.margin, found.errors["case"][0]), (0.01, "dense"))
+        self.assertEqual(found.measures["more_frames"][0], 12.0)
+
+    def test_other_comparisons_are_refused(self):
+        value = comparison(3)
+        self.write("a.json", {**value, "matrix": value.pop("modes")})
+        self.refused("a.json", "compares more than two runs")
+        self.write("b.json", comparison(99))
+        self.refused("b.json", "has schema 99, newer than 3")
+        self.write("c.json", {"schema": 1, "metrics": {"rmse": 0.0}})
+        self.refused("c.json", "compares two pictures")
+        value = comparison(2)
+        del value["modes"][0]["measures"][0]["verdict"]
+        self.write("d.json", value)
+        self.refused("d.json", "`modes.0.measures.0` has no key `verdict`")
+
+    def merged(self, numbers):
+        folder = self.folder / "frames"
+        folder.mkdir()
+        lines = []
+        for number in numbers:
+            data = b"picture %d" % number
+            name = f"frame-{number:08}.png"
+            (folder / name).write_bytes(data)
+            lines.append(f"{hashlib.sha256(data).hexdigest()}  {name}\n")
+        (folder / "frames.sha256").write_text("".join(lines), encoding="utf-8")
+        return folder
+
+    def test_merged_frames(self):
+        folder = self.merged([11, 8, 9])
+        frames = nr.read(folder)
+        of = frames.pictures
+        self.assertEqual(of["frame"].tolist(), [8, 9, 11])
+        self.assertEqual(of["bytes"].tolist(), [9, 9, 10])
+        self.assertEqual((of["format"][0], of["file"][2]), ("png", "frame-00000011.png"))
+        self.assertEqual((frames.missing, frames.metadata.verified), ([10], True))
+        self.assertIn("3 frames, 8 to 11, 28 bytes", str(frames))
+        (folder / "frame-00000009.png").write_bytes(b"another")
+        self.refused("frames", "frame-00000009.png: has changed since nimbus wrote it")
+        self.assertFalse(nr.read(folder, verify=False).metadata.verified)
+        (folder / "frame-00000009.png").rename(folder / "away")
+        self.refused("frames", "frame-00000009.png: is missing", verify=False)
+        (folder / "away").rename(folder / "frame-00000009.png")
+        with open(folder / "frames.sha256", "a", encoding="utf-8") as listing:
+            listing.write(f"{'0' * 64}  other.txt\n")
+        self.refused("frames", "lists other.txt, which is no frame", verify=False)
+
+    def test_counts_of_invocations(self):
+        self.assertEqual(nr.read(self.folder / "run").invocations["compute"].size, 0)
+        counts = {"compute": 0, "vertex": 24, "fragment": 90, "primitives": 12,
+                  "clipped_primitives": 11}
+        passes = [{"name": "sprites", **counts}, {**counts, "name": "place", "compute": 64}]
+        self.edit_json("run/run.json", lambda run: run["cases"][0].update(invocations=passes))
+        found = nr.read(self.folder / "run").invocations
+        self.assertEqual(found["name"].tolist(), ["sprites", "place"])
+        self.assertEqual((found["compute"].tolist(), found["primitives"][0]), ([0, 64], 12))
+
+    def test_a_merged_bench_has_its_parts(self):
+        clocks = json.loads((self.folder / "run/run.json").read_text(encoding="utf-8"))["clocks"]
+        part = {"first": 0, "end": 1, "node": "n7", "date": "2026-01-01T00:00:00Z",
+                "clocks": clocks, "base": []}
+        self.assertEqual(nr.read(self.folder / "run").parts["node"].size, 0)
+        self.edit_json("run/run.json", lambda run: run.update(parts=[part]))
+        parts = nr.read(self.folder / "run").parts
+        self.assertEqual((parts["node"][0], parts["end"][0]), ("n7", 1))
 
 
 class Damage(InFolder):

@@ -90,7 +90,7 @@ pub struct BenchArgs {
         long,
         value_name = "N",
         default_value_t = 1,
-        conflicts_with_all = ["part", "trace"],
+        conflicts_with_all = ["part", "trace", "capture"],
         value_parser = limited(1, MOST_STARTS, "their frames are kept in memory together")
     )]
     pub starts: u32,
@@ -146,6 +146,14 @@ pub struct BenchArgs {
     /// Do not read clocks, heat and load beside the frames
     #[arg(long, conflicts_with = "discard_throttled", hide_short_help = true)]
     pub no_state: bool,
+    /// Count what each pass invokes: shaders, and triangles before and after clipping. One more
+    /// frame of each case counts them after its timed frames, so that no time changes
+    #[arg(long)]
+    pub invocations: bool,
+    /// Have RenderDoc capture this frame, counted from 0 over all frames of the command, warm-up
+    /// included; nimbus must have been started under RenderDoc, and times then mean little
+    #[arg(long, value_name = "N")]
+    pub capture: Option<u32>,
     /// Print run.json instead of the table
     #[arg(long)]
     pub json: bool,

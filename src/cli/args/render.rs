@@ -17,6 +17,9 @@ use crate::reference::picture::ReferenceKind;
     nimbus render scenes/cubes-554.toml --size 200x150 --reference volume \\\n      \
     --set 'cloud.0.texture=\"none\"' -o volume.exr\n  \
     nimbus compare thin.exr drawn.exr\n  nimbus compare volume.exr thin.exr\n\n\
+    The picture of a device and of its reference, layer by layer:\n  \
+    nimbus render scenes/hello.toml --layers -o layers.exr\n  \
+    nimbus render scenes/hello.toml --layers --reference thin -o f64.exr\n\n\
     The second reflection of a reference is integrated over areas, which takes minutes for \
     hundreds of facets. \
     --set 'lighting.mode=\"first\"' leaves it out.")]
@@ -48,6 +51,13 @@ pub struct RenderArgs {
         value_parser = parse_samples
     )]
     pub samples: u32,
+    /// Write named layers to the EXR file, too: depth, optical depth, number of particles, and the
+    /// picture of each reflection alone (docs/reference/files.md)
+    #[arg(long)]
+    pub layers: bool,
+    /// Have RenderDoc capture the frame; nimbus must have been started under RenderDoc
+    #[arg(long, conflicts_with = "reference")]
+    pub capture: bool,
     /// Replace an existing file
     #[arg(long)]
     pub force: bool,

@@ -29,6 +29,10 @@ pub struct ViewArgs {
     /// Folder that F10, F11 and F12 save to; it is made when needed, and no file is replaced
     #[arg(long, value_name = "DIR", default_value = "captures")]
     pub captures: PathBuf,
+    /// Have RenderDoc capture this frame, counted from 0; nimbus must have been started under
+    /// RenderDoc
+    #[arg(long, value_name = "N")]
+    pub capture: Option<u32>,
     /// Print the times of the loops that ran as JSON when the window is closed
     #[arg(long)]
     pub json: bool,

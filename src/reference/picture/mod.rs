@@ -4,13 +4,15 @@
 //! - [`sums`] draws any range of samples at any pixels, so that a picture can be computed in parts
 //!   and put together to the same bits.
 //! - [`FrameReference`] holds every stage of one frame up to the light on its facets.
-//! - [`drawn_as_set`] draws a frame with the scene's own drawing settings.
+//! - [`drawn_as_set`] draws a frame with the scene's own drawing settings, and [`layers_as_set`]
+//!   its layers.
 
 mod background;
 mod error_estimate;
 mod expected;
 mod frame;
 mod kind;
+mod layers;
 mod limits;
 mod local_scene;
 mod model_light;
@@ -29,6 +31,7 @@ pub use error_estimate::ErrorEstimate;
 pub use expected::{PictureTime, expected_time};
 pub use frame::{FrameReference, SecondOf, colors};
 pub use kind::{ReferenceKind, n_reflections};
+pub use layers::{PictureLayers, layers_as_set, sums_by_settings};
 pub use limits::check_memory;
 pub use model_picture::ModelDrawing;
 pub use pixels::{Pixels, Tile};

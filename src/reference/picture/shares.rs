@@ -106,7 +106,7 @@ fn pixel_of(
 }
 
 /// Returns the opaque background of every pixel, without colours, and the shares of facets in it.
-fn solid_shares(
+pub(super) fn solid_shares(
     scene: &Scene,
     frame: &FrameReference,
     view: &View,
@@ -182,7 +182,7 @@ pub fn drawn_by_settings(
 
 /// Relative error of a value that is interpolated between facets, and of the depth of a surface:
 /// some hundred roundings of f32.
-const INTERPOLATED: f64 = 1e-5;
+pub(super) const INTERPOLATED: f64 = 1e-5;
 /// Roundings of f32 in the place of a particle (of its offset in the group, the group's and the
 /// cloud's place), and in its offset from a ray.
 const N_ROUNDINGS: f64 = 8.0;
@@ -196,7 +196,7 @@ const NARROWER: f64 = 0.01;
 
 /// Returns the rounding of a device that draws `blobs`. The error of a particle's place relative to
 /// its σ moves the distance of a ray by that share: τ changes by up to the cutoff times the share.
-fn rounding(scene: &Scene, view: &View, blobs: &[Blob]) -> Rounding {
+pub(super) fn rounding(scene: &Scene, view: &View, blobs: &[Blob]) -> Rounding {
     let mut sigmas: Vec<f64> = blobs.iter().map(|b| b.sigma * b.aspect.min(1.0)).collect();
     sigmas.retain(|sigma| *sigma > 0.0);
     sigmas.sort_by(f64::total_cmp);

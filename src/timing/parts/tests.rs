@@ -50,6 +50,7 @@ fn case(k: usize, ms: f64) -> Case {
         figure: None,
         check: None,
         state: None,
+        invocations: None,
     }
 }
 

@@ -16,7 +16,7 @@ use winit::window::WindowId;
 use super::captures::Captures;
 use super::error_meter::ErrorMeter;
 use super::file_watch::FileWatch;
-use super::frame_loop::LoopTimes;
+use super::frame_loop::{LoopTimes, WindowTimes};
 use super::panels;
 use super::render_links::{RenderEvent, RenderLinks};
 use super::render_thread::SceneRenderer;
@@ -53,14 +53,6 @@ pub struct Options {
     pub has_panels: bool,
     /// The folder that pictures and scenes are saved to.
     pub captures: PathBuf,
-}
-
-/// Times measured while a window was open.
-pub struct WindowTimes {
-    /// Frame times of each loop that ran.
-    pub loops: Vec<LoopTimes>,
-    /// Time that each update of the panels took on the window's thread, ms.
-    pub panels_ms: Vec<f64>,
 }
 
 /// Interval of panel updates and of looks at the scene's files: numbers stay long enough to read.
@@ -112,7 +104,8 @@ pub fn run(options: Options) -> Result<WindowTimes> {
     ran?;
     let loops = rendered.unwrap_or_else(|| Ok(vec![]))?;
     let panels_ms = std::mem::take(&mut lock(&app.links.widgets).update_ms);
-    Ok(WindowTimes { loops, panels_ms })
+    let captured = lock(&app.links.status).captured.take();
+    Ok(WindowTimes { loops, panels_ms, captured })
 }
 
 /// Position of the pointer, and the buttons that turn the camera.

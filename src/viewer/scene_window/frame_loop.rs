@@ -10,12 +10,23 @@ use super::render_links::{Readback, RenderEvent, RenderLinks};
 use super::view_state::ViewState;
 use crate::error::Result;
 use crate::frame::{Counts, FrameTimes, Game, Renderer, parallel, serial};
+use crate::gpu::Captured;
 use crate::measure::stats::Summary;
 use crate::model::scene::{Scene, Threading};
 use crate::viewer::fly_camera::FlyCamera;
 use crate::viewer::posed_player::PosedPlayer;
 use crate::viewer::sync::lock;
 use crate::viewer::window_target::{PictureDraw, WindowTarget};
+
+/// The results of a window that was open.
+pub struct WindowTimes {
+    /// Frame times of each loop that ran.
+    pub loops: Vec<LoopTimes>,
+    /// Time that each update of the panels took on the window's thread, ms.
+    pub panels_ms: Vec<f64>,
+    /// The result of the capture that was asked for; none if its frame was not drawn.
+    pub captured: Option<Captured>,
+}
 
 /// Frame times of one loop.
 #[derive(Debug, Clone, Copy)]

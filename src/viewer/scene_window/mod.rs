@@ -35,8 +35,8 @@ mod view_state;
 
 #[cfg(feature = "window")]
 pub(crate) use self::{
-    app::{Options, WindowTimes, run},
-    frame_loop::LoopTimes,
+    app::{Options, run},
+    frame_loop::{LoopTimes, WindowTimes},
     scene_source::SceneSource,
 };
 pub use view_state::ViewState;

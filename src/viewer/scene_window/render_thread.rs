@@ -139,6 +139,7 @@ impl SceneRenderer {
                 Err(error) => return Err(error),
             }
         }
+        lock(&self.links.status).captured = self.target.gpu.device.captured();
         self.target.close()?;
         Ok(loop_times(&self.samples))
     }

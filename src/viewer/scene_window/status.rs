@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use super::timeline::Timeline;
 use crate::frame::Counts;
-use crate::gpu::PresentMode;
+use crate::gpu::{Captured, PresentMode};
 use crate::studies::picture_error::PictureError;
 use crate::viewer::error_probe::ProbeStatus;
 
@@ -29,6 +29,8 @@ pub struct ViewStatus {
     pub variant_ms: Option<f64>,
     /// `None` while no error is measured.
     pub error: Option<ErrorStatus>,
+    /// The result of the capture that was asked for.
+    pub captured: Option<Captured>,
 }
 
 /// Error of the view against its reference.

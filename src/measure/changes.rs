@@ -171,7 +171,7 @@ impl Noise {
         let p_without = self.tail(without, short.len() - 1, long);
         let is_kept = without.signum() == by.signum();
         let most = FALSE_ALARMS / values.len() as f64;
-        if !is_kept || !(p < most && p_without < ALONE) {
+        if !(is_kept && p < most && p_without < ALONE) {
             return None;
         }
         let half = student_95(self.degrees) * self.error(before.len(), after.len());

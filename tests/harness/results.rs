@@ -108,6 +108,7 @@ pub fn run(modes: Vec<Mode>) -> Run {
 }
 
 /// Returns the row of frame `frame`, timed, of 1 ms.
+#[allow(dead_code, reason = "not every test binary writes frames")]
 pub fn row(threading: &str, frame: u32) -> FrameRow {
     FrameRow {
         phase: String::new(),

@@ -51,6 +51,7 @@ fn case(k: usize, ms: f64) -> Case {
         check: None,
         state: None,
         invocations: None,
+        precision: None,
     }
 }
 

@@ -81,8 +81,8 @@ impl Observed<'_> {
         };
         let cases = of_cases.into_iter().map(case).collect();
         let start = self.rows.iter().find(|row| row.event == Event::Start);
-        let counts = self.rows.iter().filter_map(|row| row.cpu_throttles);
-        let counted = counts.clone().next().zip(counts.last());
+        let mut counts = self.rows.iter().filter_map(|row| row.cpu_throttles);
+        let counted = counts.clone().next().zip(counts.next_back());
         let mut run = RunState {
             sources: self.sources.to_vec(),
             clock: if is_cpu { "cpu" } else { "gpu" }.to_owned(),

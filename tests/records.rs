@@ -246,9 +246,9 @@ fn keys_and_their_order_match_the_schema() {
         &mut n_compared,
     );
     // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its
-    // share, skipping, counts; twice a mode, seven summaries, lows, two passes, a reason. A part,
-    // its clocks and its time.
-    assert_eq!(n_compared, 3 + 4 + 2 + 7 + 2 * (1 + 7 + 1 + 2 + 1));
+    // share, skipping, counts, ceilings and a bandwidth; twice a mode, seven summaries, lows, two
+    // passes, a reason. A part, its clocks and its time.
+    assert_eq!(n_compared, 3 + 4 + 2 + 7 + 2 + 2 * (1 + 7 + 1 + 2 + 1));
 }
 
 #[test]

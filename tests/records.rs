@@ -15,6 +15,7 @@ use nimbus::timing::json::{read, write};
 use nimbus::timing::machine::{Cpu, cpu, environment, revision, utc_now};
 use nimbus::timing::names::Setting;
 use nimbus::timing::overlap::{Overlap, SerialFrame};
+use nimbus::timing::precision::{PrecisionRecord, Reached};
 use nimbus::timing::records::{
     BaseTime, Case, Measured, Mode, PartRecord, Pass, Ratio, Reason, Run, Skipping,
 };
@@ -125,6 +126,7 @@ fn sample() -> Run {
         skipping: Some(Skipping { gpu_ms: 1.0, gpu_no_skip_ms: 3.0, same_bytes: Some(true) }),
         counts: Some(Counts { values: 8, ..Counts::default() }),
         state: Some(run_state().all),
+        precision: Some(Reached { half_width: Some(0.01), rounds: 8, ended_by: None }),
         ..blank.cases[0].clone()
     };
     let base = BaseTime { threading: "serial".to_owned(), skip: true, p50_ms: Some(1.5) };
@@ -152,6 +154,7 @@ fn sample() -> Run {
             operations_per_s: 1e11,
         }),
         cold_bytes: Some(1 << 25),
+        precision: Some(PrecisionRecord { wanted: 0.02, seed: 1, limit_s: 600.0 }),
         ..blank
     }
 }
@@ -300,10 +303,12 @@ fn keys_and_their_order_match_the_schema() {
         &mut n_compared,
     );
     // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its
-    // share, skipping, counts; twice a mode, seven summaries, lows, two passes, a reason. A part,
-    // its clocks and its time. The state of the case, with five spreads and a reason; of run and
-    // part, each of which has that of all cases, and a drift.
-    assert_eq!(n_compared, 7 + 2 * (1 + 7 + 1) + 3 + 4 + 2 + 7 + 2 * (1 + 7 + 1 + 2 + 1));
+    // share, skipping, counts, ceilings and a bandwidth; both precisions; twice a mode, seven
+    // summaries, lows, two passes, a reason. A part, its clocks and its time. The state of the case,
+    // with five spreads and a reason; of run and part, each of which has that of all cases, and a
+    // drift.
+    let of_states = 7 + 2 * (1 + 7 + 1);
+    assert_eq!(n_compared, of_states + 3 + 4 + 2 + 7 + 2 + 2 + 2 * (1 + 7 + 1 + 2 + 1));
 }
 
 #[test]

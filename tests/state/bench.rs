@@ -11,8 +11,10 @@ use nimbus::gpu::{DeviceOptions, LoweredLimits};
 use nimbus::io::scene_file;
 use nimbus::model::scene::Threading;
 use nimbus::timing::bench_state::Judging;
-use nimbus::timing::blocks::{self, BenchPlan, Outcome};
+use nimbus::timing::blocks::{BenchPlan, Outcome};
 use nimbus::timing::cases::{Case, LoopChoice, cases};
+use nimbus::timing::running::{self, Event as BenchEvent};
+use nimbus::timing::schedule::Rounds;
 use nimbus::timing::state::{DeviceNames, Event, Folders, Sampler, StateRow};
 
 const N_FRAMES: u32 = 6;
@@ -42,16 +44,21 @@ fn benched(valid_bits: u32, discard: bool) -> (Vec<Case>, BenchPlan, Outcome) {
     let log = sampler.log();
     let plan = BenchPlan {
         n_warm_up: N_WARM_UP,
-        n_rounds: N_ROUNDS,
+        rounds: Rounds::Fixed(N_ROUNDS),
         hash_frames: false,
         pictures: false,
         checked: None,
+        cold_bytes: None,
+        counts_invocations: false,
     };
     let outcome = Mutex::new(Outcome { watch: sampler.watch(), ..Outcome::default() });
     let mut n_frames = 0;
     // The first frame of a block waits until the thread has read the end of the block before, and
     // the last frame of its warm-up has set the clock before the thread reads the begin.
-    let mut tick = || {
+    let mut tick = |event| {
+        if event != BenchEvent::Frame {
+            return;
+        }
         let i_block = n_frames / (N_WARM_UP + N_FRAMES);
         if n_frames % (N_WARM_UP + N_FRAMES) == 0 {
             let has_ended = |row: &StateRow| {
@@ -67,7 +74,7 @@ fn benched(valid_bits: u32, discard: bool) -> (Vec<Case>, BenchPlan, Outcome) {
         }
         n_frames += 1;
     };
-    let ended = blocks::run(stage, &cases, &plan, &AtomicBool::new(false), &outcome, &mut tick);
+    let ended = running::run(stage, &cases, &plan, &AtomicBool::new(false), &outcome, &mut tick);
     assert_eq!(ended.failure, None);
     let last = |row: &StateRow| row.event == Event::End && row.block == Some(N_ROUNDS - 1);
     wait(|| log.rows().iter().any(last));

@@ -86,7 +86,10 @@ fn the_merged_bench_is_that_of_one_process() {
     let [ours, theirs] = [&merged, &alone].map(|folder| read_results(folder).expect("results"));
     assert_eq!(exact(&ours.run), exact(&theirs.run));
     let modes = |of: &nimbus::timing::results::BenchResults| -> Vec<_> {
-        of.modes.iter().map(|m| (m.name.clone(), m.frames.clone(), m.blocks.len())).collect()
+        of.modes
+            .iter()
+            .map(|m| (m.name.clone(), m.frames.clone(), m.times("frame").len()))
+            .collect()
     };
     assert_eq!((modes(&ours), ours.modes.len()), (modes(&theirs), 18));
     let (ours, theirs) = (ours.run, theirs.run);

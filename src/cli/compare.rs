@@ -56,7 +56,8 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         "n_resamples": Bootstrap::default().n_resamples,
         // The measure that decides. The others are not corrected for multiple comparisons.
         "headline": HEADLINE,
-        "modes": found.modes, "errors": found.errors, "remarks": found.remarks,
+        "modes": found.modes, "errors": found.errors, "memory": found.memory,
+        "remarks": found.remarks,
     }))
 }
 
@@ -138,8 +139,13 @@ fn text(
     for mode in &found.modes {
         out += &format!("\n{}", output::table(&rows(mode)));
     }
-    if !found.errors.is_empty() {
-        out += &format!("\n{}", output::table(&error_rows(&found.errors)));
+    for (what, sizes, number) in [
+        ("RMSE", &found.errors, output::scientific as fn(f64) -> String),
+        ("device memory, MiB", &found.memory, mib),
+    ] {
+        if !sizes.is_empty() {
+            out += &format!("\n{}", output::table(&size_rows(what, sizes, number)));
+        }
     }
     out += &few_frames_remark(&found.modes).map_or(String::new(), |remark| remark + "\n");
     out.push('\n');
@@ -151,12 +157,16 @@ fn text(
     out + &foot(&found.modes, margin)
 }
 
-fn error_rows(errors: &[SizeComparison]) -> Vec<Vec<String>> {
-    let mut rows = output::header(["RMSE", "A", "B", "B / A", "95 % low", "high", "B is"]);
-    for e in errors {
-        let name = if e.name.is_empty() { "picture" } else { &e.name };
+fn mib(bytes: f64) -> String {
+    format!("{:.1}", bytes / f64::from(1 << 20))
+}
+
+fn size_rows(what: &str, sizes: &[SizeComparison], number: fn(f64) -> String) -> Vec<Vec<String>> {
+    let mut rows = output::header([what, "A", "B", "B / A", "95 % low", "high", "B is"]);
+    for e in sizes {
+        let name = if e.name.is_empty() { "scene" } else { &e.name };
         let mut row = vec![name.to_owned()];
-        row.extend([e.a, e.b].map(output::scientific));
+        row.extend([e.a, e.b].map(number));
         let ends = [|r: Interval| r.estimate, |r: Interval| r.low, |r: Interval| r.high];
         row.extend(ends.map(|of| or_dash(e.b_by_a, |r| format!("{:.3}", of(r)))));
         row.push(e.verdict.text().to_owned());

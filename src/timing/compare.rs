@@ -82,6 +82,8 @@ pub struct Comparison {
     pub modes: Vec<ModeComparison>,
     /// The errors of the pictures of every case that both checked.
     pub errors: Vec<SizeComparison>,
+    /// The most device memory, in bytes, of every case whose state both read.
+    pub memory: Vec<SizeComparison>,
     /// Remarks on the runs and their frames.
     pub remarks: Vec<String>,
 }
@@ -98,7 +100,8 @@ impl Comparison {
         remarks.extend(frame_remarks(&a.modes, &b.modes));
         remarks.extend(steadiness_remarks(&pairs, &modes));
         let errors = sizes::errors(&a.run, &b.run, margin);
-        Comparison { differences: differences(&a.run, &b.run), modes, errors, remarks }
+        let memory = sizes::memory(&a.run, &b.run, margin);
+        Comparison { differences: differences(&a.run, &b.run), modes, errors, memory, remarks }
     }
 }
 

@@ -36,7 +36,7 @@ pub fn section(a: &Source, b: &Source) -> Result<Markup> {
 }
 
 fn benches(a: &BenchResults, b: &BenchResults, folders: [&Path; 2]) -> Result<Markup> {
-    let Comparison { differences, modes, errors, remarks } = Comparison::new(a, b, MARGIN);
+    let Comparison { differences, modes, errors, memory, remarks } = Comparison::new(a, b, MARGIN);
     Ok(html! {
         (differing(&differences))
         (remark_list(&remarks))
@@ -52,7 +52,8 @@ fn benches(a: &BenchResults, b: &BenchResults, folders: [&Path; 2]) -> Result<Ma
                 noise within the runs, not the variation between starts of the program."
             }
         }
-        @if !errors.is_empty() { (errors_table(&errors)) }
+        @if !errors.is_empty() { (sizes_table("RMSE against f64, and its ratio", &errors)) }
+        @if !memory.is_empty() { (sizes_table("Most device memory, bytes", &memory)) }
         (pictures_of(a, b, folders)?)
     })
 }
@@ -111,10 +112,10 @@ fn ratios(modes: &[ModeComparison]) -> Markup {
     table("Medians, their ratios and 95 % intervals", &header, rows)
 }
 
-fn errors_table(errors: &[SizeComparison]) -> Markup {
+fn sizes_table(caption: &str, sizes: &[SizeComparison]) -> Markup {
     let row = |e: &SizeComparison| {
         vec![
-            text(if e.name.is_empty() { "picture" } else { &e.name }),
+            text(if e.name.is_empty() { "scene" } else { &e.name }),
             value(Some(e.a)),
             value(Some(e.b)),
             value(e.b_by_a.map(|r| r.estimate)),
@@ -124,7 +125,7 @@ fn errors_table(errors: &[SizeComparison]) -> Markup {
         ]
     };
     let header = ["case", "A", "B", "B / A", "95 % low", "high", "B is"];
-    table("RMSE against f64, and its ratio", &header, errors.iter().map(row))
+    table(caption, &header, sizes.iter().map(row))
 }
 
 /// Compares the pictures of cases with equal names.

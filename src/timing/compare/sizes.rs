@@ -1,4 +1,4 @@
-//! Compares what is no time: the errors of pictures.
+//! Compares what is no time: the errors of pictures, and device memory.
 
 use serde::Serialize;
 
@@ -28,6 +28,20 @@ pub(super) fn errors(a: &Run, b: &Run, margin: f64) -> Vec<SizeComparison> {
     let of_case = |of_a: &Case| {
         let of_b = b.cases.iter().find(|case| case.name() == of_a.name())?;
         Some(compare(of_a.name(), rmse(of_a)?, rmse(of_b)?, margin))
+    };
+    a.cases.iter().filter_map(of_case).collect()
+}
+
+/// Compares the most device memory, in bytes, of every case whose state both runs have.
+pub(super) fn memory(a: &Run, b: &Run, margin: f64) -> Vec<SizeComparison> {
+    // What nimbus allocates is known on every device, and has no noise.
+    let bytes = |case: &Case| {
+        let bytes = case.state.as_ref()?.peak_own_bytes?;
+        Some(Figure { value: bytes as f64, low: Some(bytes as f64), high: Some(bytes as f64) })
+    };
+    let of_case = |of_a: &Case| {
+        let of_b = b.cases.iter().find(|case| case.name() == of_a.name())?;
+        Some(compare(of_a.name(), bytes(of_a)?, bytes(of_b)?, margin))
     };
     a.cases.iter().filter_map(of_case).collect()
 }

@@ -18,6 +18,7 @@ mod device_info;
 mod draw_pipeline;
 mod draws;
 mod executed;
+mod extensions;
 mod fault;
 mod guard;
 mod host_clock;

@@ -61,7 +61,8 @@ fn csv(name: &str) -> Vec<StateRow> {
 /// Returns the times in s of the flagged frames, from the begin of the first to the end of the
 /// last, and their number.
 fn flagged(all: &[(TimedFrame, Flags)], is_so: fn(Flags) -> bool) -> (f64, f64, usize) {
-    let flagged = || all.iter().filter(|(_, flags)| is_so(*flags)).map(|(frame, _)| frame.span);
+    let flagged =
+        || all.iter().filter(move |(_, flags)| is_so(*flags)).map(|(frame, _)| frame.span);
     let begin = flagged().map(|span| span.begin_s).fold(f64::INFINITY, f64::min);
     let end = flagged().map(|span| span.end_s).fold(0.0, f64::max);
     (begin, end, flagged().count())

@@ -6,6 +6,7 @@ use ash::{ext, khr, vk};
 
 use super::advice::no_driver;
 use super::call::Call;
+use super::extensions::has_extension;
 use super::host_clock::{self, ClockCalibration};
 use super::instance::Instance;
 use super::limits::{LLVMPIPE_ITERATIONS, Limits};
@@ -321,16 +322,6 @@ fn has_pipeline_statistics(instance: &ash::Instance, physical: vk::PhysicalDevic
         unsafe { instance.get_physical_device_features2(physical, &mut all) };
     }
     feature.pipeline_executable_info == vk::TRUE
-}
-
-/// Whether a device lists an extension; false where the list cannot be read.
-pub(super) fn has_extension(
-    instance: &ash::Instance,
-    physical: vk::PhysicalDevice,
-    name: &CStr,
-) -> bool {
-    let extensions = unsafe { instance.enumerate_device_extension_properties(physical) };
-    extensions.is_ok_and(|all| all.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
 }
 
 /// Returns a fixed-size C string of Vulkan as text; empty where it does not end.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::{ext, vk};
 
 use super::device::Device;
-use super::device_info::has_extension;
+use super::extensions::has_extension;
 use super::instance::Instance;
 use super::memory_count::MemoryCount;
 

@@ -23,6 +23,7 @@ mod device_options;
 mod draw_pipeline;
 mod draws;
 mod executed;
+mod extensions;
 mod fault;
 mod features;
 mod guard;

@@ -78,7 +78,7 @@ fn too_few_readings_tell_no_drift() {
         falling.iter().map(|p| ClockPoint { of: p.i_block as usize, ..*p }).collect();
     assert_eq!(drift(&alone), None);
     let one_loop = |n: usize| -> Vec<ClockPoint> {
-        let point = |i| ClockPoint { of: 0, i_block: u32::from(i > 0), mhz: 1e3 - i as f64 };
+        let point = |i: usize| ClockPoint { of: 0, i_block: u32::from(i > 0), mhz: 1e3 - i as f64 };
         (0..n).map(point).collect()
     };
     assert_eq!(drift(&one_loop(3 * LEAST_READINGS - 1)), None);

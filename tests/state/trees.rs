@@ -92,6 +92,6 @@ impl Tree {
 /// Returns the bytes of "0a1b" or "3*00".
 fn bytes(word: &str) -> Vec<u8> {
     let (n, hex) = word.split_once('*').unwrap_or(("1", word));
-    let byte = |i| u8::from_str_radix(&hex[i..i + 2], 16).expect("hexadecimal digits");
+    let byte = |i: usize| u8::from_str_radix(&hex[i..i + 2], 16).expect("hexadecimal digits");
     (0..hex.len()).step_by(2).map(byte).collect::<Vec<u8>>().repeat(n.parse().expect("a number"))
 }

@@ -235,14 +235,11 @@ fn the_state_of_each_part_is_kept() {
     let n = LOOPS.len() * N_ROUNDS;
     assert_eq!(blocks.len(), n + 2 * n);
     for (block, mhz) in blocks {
-        let i_part = if mhz >= 400.0 { 2 } else { 0 };
-        let own = mhz as usize % 100;
-        let of_part = &parts[i_part].run.block_order[own];
-        let of_whole = &run.block_order[block as usize];
-        assert_eq!(
-            (numbers(&parts[i_part].range)[of_part.case], &of_part.threading),
-            (of_whole.case, &of_whole.threading)
-        );
+        let part = &parts[if mhz >= 400.0 { 2 } else { 0 }];
+        let own = &part.run.block_order[mhz as usize % 100];
+        let whole = &run.block_order[block as usize];
+        let number = numbers(&part.range)[own.case];
+        assert_eq!((number, &own.threading), (whole.case, &whole.threading));
     }
 }
 

@@ -10,6 +10,7 @@ use nimbus::frame::Counts;
 use nimbus::io::result_folder::Existing;
 use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::Summary;
+use nimbus::timing::difference::{Condition, differences};
 use nimbus::timing::frame_rows::{FRAMES_FILE, FrameRow, FrameTable};
 use nimbus::timing::json::{read, write};
 use nimbus::timing::machine::{Cpu, cpu, environment, revision, utc_now};
@@ -392,4 +393,15 @@ fn the_revision_is_a_git_hash_or_unknown() {
         revision() == "unknown"
             || (digits.len() >= 12 && digits.chars().all(|c| c.is_ascii_hexdigit()))
     );
+}
+
+#[test]
+fn hot_and_cold_runs_are_not_compared_unless_allowed() {
+    let hot = results::run(vec![mode("serial")]);
+    let cold = Run { cold_bytes: Some(1 << 25), ..hot.clone() };
+    assert!(differences(&hot, &hot).is_empty() && differences(&cold, &cold).is_empty());
+    let found = differences(&hot, &cold);
+    assert_eq!(found.len(), 1);
+    assert_eq!((found[0].kind, found[0].what.as_str()), (Condition::Device, "caches"));
+    assert_eq!(found[0].b, "cold before each pass");
 }

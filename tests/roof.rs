@@ -3,8 +3,6 @@
 
 #[path = "harness/program.rs"]
 mod program;
-#[path = "harness/results.rs"]
-mod results;
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -18,7 +16,6 @@ use nimbus::io::scene_file;
 use nimbus::model::scene::Threading;
 use nimbus::passes;
 use nimbus::roof::{Budget, measure};
-use nimbus::timing::difference::{Condition, differences};
 use nimbus::timing::roofs::Roofs;
 use program::{nimbus, path};
 use serde_json::Value;
@@ -160,17 +157,6 @@ fn amounts_of_a_frame_are_those_of_its_scene() {
         assert!(work.bytes > 0.0 && work.bytes.is_finite(), "{pass:?}: {work:?}");
     }
     stage.close().expect("no validation messages");
-}
-
-#[test]
-fn hot_and_cold_runs_are_not_compared_unless_allowed() {
-    let hot = results::run(vec![results::mode("serial", 4, 0)]);
-    let cold = nimbus::timing::records::Run { cold_bytes: Some(1 << 25), ..hot.clone() };
-    assert!(differences(&hot, &hot).is_empty() && differences(&cold, &cold).is_empty());
-    let found = differences(&hot, &cold);
-    assert_eq!(found.len(), 1);
-    assert_eq!((found[0].kind, found[0].what.as_str()), (Condition::Device, "caches"));
-    assert_eq!(found[0].b, "cold before each pass");
 }
 
 /// Runs a short bench of the small scene, with a cache of its own.

@@ -232,7 +232,7 @@ fn both_paths_give_the_same_layers() {
         assert_eq!(is_empty, tiles.depth[k].is_infinite());
         assert_eq!(is_empty, *tau == 0.0);
     }
-    assert!(tiles.n_particles.iter().any(|n| *n == 0.0));
+    assert!(tiles.n_particles.contains(&0.0));
     assert!(tiles.n_particles.iter().any(|n| *n > 20.0));
 }
 

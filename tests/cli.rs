@@ -152,7 +152,7 @@ fn a_thousand_million_particles_are_refused_by_the_limit_s_name() {
 fn each_scene_has_a_folder_unless_it_is_faulty() {
     let dir = temp();
     let out = path(&dir, "runs");
-    let short = ["--frames", "2", "--warmup", "0", "--repeat", "1", "--out", &out];
+    let short = ["--frames", "2", "--warmup", "0", "--repeat", "1", "--no-check", "--out", &out];
     let (code, _, stderr) =
         run(&[&["bench", "scenes/hello.toml", "scenes/absent.toml"], &short[..]].concat());
     assert!(code == 2 && stderr.contains("absent.toml"), "{stderr}");

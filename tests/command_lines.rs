@@ -309,3 +309,22 @@ fn ten_minutes_of_generated_command_lines_end_in_order() {
     let begin = Instant::now();
     check(seed, |_| begin.elapsed() > LONG);
 }
+
+/// clap checks this in debug builds alone, and takes the first of two in others.
+#[test]
+fn no_flag_stands_for_two_arguments() {
+    fn check(command: &clap::Command) -> usize {
+        let mut seen = std::collections::BTreeSet::new();
+        let mut n = 0;
+        for argument in command.get_arguments() {
+            let long = argument.get_long().map(|long| format!("--{long}"));
+            let short = argument.get_short().map(|short| format!("-{short}"));
+            for flag in long.into_iter().chain(short) {
+                assert!(seen.insert(flag.clone()), "{}: two of {flag}", command.get_name());
+                n += 1;
+            }
+        }
+        n + command.get_subcommands().map(check).sum::<usize>()
+    }
+    assert!(check(&Args::command()) > 100);
+}

@@ -125,9 +125,12 @@ fn shrink(mut args: Vec<String>) -> Vec<String> {
     };
     // A sweep over sizes, and arguments behind `--`, have values of their own.
     let sweeps_size = args.iter().any(|a| a.starts_with("size="));
-    for (option, value) in
-        options.iter().filter(|(option, _)| !(sweeps_size && *option == "--size"))
-    {
+    // A precision decides the number of blocks.
+    let has_precision = args.iter().any(|a| a == "--precision");
+    let is_left_out = |option: &str| {
+        (sweeps_size && option == "--size") || (has_precision && option == "--repeat")
+    };
+    for (option, value) in options.iter().filter(|(option, _)| !is_left_out(option)) {
         match args.iter().position(|a| a == option) {
             Some(i) => args[i + 1] = (*value).to_owned(),
             None => {
@@ -190,7 +193,7 @@ fn run_lines(page: &str, lines: Vec<String>) -> Vec<String> {
         // Examples compare two things that differ.
         let differs = |args: &[String]| {
             let [a, b] = [&args[1], &args[2]].map(|name| fs::read(folder.path().join(name)).ok());
-            let [c, d] = [&args[1], &args[2]].map(|name| scene_hash(&folder.path().join(name)));
+            let [c, d] = [&args[1], &args[2]].map(|name| conditions(&folder.path().join(name)));
             a.zip(b).is_some_and(|(a, b)| a != b) || c.zip(d).is_some_and(|(c, d)| c != d)
         };
         let args = line.strip_prefix("tools/nimbus ").map(words).unwrap_or_default();
@@ -202,10 +205,10 @@ fn run_lines(page: &str, lines: Vec<String>) -> Vec<String> {
 }
 
 /// Returns the hash of the scene of a bench's results.
-fn scene_hash(folder: &Path) -> Option<String> {
+fn conditions(folder: &Path) -> Option<[serde_json::Value; 2]> {
     let text = fs::read_to_string(folder.join("run.json")).ok()?;
     let run: serde_json::Value = serde_json::from_str(&text).ok()?;
-    run["scene_hash"].as_str().map(str::to_owned)
+    Some(["scene_hash", "cold_bytes"].map(|key| run[key].clone()))
 }
 
 #[test]

@@ -37,10 +37,10 @@ fn order(results: &BenchResults) -> Vec<(usize, String, bool)> {
 #[test]
 fn eight_rounds_of_segments_in_random_order_come_first() {
     let dir = tempfile::tempdir().expect("a folder");
-    let least = ["--precision", "0.0000001%", "--time-limit", "0", "--seed", "5"];
+    let least = ["--precision", "0.0000001%", "--time-limit", "0", "--order-seed", "5"];
     let (code, table, stderr) = bench(dir.path(), "a", &least);
     assert_eq!(code, 0, "{stderr}");
-    assert!(table.contains("blocks in random order (--seed 5)"), "{table}");
+    assert!(table.contains("blocks in random order (--order-seed 5)"), "{table}");
     assert!(table.contains("PRECISION NOT REACHED: ±"), "{table}");
     assert!(table.contains("would take longer than --time-limit 0"), "{table}");
     let a = read_results(&dir.path().join("a")).expect("results");

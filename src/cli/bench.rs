@@ -9,13 +9,13 @@ use clap::ColorChoice;
 
 use super::args::{BenchArgs, SceneArgs};
 use super::bench_cases::{BenchCases, bench_cases, plan};
+use super::bench_check;
 use super::bench_record::{Recorder, Runs, print_json};
 use super::capture_note;
 use super::interrupt::{self, PATIENCE};
 use super::output::{SharedFolder, check_out, claim_file, lock_folder};
 use super::progress::progress;
 use super::scene::{device_choice, print_sizes};
-use super::{bench_check, bench_starts};
 use crate::error::{Error, Result};
 use crate::frame::{Stage, limits};
 use crate::gpu::PassTimes;
@@ -43,23 +43,12 @@ pub struct Context<'a> {
     pub zones: Option<&'a Zones>,
 }
 
-/// Runs `nimbus bench`.
+/// Runs the benches of all scenes in this process.
 ///
 /// # Errors
 /// Fails if the arguments or a scene are faulty, the device fails, or Ctrl-C came. Finished results
 /// are kept.
 pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
-    if let Some(folder) = &args.as_start {
-        return run_here(&bench_starts::of_start(args, folder), context);
-    }
-    if args.starts > 1 {
-        return bench_starts::run(args, context);
-    }
-    run_here(args, context)
-}
-
-/// Runs the benches of all scenes in this process.
-fn run_here(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
     let n_scenes = args.scenes.len();
     for (flag, is_set) in [
         ("--part", args.part.is_some()),

@@ -85,7 +85,7 @@ pub fn plan(args: &BenchArgs) -> BenchPlan {
 /// Returns the precision that the arguments ask for.
 pub fn precision(args: &BenchArgs) -> Option<Precision> {
     let limit = Duration::from_secs_f64(args.time_limit);
-    args.precision.map(|wanted| Precision { wanted, seed: args.seed, limit })
+    args.precision.map(|wanted| Precision { wanted, seed: args.order_seed, limit })
 }
 
 /// Returns the cases of `--part` after the first of all; all cases without `--part`.

@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::args::BenchArgs;
-use super::bench::{Context, out_dirs};
+use super::bench::{self, Context, out_dirs};
 use super::bench_cases::bench_cases;
 use super::bench_record::{Runs, print_json};
 use super::output::{self, wrote_folder};
@@ -25,8 +25,20 @@ use crate::timing::json;
 use crate::timing::results::{open_results, write_results};
 use crate::timing::starts::{Start, join};
 
+/// Runs `nimbus bench`, in this process or in those of `--starts`.
+///
+/// # Errors
+/// Fails as [`bench::run`] does, or if a process fails.
+pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
+    match &args.as_start {
+        Some(folder) => bench::run(&of_start(args, folder), context),
+        None if args.starts > 1 => run_starts(args, context),
+        None => bench::run(args, context),
+    }
+}
+
 /// Returns the arguments of the process of one start, whose results go to `folder`.
-pub fn of_start(args: &BenchArgs, folder: &Path) -> BenchArgs {
+fn of_start(args: &BenchArgs, folder: &Path) -> BenchArgs {
     let mut args = args.clone();
     args.out = Some(folder.to_owned());
     (args.starts, args.force, args.plot, args.json) = (1, false, false, false);
@@ -38,7 +50,7 @@ pub fn of_start(args: &BenchArgs, folder: &Path) -> BenchArgs {
 /// # Errors
 /// Fails if the arguments or a scene are faulty, a process fails, or Ctrl-C came. Starts that ended
 /// before are kept.
-pub fn run(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
+fn run_starts(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
     if args.scenes.len() > 1 {
         let n = args.scenes.len();
         return Err(Error::usage(format!("--starts takes one scene, found {n}")));

@@ -137,7 +137,7 @@ fn blocks_line(run: &Run) -> String {
         n => format!(" in {n} starts of the program"),
     };
     if let Some(PrecisionRecord { seed, .. }) = run.precision {
-        let how = format!("in random order (--seed {seed}), a part of the frames each");
+        let how = format!("in random order (--order-seed {seed}), a part of the frames each");
         return format!("{cases}{n} blocks{starts} {how}");
     }
     if !starts.is_empty() {

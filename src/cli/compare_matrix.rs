@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::args::CompareArgs;
-use super::compare::{allowed, line, percent, side, side_line, verdict_text};
+use super::compare_sides::{allowed, line, percent, side, side_line, verdict_text};
 use super::output::{self, or_dash};
 use crate::error::{Error, Result};
 use crate::timing::compare::{HEADLINE, LoopMatrix, matrix};

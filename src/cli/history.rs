@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::args::HistoryArgs;
-use super::compare::{line, side};
+use super::compare_sides::{line, side};
 use super::output::{self, claim_file, interval, or_dash, wrote};
 use super::revisions::{Repository, Revision, next_to_measure};
 use crate::error::{Error, Result};

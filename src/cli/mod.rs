@@ -19,6 +19,7 @@ mod clock_locks;
 mod compare;
 mod compare_matrix;
 mod compare_pictures;
+mod compare_sides;
 mod devices;
 #[cfg(feature = "window")]
 mod edit;
@@ -103,7 +104,7 @@ fn run(args: &Args, zones: Option<&Zones>) -> Result<()> {
         Command::Render(a) => render::run(a),
         Command::Bench(a) => {
             let (color, stop) = (args.color, graceful_stop());
-            bench::run(a, &bench::Context { color, stop, zones })
+            bench_starts::run(a, &bench::Context { color, stop, zones })
         }
         Command::Compare(a) => compare::run(a),
         Command::History(a) => history::run(a),

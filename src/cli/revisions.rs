@@ -106,7 +106,8 @@ mod tests {
     use super::*;
 
     fn revisions(n: u32) -> Vec<Revision> {
-        let of = |i| Revision { hash: format!("{i:040x}"), subject: format!("change {i}") };
+        let hash = |i: u32| format!("{i:x}").repeat(40);
+        let of = |i| Revision { hash: hash(i), subject: format!("change {i}") };
         (1..=n).map(of).collect()
     }
 

@@ -30,8 +30,8 @@ use super::student::student_95;
 
 /// Blocks that a list needs for an interval.
 pub const N_BLOCKS_NEEDED: usize = 8;
-/// Degrees of freedom that an interval over blocks needs. With fewer, Student's t is above 3, and no
-/// interval gets narrow.
+/// Degrees of freedom that an interval over blocks needs. With fewer, Student's t is above 3, and
+/// no interval gets narrow.
 const DEGREES_NEEDED: f64 = 4.0;
 /// Starts of a program that a list needs for an interval. With two, Student's t is 12.7.
 pub const N_STARTS_NEEDED: usize = 3;

@@ -8,10 +8,11 @@
 //! ([`attachments`]). [`still`] remarks on scenes in which nothing moves. [`compare`] compares
 //! results and gives each measure a [`verdict`]; [`difference`] lists what else differs between
 //! them. [`history`] finds changes in a series of results. [`parts`] joins a bench that several
-//! nodes timed, and [`starts`] one that several processes ran. [`trace`] writes the frames as a time
-//! line. [`state`] reads the clocks and the load of the machine beside the frames, and
-//! [`bench_state`] judges the frames by them. [`roofs`] are what a device can do at most, [`caches`]
-//! the size of its last cache level, and [`shares`] compares passes with both. [`invocations`]
+//! nodes timed, and [`starts`] one that several processes ran. [`trace`] writes the frames as a
+//! time line. [`state`] reads the clocks and the load of the machine beside the frames, and
+//! [`bench_state`] judges the frames by them. [`roofs`] are what a device can do at most,
+//! [`caches`] the size of its last cache level, and [`shares`] compares passes with both.
+//! [`invocations`]
 //! counts what passes invoke. [`machine`], [`names`] and [`json`] serve all of them, and the studies
 //! too.
 

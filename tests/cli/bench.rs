@@ -194,7 +194,7 @@ fn an_interrupted_bench_keeps_its_finished_part() {
     let (output, _) = signals::interrupt(&mut command, is_begun);
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(130));
-    let kept = format!("wrote {out}: what was finished, 3 files, listed in run.sha256\n");
+    let kept = format!("wrote {out}: what was finished, 4 files, listed in run.sha256\n");
     assert!(stderr.contains("keeps what is done") && stderr.contains(&kept), "{stderr}");
     assert_eq!(stderr.lines().count(), 3, "{stderr}");
     let json: Value =

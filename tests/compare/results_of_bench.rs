@@ -57,7 +57,7 @@ fn help_explains_intervals_and_shows_examples() {
         "--allow",
         "bench scenes/threads.toml --out before",
         "Exit codes",
-        "not the same",
+        "undecided",
     ] {
         assert!(help.contains(word), "{word} in\n{help}");
     }

@@ -83,9 +83,9 @@ pub struct BenchArgs {
     pub time_limit: f64,
     /// Seed of the order of blocks with --precision
     #[arg(long, value_name = "N", default_value_t = 0, requires = "precision")]
-    pub seed: u64,
-    /// Run the bench in this many processes, one after the other, and compare their times: one start
-    /// of a program differs from the next by more than its frames tell. Intervals need three
+    pub order_seed: u64,
+    /// Run the bench in this many processes, one after the other, and compare their times: one
+    /// start of a program differs from the next by more than its frames tell. Intervals need three
     #[arg(
         long,
         value_name = "N",

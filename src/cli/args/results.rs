@@ -105,7 +105,7 @@ pub struct ReportArgs {
     nimbus bench scenes/threads.toml --out night-3\n  \
     nimbus history night-1 night-2 night-3 -o history.html\n\n\
     Which revision brought the last change:\n  \
-    nimbus history night-* --bisect --repo .\n\n\
+    nimbus history night-1 night-2 night-3 --bisect --repo .\n\n\
     Exit codes: 0 read, whatever was found; 2 not comparable, or no results of nimbus bench.")]
 pub struct HistoryArgs {
     /// Results folders (`nimbus bench --out DIR`)

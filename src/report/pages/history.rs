@@ -78,12 +78,13 @@ fn section(runs: &[HistoryRun], of: &Series) -> Result<Markup> {
             value(Some(p.level)),
         ]
     };
+    let columns = ["run", "revision", "date", unit, "level"];
     let header = ["first run after", "revision", "after / before", "runs it may be", "chance"];
     Ok(html! {
         @if of.changes.is_empty() { p { "No change beyond the noise." } }
         @else { (table("Changes", &header, of.changes.iter().map(change))) }
         @for chart in &drawn { (chart) }
-        (table("Runs of this series", &["run", "revision", "date", unit, "level"], of.points.iter().map(row)))
+        (table("Runs of this series", &columns, of.points.iter().map(row)))
     })
 }
 

@@ -13,8 +13,10 @@ use crate::reference::picture::{FrameReference, PixelShares, SecondOf};
 const KEY: u32 = 0x6368_6b73;
 /// Facets whose second reflection is computed at a time.
 const N_AT_ONCE: usize = 16;
-/// Pixels that are computed whatever the time.
+/// Pixels that are computed beyond the budget, unless they take long.
 const N_LEAST: usize = 32;
+/// Time after which no further pixel is computed, beyond the budget.
+const LONGEST: Duration = Duration::from_secs(10);
 
 /// The facets whose second reflection is needed.
 #[derive(Debug, Clone, Default)]
@@ -83,7 +85,12 @@ impl Light {
         let mut light = Light { first, second: BTreeMap::new(), grid_error };
         let begin = Instant::now();
         let n_least = N_LEAST.min(plan.drawn.len());
-        light.add(second, plan.drawn[..n_least].iter().flat_map(|(_, facets)| *facets));
+        for pixels in plan.drawn[..n_least].chunks(N_AT_ONCE / 2) {
+            light.add(second, pixels.iter().flat_map(|(_, facets)| *facets));
+            if begin.elapsed() > budget.max(LONGEST) {
+                return light;
+            }
+        }
         let each_s = begin.elapsed().as_secs_f64() / light.second.len().max(1) as f64;
         let n_left = plan.seen.len() - light.second.len();
         if each_s * n_left as f64 <= budget.as_secs_f64() {

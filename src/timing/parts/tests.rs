@@ -94,12 +94,7 @@ fn part(range: Range<usize>) -> Part {
     let mut block_order = Vec::new();
     for round in 0..N_ROUNDS {
         let blocks = (0..numbers.len()).flat_map(|case| {
-            LOOPS.map(|threading| Block {
-                case,
-                threading: threading.to_owned(),
-                skip: true,
-                start: 0,
-            })
+            LOOPS.map(|of| Block { case, threading: of.to_owned(), skip: true, start: 0 })
         });
         let mut blocks: Vec<Block> = blocks.collect();
         if round % 2 == 1 {
@@ -219,8 +214,7 @@ fn the_state_of_each_part_is_kept() {
                 Some(CaseState { n_readings: 10 * load as usize + n, ..CaseState::default() });
         }
     }
-    // Results of an earlier version have no readings.
-    parts[1].state.clear();
+    parts[1].state.clear(); // Results of an earlier version have no readings.
     let Joined { run, state, .. } = join(&parts).unwrap();
     assert_eq!(run.state, None);
     let of_parts: Vec<_> = run.parts.iter().map(|part| part.state.clone()).collect();
@@ -232,14 +226,13 @@ fn the_state_of_each_part_is_kept() {
     // third part's first case is that of the first part.
     let blocks: Vec<(u32, f64)> =
         state.iter().map(|row| (row.block.unwrap(), row.gpu_mhz.unwrap())).collect();
-    let n = LOOPS.len() * N_ROUNDS;
-    assert_eq!(blocks.len(), n + 2 * n);
+    assert_eq!(blocks.len(), 3 * LOOPS.len() * N_ROUNDS);
     for (block, mhz) in blocks {
         let part = &parts[if mhz >= 400.0 { 2 } else { 0 }];
         let own = &part.run.block_order[mhz as usize % 100];
         let whole = &run.block_order[block as usize];
-        let number = numbers(&part.range)[own.case];
-        assert_eq!((number, &own.threading), (whole.case, &whole.threading));
+        assert_eq!(numbers(&part.range)[own.case], whole.case);
+        assert_eq!(own.threading, whole.threading);
     }
 }
 

@@ -6,8 +6,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::device_source::DeviceSource;
 use super::row::StateRow;
-use super::sources::DeviceSource;
 use super::sysfs;
 
 /// A card of the driver amdgpu.

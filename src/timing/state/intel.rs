@@ -5,8 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
+use super::device_source::DeviceSource;
 use super::row::StateRow;
-use super::sources::DeviceSource;
 use super::sysfs;
 
 /// A card of the driver i915 or Xe.

@@ -7,6 +7,7 @@
 
 mod amd;
 mod card;
+mod device_source;
 mod host;
 mod intel;
 mod nvml;
@@ -20,10 +21,11 @@ mod sysfs;
 mod text;
 
 pub use card::{AMD, INTEL, NVIDIA, card};
+pub use device_source::DeviceSource;
 pub use record::{CaseState, Drift, RunState, Spread, ThrottleCount};
 pub use row::{Event, STATE_FILE, StateRow, parse_rows, rows_text};
 pub use rules::{Flags, FrameMark};
 pub use sampler::{BlockWatch, Sampler, StateLog};
-pub use sources::{DeviceNames, DeviceSource, Folders, Sources};
+pub use sources::{DeviceNames, Folders, Sources};
 pub use summary::{BenchState, Observed, TimedFrame};
 pub use text::{case_line, remark_lines, run_line};

@@ -4,7 +4,7 @@
 pub use library::open;
 
 #[cfg(not(any(target_os = "linux", windows)))]
-use super::sources::DeviceSource;
+use super::device_source::DeviceSource;
 
 /// Returns the reader of a GPU.
 ///
@@ -55,8 +55,8 @@ mod library {
     use nvml_wrapper::error::NvmlError;
     use nvml_wrapper::{Device, Nvml};
 
+    use super::super::device_source::DeviceSource;
     use super::super::row::StateRow;
-    use super::super::sources::DeviceSource;
     use super::{Listed, place};
 
     /// The library, loaded once in a process.

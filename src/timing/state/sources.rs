@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::amd::AmdCard;
 use super::card::{AMD, INTEL, NVIDIA, card};
+use super::device_source::DeviceSource;
 use super::host::Host;
 use super::intel::IntelCard;
 use super::nvml;
@@ -23,15 +24,6 @@ impl Default for Folders {
     fn default() -> Folders {
         Folders { sys: PathBuf::from("/sys"), proc: PathBuf::from("/proc") }
     }
-}
-
-/// A reader of the clocks, heat and power of a device.
-pub trait DeviceSource {
-    /// Returns the name of the driver or library that is asked.
-    fn name(&self) -> &'static str;
-
-    /// Sets what the source tells at `time_s`, seconds since the start of the run.
-    fn read(&mut self, time_s: f64, row: &mut StateRow);
 }
 
 /// The sources of the state of one device and its host.

@@ -45,7 +45,8 @@ fn eight_rounds_of_segments_in_random_order_come_first() {
     assert!(table.contains("would take longer than --time-limit 0"), "{table}");
     let a = read_results(&dir.path().join("a")).expect("results");
     let asked = a.run.precision.expect("a precision");
-    assert_eq!((asked.wanted, asked.seed, asked.limit_s), (1e-9, 5, 0.0));
+    assert_eq!((asked.seed, asked.limit_s), (5, 0.0));
+    assert!((asked.wanted / 1e-9 - 1.0).abs() < 1e-12, "{}", asked.wanted);
     let case = &a.run.cases[0];
     let reached = case.precision.expect("a precision");
     assert_eq!((reached.rounds, reached.ended_by), (8, Some(Limit::Time)));
@@ -102,7 +103,7 @@ fn a_precision_needs_no_number_of_blocks() {
     for (words, what) in [
         (&["--precision", "2%", "--repeat", "3"][..], "cannot be used with"),
         (&["--precision", "0"], "expected a share such as 1%"),
-        (&["--precision", "2%", "--time-limit", "-1"], "expected seconds"),
+        (&["--precision", "2%", "--time-limit=-1"], "expected seconds"),
         (&["--time-limit", "3"], "--precision"),
     ] {
         let (code, _, stderr) = bench(dir.path(), "refused", words);
@@ -118,7 +119,7 @@ fn starts_are_processes_whose_frames_are_joined() {
     let (code, table, stderr) = bench(dir.path(), "a", &three);
     assert_eq!(code, 0, "{stderr}");
     assert!(stderr.contains("files, listed in"), "{stderr}");
-    assert!(!stderr.contains("as-start") && !stderr.contains("/tmp/.tmp"), "{stderr}");
+    assert!(!stderr.contains("as-start") && stderr.lines().count() == 1, "{stderr}");
     let results = read_results(&dir.path().join("a")).expect("results");
     let starts: Vec<u32> = results.run.block_order.iter().map(|b| b.start).collect();
     assert_eq!(starts, [0, 0, 0, 1, 1, 1, 2, 2, 2]);

@@ -102,14 +102,9 @@ pub struct Block {
     pub threading: String,
     /// Whether frames skip passes.
     pub skip: bool,
-    /// Number of the start of the program that ran it; left out for the first.
-    #[serde(default, skip_serializing_if = "is_first")]
+    /// Number of the start of the program that ran it, from 0.
+    #[serde(default)]
     pub start: u32,
-}
-
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_first(start: &u32) -> bool {
-    *start == 0
 }
 
 /// The scene in one of its phases, at one point of the sweep.

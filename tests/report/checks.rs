@@ -150,9 +150,9 @@ pub fn without_scripts(browser: &mut Browser) {
     assert_eq!(n(".slider"), 0);
     assert_eq!(n("thead button"), 0);
     assert_eq!(n("figure.chart svg"), 10);
-    // Per bench: loops, cases, passes, floors; of the study: configurations and budgets; the ledger; of
-    // the comparison: differences and ratios.
-    assert_eq!(n("table"), 2 * 4 + 2 + 1 + 2);
+    // Per bench: loops, cases, passes, floors, state; of the study: configurations and budgets; the
+    // ledger; of the comparison: differences, ratios, errors and memory.
+    assert_eq!(n("table"), 2 * 5 + 2 + 1 + 4);
     assert_eq!(n(".mark title"), n(".mark"));
     assert!(n(".mark") > 23);
     // The benches' last frames; the study's reference, three pictures and three error maps; two

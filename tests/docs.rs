@@ -130,6 +130,10 @@ fn shrink(mut args: Vec<String>) -> Vec<String> {
     let is_left_out = |option: &str| {
         (sweeps_size && option == "--size") || (has_precision && option == "--repeat")
     };
+    // A narrow one takes minutes on a busy machine.
+    if let Some(i) = args.iter().position(|a| a == "--precision") {
+        args[i + 1] = "50%".to_owned();
+    }
     for (option, value) in options.iter().filter(|(option, _)| !is_left_out(option)) {
         match args.iter().position(|a| a == option) {
             Some(i) => args[i + 1] = (*value).to_owned(),

@@ -7,8 +7,8 @@
 // chains an invocation cover the latency of a multiplication and a sum on a processor that begins
 // two a cycle, and its sixteen registers hold them. Vectors of 64-bit numbers take two registers,
 // so that eight chains do.
-// A step is x = a x + b. The host passes a = b = 1, which the compiler does not know, so that each
-// chain ends at its start plus the number of steps, exactly in every format.
+// A step is x = a x + b. The host passes a = b = 1, which the compiler does not know. Each chain
+// then ends at its start plus the number of steps, exactly in every format.
 
 // 0: f32; 1: f64; 2: f16; 3: 32-bit integers; 4: 64-bit integers.
 #ifndef KIND

@@ -298,8 +298,8 @@ def median_interval(values: Sequence[float]) -> Optional[Interval]:
 def ratio_of_medians(b: Sequence[float], a: Sequence[float]) -> Optional[Interval]:
     """Returns median(b) / median(a) and its 95 % interval, as nimbus compare does.
 
-    Both lists are in the order in which they were measured. If the interval contains 1, no
-    difference was found, which is not "equal". None for fewer than 30 values of one of them, or if
+    Both lists are in the order in which they were measured. If the interval contains 1, it is
+    not decided which is faster. None for fewer than 30 values of one of them, or if
     the median of `a` is 0, or is 0 in a resample.
     """
     lists = [np.asarray(values, dtype=np.float64).ravel() for values in (b, a)]

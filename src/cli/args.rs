@@ -84,10 +84,12 @@ pub enum Command {
     ///
     /// For two results folders: the medians of A and B, their ratio B / A with a 95 % interval, and
     /// a verdict, for every loop that both ran and for frame, game step, render step, GPU and each
-    /// pass; and the errors of their pictures. "the same" means that the whole interval lies within
-    /// --margin, "faster" and "slower" that it lies beyond. "undecided" means that it crosses the
-    /// margin; the table says how many more frames would decide. For more than two folders: a
+    /// pass. The errors of pictures and device memory are compared, too. For more than two folders: a
     /// matrix of the frame times, each run against each.
+    ///
+    /// "the same" means that the whole interval lies within --margin. "faster" and "slower" mean
+    /// that it lies beyond. "undecided" means that it crosses an end of the margin; the table says
+    /// how many more frames would decide.
     ///
     /// Only `frame` is the headline. The other rows are not corrected for many comparisons: of
     /// twenty, one will be beyond its interval.
@@ -106,11 +108,10 @@ pub enum Command {
     /// Find where frame times or errors changed in a series of results
     ///
     /// The runs are ordered by the revisions that they measured. A change is a step of the median
-    /// frame time, or of the error, beyond the noise between runs: with three runs or more on each
-    /// side, and so great that a series without a change shows one like it once in a thousand. Each
-    /// has an interval of its size, and the runs that it may lie between. One slow run is no
-    /// change. Of runs with 0.5 % noise between them, a step of 3 % is found with the third run
-    /// after it.
+    /// frame time, or of the error, beyond the noise between runs. It has three runs or more on
+    /// each side. A series without a change shows such a step once in a thousand. Each change has
+    /// an interval of its size, and the runs that it may lie between. One slow run is no change.
+    /// Where runs differ by 0.5 %, the third run after a step of 3 % shows it in 98 of 100 series.
     History(HistoryArgs),
     /// Measure run time against error over a scene's knobs: how much error does a millisecond buy?
     ///

@@ -98,7 +98,7 @@ impl Recorder {
             trace::write(file, &outcome.samples, zones.as_ref(), clock)?;
         }
         let quiet = args.options.quiet;
-        // Nobody looks into the folder of a start.
+        // The folder of a start is read by its parent and then removed.
         let folder = lock_folder(&self.folder);
         if let Some(folder) = folder.as_ref().filter(|_| args.as_start.is_none()) {
             output::wrote_folder(folder, !run.interrupted, quiet);

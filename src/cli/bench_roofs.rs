@@ -1,11 +1,12 @@
-//! What `nimbus bench` prints of roofs and of cold caches.
+//! The lines and the table of `nimbus bench` on roofs and cold caches.
 
 use super::bench_remarks::ms;
 use super::output::{or_dash, table};
 use crate::timing::records::{Case, Pass, Run};
 
-/// Returns the table of a case's passes with their least work and the share of the roof that they
-/// reach in the loop without skipping, or else in the first loop; empty if no pass has a floor.
+/// Returns the table of a case's passes: their least work, and the share of the roof that they
+/// reach. The times are those of the loop without skipping, or else of the first loop. The table is
+/// empty if no pass has a floor.
 pub fn case_text(case: &Case) -> String {
     let whole = case.modes.iter().find(|mode| !mode.skip).or(case.modes.first());
     let passes = whole.map_or(&[][..], |mode| &mode.passes);

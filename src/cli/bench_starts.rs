@@ -130,9 +130,9 @@ fn same_pictures(starts: &[Start], i_case: usize) -> Option<bool> {
     (n_known > 1).then(|| all.windows(2).all(|w| w[0] == w[1]))
 }
 
-/// Runs one start. It is told where its results go by an argument that follows the command's name;
-/// all other arguments are those of this process. Its messages are printed if it `tells`.
-fn start(place: &Path, context: &Context<'_>, tells: bool) -> Result<()> {
+/// Runs one start. It has the arguments of this process, and one more after the command's name: the
+/// folder of its results. Its messages are printed if `is_told`.
+fn start(place: &Path, context: &Context<'_>, is_told: bool) -> Result<()> {
     let program = process::program()?;
     let mut command = process::quiet(&program);
     command.args(words(std::env::args_os().skip(1), place));
@@ -150,8 +150,8 @@ fn start(place: &Path, context: &Context<'_>, tells: bool) -> Result<()> {
     }
     match status.code() {
         Some(0) => {
-            // What the first start says of the scene holds for all.
-            if tells {
+            // All starts give the same messages about the scene; those of the first are printed.
+            if is_told {
                 text.lines().for_each(|line| say!("{line}"));
             }
             Ok(())

@@ -1,4 +1,4 @@
-//! What became of a capture that `--capture` asked for.
+//! The message about a frame that `--capture` asked for.
 
 use crate::gpu::Captured;
 use crate::io::console::say;

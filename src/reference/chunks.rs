@@ -49,24 +49,13 @@ pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> Bounded {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
     use crate::reference::Blob;
     use crate::reference::composite::Rounding;
     use crate::reference::sprites::{Sprites, render_over as far_to_near};
     use crate::reference::view::View;
 
-    const VIEW: View = View {
-        width: 1,
-        height: 1,
-        pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
-        fov_y_rad: 1.0,
-        near: 0.5,
-        cutoff: 3.0,
-        threshold: 0.0,
-        smallest: 0.0,
-        shift: glam::DVec2::ZERO,
-    };
+    const VIEW: View = View::ONE_PIXEL;
 
     fn layer(z: f64, tau: f64) -> Blob {
         Blob {

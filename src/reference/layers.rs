@@ -35,23 +35,11 @@ pub fn n_layers(view: &View, blobs: &[Blob], reach: f64) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use glam::{DVec2, DVec3};
+    use glam::DVec3;
 
     use super::*;
-    use crate::model::camera::Pose;
 
-    /// Eye at the origin, looking along −z.
-    const VIEW: View = View {
-        width: 1,
-        height: 1,
-        pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
-        fov_y_rad: 1.0,
-        near: 0.5,
-        cutoff: 3.0,
-        threshold: 0.0,
-        smallest: 0.0,
-        shift: DVec2::ZERO,
-    };
+    const VIEW: View = View::ONE_PIXEL;
 
     #[test]
     fn layers_are_counted_where_blobs_lie() {

@@ -92,25 +92,13 @@ pub fn sums_at(
 
 #[cfg(test)]
 mod tests {
-    use glam::{DVec2, DVec3};
+    use glam::DVec3;
 
     use super::*;
-    use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
     use crate::reference::Blob;
 
-    /// Eye at the origin, looking along −z, one pixel.
-    const VIEW: View = View {
-        width: 1,
-        height: 1,
-        pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
-        fov_y_rad: 1.0,
-        near: 0.5,
-        cutoff: 3.0,
-        threshold: 0.0,
-        smallest: 0.0,
-        shift: DVec2::ZERO,
-    };
+    const VIEW: View = View::ONE_PIXEL;
 
     fn blob(z: f64, tau: f64) -> Blob {
         let kappa = tau / (SQRT_TAU * 0.25);

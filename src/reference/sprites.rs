@@ -288,21 +288,9 @@ pub fn alpha(tau: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
 
-    /// Eye at the origin, looking along −z, one pixel.
-    const VIEW: View = View {
-        width: 1,
-        height: 1,
-        pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
-        fov_y_rad: 1.0,
-        near: 0.5,
-        cutoff: 3.0,
-        threshold: 0.0,
-        smallest: 0.0,
-        shift: DVec2::ZERO,
-    };
+    const VIEW: View = View::ONE_PIXEL;
 
     #[test]
     fn shares_are_those_of_opacities_near_before_far() {

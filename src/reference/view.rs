@@ -29,6 +29,22 @@ pub struct View {
     pub shift: DVec2,
 }
 
+#[cfg(test)]
+impl View {
+    /// Eye at the origin, looking along −z, one pixel.
+    pub(super) const ONE_PIXEL: View = View {
+        width: 1,
+        height: 1,
+        pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
+        fov_y_rad: 1.0,
+        near: 0.5,
+        cutoff: 3.0,
+        threshold: 0.0,
+        smallest: 0.0,
+        shift: DVec2::ZERO,
+    };
+}
+
 impl View {
     pub(super) fn half_slopes(&self) -> (f64, f64) {
         let tan = (0.5 * self.fov_y_rad).tan();

@@ -129,10 +129,7 @@ impl Bench<'_> {
         if let Some(bytes) = self.plan.cold_bytes.filter(|_| is_new) {
             stage.set_cold(bytes)?;
         }
-        let has_several = self.cases.len() > 1;
-        let named = |note: &String| {
-            if has_several { format!("{}: {note}", case.name()) } else { note.clone() }
-        };
+        let named = |note: &String| named(self.cases, i_case, note);
         lock(self.outcome).chosen.extend(stage.take_chosen().iter().map(named));
         let is_stopped = || self.stop.load(Ordering::Relaxed);
         run_frames(stage, self.outcome, (block, i_block), (case, self.plan), &mut || {
@@ -208,10 +205,7 @@ impl Bench<'_> {
     fn end_case(&mut self, i_case: usize) -> Result<()> {
         let Some(stage) = &mut self.stage else { return Ok(()) };
         let case = &self.cases[i_case];
-        let has_several = self.cases.len() > 1;
-        let named = |note: &String| {
-            if has_several { format!("{}: {note}", case.name()) } else { note.clone() }
-        };
+        let named = |note: &String| named(self.cases, i_case, note);
         let last = lock(self.outcome)
             .samples
             .last()
@@ -244,6 +238,14 @@ impl Bench<'_> {
             lock(self.outcome).pictures.push(picture);
         }
         Ok(())
+    }
+}
+
+/// Returns a note with the name of its case, if there are several.
+fn named(cases: &[Case], i_case: usize, note: &str) -> String {
+    match cases {
+        [_] => note.to_owned(),
+        _ => format!("{}: {note}", cases[i_case].name()),
     }
 }
 

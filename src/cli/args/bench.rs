@@ -124,9 +124,9 @@ pub struct BenchArgs {
     /// Replace existing results
     #[arg(long)]
     pub force: bool,
-    /// Make caches cold before each pass: the device writes MIB MiB, by default as much as its last
-    /// cache level holds (256 MiB on a GPU, a bound), outside of the pass's time. Times of passes
-    /// then are those of data from memory; times of frames contain the writes and are no figure
+    /// Make caches cold before each pass: the device writes MIB MiB, outside of the pass's time.
+    /// By default it writes as much as its last cache level holds (256 MiB on a GPU, a bound).
+    /// Passes then find their data in memory. Times of frames contain the writes and are no figure
     #[arg(
         long,
         value_name = "MIB",

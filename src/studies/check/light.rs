@@ -15,7 +15,8 @@ const KEY: u32 = 0x6368_6b73;
 const N_AT_ONCE: usize = 16;
 /// Pixels that are computed beyond the budget, unless they take long.
 const N_LEAST: usize = 32;
-/// Time after which no further pixel is computed, beyond the budget.
+/// Time after which no further pixel is computed, even if fewer than [`N_LEAST`] are: a check is to
+/// take seconds.
 const LONGEST: Duration = Duration::from_secs(10);
 
 /// The facets whose second reflection is needed.

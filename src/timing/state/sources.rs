@@ -104,9 +104,13 @@ impl Sources {
         if let Some(memory) = self.memory.as_ref().map(MemoryProbe::read) {
             row.process_bytes = memory.process;
             row.own_bytes = Some(memory.own);
-            // Until the frames of a block begin, the memory may be that of the case before.
-            let is_of_block = matches!(event, Event::Tick | Event::End);
-            row.own_peak_bytes = Some(if is_of_block { memory.own_peak } else { memory.own });
+            row.own_peak_bytes = match event {
+                Event::Tick => Some(memory.own_peak),
+                // The end is read after the block, when other work may have allocated.
+                Event::End => None,
+                // Until the frames of a block begin, the peak may be that of the case before.
+                Event::Start | Event::Begin => Some(memory.own),
+            };
         }
         self.host.read_fast(&mut row);
         if event != Event::Tick {

@@ -84,8 +84,8 @@ pub enum Command {
     ///
     /// For two results folders: the medians of A and B, their ratio B / A with a 95 % interval, and
     /// a verdict, for every loop that both ran and for frame, game step, render step, GPU and each
-    /// pass. The errors of pictures and device memory are compared, too. For more than two folders: a
-    /// matrix of the frame times, each run against each.
+    /// pass. The errors of pictures and device memory are compared, too. For more than two folders:
+    /// a matrix of the frame times, each run against each.
     ///
     /// "the same" means that the whole interval lies within --margin. "faster" and "slower" mean
     /// that it lies beyond. "undecided" means that it crosses an end of the margin; the table says

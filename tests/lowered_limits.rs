@@ -48,6 +48,15 @@ fn picture(context: &GpuContext, scene: &Scene) -> Result<Vec<u8>, Error> {
     renderer.image_bytes()
 }
 
+/// Returns how many bytes of two pictures differ, and the first of them.
+fn difference(found: &[u8], expected: &[u8]) -> String {
+    let differ = |i: &usize| found.get(*i) != expected.get(*i);
+    let n = (0..found.len().max(expected.len())).filter(differ).count();
+    let first: Vec<_> =
+        (0..found.len()).filter(differ).map(|i| (i, found[i], expected.get(i))).take(8).collect();
+    format!("{n} of {} bytes differ; (byte, found, expected): {first:?}", expected.len())
+}
+
 #[test]
 fn every_scene_draws_the_same_picture_under_the_limits_of_other_devices() {
     let whole = open(None);
@@ -59,7 +68,7 @@ fn every_scene_draws_the_same_picture_under_the_limits_of_other_devices() {
             for (name, context) in &others {
                 let what = format!("{} by {draw:?} on {name}", path.display());
                 let found = picture(context, &scene).unwrap_or_else(|e| panic!("{what}: {e}"));
-                assert!(found == expected, "{what}: another picture");
+                assert!(found == expected, "{what}: {}", difference(&found, &expected));
             }
         }
     }

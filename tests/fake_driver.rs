@@ -4,6 +4,8 @@
 //! `fake_driver/icd.c` is a Vulkan driver that passes all calls on to lavapipe, but for the faults
 //! that environment variables ask for. It also counts the objects that are never destroyed.
 
+#[path = "harness/driver_files.rs"]
+mod driver_files;
 #[path = "harness/fixtures.rs"]
 mod fixtures;
 
@@ -13,16 +15,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use driver_files::{DriverFiles, MANIFEST_VARIABLES};
 use fixtures::Fixtures;
 use rayon::prelude::*;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Folders in which the loader looks for the manifests of drivers.
-const MANIFEST_FOLDERS: [&str; 3] =
-    ["/etc/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/usr/share/vulkan/icd.d"];
-/// Variables that name manifests, the newer one first.
-const MANIFEST_VARIABLES: [&str; 2] = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"];
 /// A run takes a fraction of a second. One that takes longer than this hangs.
 const MOST_S: u64 = 120;
 /// Distinct calls that the runs below make and that can fail, without `ASKED_BY_TIME`. Fewer are a
@@ -34,12 +32,10 @@ const ASKED_BY_TIME: &str = "vkGetSemaphoreCounterValue";
 const DEVICE: i32 = 3;
 const LIMIT: i32 = 2;
 
-/// The fake driver, compiled, and a folder with a small scene.
+/// The fake driver, and a folder with a small scene.
 struct FakeDriver {
     scene: Fixtures,
-    folder: TempDir,
-    /// Library of the driver that does the work.
-    real: String,
+    driver: DriverFiles,
 }
 
 /// A run of nimbus that has ended.
@@ -83,25 +79,7 @@ enum Place {
 
 impl FakeDriver {
     fn new() -> FakeDriver {
-        let folder = tempfile::tempdir().expect("a folder");
-        for (name, define) in [("first", "-DFIRST"), ("second", "-DSECOND")] {
-            let library = folder.path().join(format!("lib{name}.so"));
-            compile(&library, define);
-            let manifest = serde_json::json!({
-                "file_format_version": "1.0.0",
-                "ICD": { "library_path": library, "api_version": "1.3.0" },
-            });
-            let path = folder.path().join(format!("{name}.json"));
-            fs::write(path, manifest.to_string()).expect("room");
-        }
-        FakeDriver { scene: Fixtures::new(), folder, real: lavapipe() }
-    }
-
-    /// Returns the manifests of drivers of these names, as the loader's variables list them.
-    fn manifests(&self, names: &[&str]) -> String {
-        let path =
-            |name: &&str| self.folder.path().join(format!("{name}.json")).display().to_string();
-        names.iter().map(path).collect::<Vec<_>>().join(":")
+        FakeDriver { scene: Fixtures::new(), driver: DriverFiles::new() }
     }
 
     /// Runs a command line on the first driver, with variables of the fake driver or the loader.
@@ -111,13 +89,11 @@ impl FakeDriver {
 
     /// Runs a command line that writes into the folder `out`.
     fn run_in(&self, out: TempDir, line: &str, variables: &[(&str, &str)]) -> Ended {
-        let notes = tempfile::tempdir_in(self.folder.path()).expect("a folder");
+        let notes = tempfile::tempdir_in(self.driver.folder()).expect("a folder");
         let [stdout, stderr, log] = ["stdout", "stderr", "log"].map(|n| notes.path().join(n));
         let line = line.replace("{}", &out.path().display().to_string());
         let mut command = self.scene.command(line.split(' '));
-        let manifests = self.manifests(&["first"]);
-        command.envs(MANIFEST_VARIABLES.map(|name| (name, &manifests)));
-        command.env("NIMBUS_FAKE_REAL", &self.real).env("NIMBUS_FAKE_LOG", &log);
+        command.envs(self.driver.variables()).env("NIMBUS_FAKE_LOG", &log);
         command.envs(variables.iter().copied());
         // Files, and not pipes, which a program that hangs would leave open.
         command.stdin(Stdio::null());
@@ -131,7 +107,7 @@ impl FakeDriver {
 
     /// Returns how often a job makes each call that can fail.
     fn counts(&self, job: Job) -> BTreeMap<String, u64> {
-        let path = self.folder.path().join("counts");
+        let path = self.driver.folder().join("counts");
         let _ = fs::remove_file(&path);
         let ended = self.run(job.line, &[("NIMBUS_FAKE_COUNTS", path.to_str().expect("UTF-8"))]);
         assert!(ended.status.success() && ended.log.is_empty(), "{}{}", ended.stderr, ended.log);
@@ -194,44 +170,6 @@ fn n_tries(call: &str) -> usize {
 /// Whether a call waits for the device at the very end, when no result is left to be written.
 fn is_last_wait(call: &str) -> bool {
     ["vkDeviceWaitIdle", "vkWaitSemaphores"].contains(&call)
-}
-
-/// Compiles the fake driver.
-fn compile(library: &Path, define: &str) {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fake_driver/icd.c");
-    let options = ["-std=gnu11", "-O1", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"];
-    let mut command = Command::new("cc");
-    command.args(options).args(["-fvisibility=hidden", define, "-o"]).arg(library).arg(source);
-    let output = command.args(["-ldl", "-lpthread"]).output();
-    let output = output.expect("`cc`, a C compiler, which tools/bootstrap installs");
-    assert!(output.status.success(), "cc: {}", String::from_utf8_lossy(&output.stderr));
-}
-
-/// Returns the library of Mesa's software driver.
-fn lavapipe() -> String {
-    let named = MANIFEST_VARIABLES.iter().filter_map(std::env::var_os);
-    let places = named.flat_map(|paths| std::env::split_paths(&paths).collect::<Vec<_>>());
-    let files = |place: PathBuf| match fs::read_dir(&place) {
-        Ok(entries) => entries.flatten().map(|entry| entry.path()).collect(),
-        Err(_) => vec![place],
-    };
-    let is_lavapipe = |path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.starts_with("lvp_icd") && name.ends_with(".json") && path.is_file()
-    };
-    let manifest = places
-        .chain(MANIFEST_FOLDERS.map(PathBuf::from))
-        .flat_map(files)
-        .find(is_lavapipe)
-        .expect("lavapipe's manifest lvp_icd.*.json, which tools/bootstrap installs");
-    let text = fs::read_to_string(&manifest).expect("the manifest");
-    let json: Value = serde_json::from_str(&text).expect("JSON");
-    let library = json["ICD"]["library_path"].as_str().expect("a path");
-    // A name without a folder is searched for by the linker, another one from the manifest on.
-    match library.contains('/') {
-        true => manifest.with_file_name(library).display().to_string(),
-        false => library.to_owned(),
-    }
 }
 
 /// Waits for a command to end; kills it if it hangs.
@@ -423,7 +361,7 @@ fn what_the_driver_says_of_a_loss_is_in_the_message() {
 #[test]
 fn commands_of_a_pass_have_its_name_as_a_label() {
     let driver = FakeDriver::new();
-    let path = driver.folder.path().join("labels");
+    let path = driver.driver.folder().join("labels");
     for limit in ["", " --max-submit-ms 0.01"] {
         let _ = fs::remove_file(&path);
         let line = format!("{}{limit}", RENDER.line);
@@ -461,11 +399,11 @@ fn the_list_of_devices_is_clear_on_every_machine() {
     let one = devices(&[], 0).0;
     assert!(one.starts_with("0: llvmpipe") && one.matches("<- used").count() == 1, "{one}");
 
-    let names = driver.manifests(&["first", "second"]);
+    let names = driver.driver.manifests(&["first", "second"]);
     let two = devices(&MANIFEST_VARIABLES.map(|name| (name, &names[..])), 0).0;
     assert!(two.contains(": second (discrete)  <- used") && two.contains(": llvmpipe"), "{two}");
 
-    let missing = driver.manifests(&["missing"]);
+    let missing = driver.driver.manifests(&["missing"]);
     let (_, error) = devices(&MANIFEST_VARIABLES.map(|name| (name, &missing[..])), DEVICE);
     assert!(error.contains("there is no Vulkan driver; "), "{error}");
 

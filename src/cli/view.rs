@@ -12,7 +12,9 @@ use super::output::{self, header};
 use super::scene::{device_choice, load_with_files, typed_overrides};
 use crate::error::Result;
 use crate::measure::stats::Summary;
-use crate::viewer::scene_window::{self, LoopTimes, Options, SceneSource, WindowTimes};
+use crate::viewer::scene_window::{
+    self, LoopTimes, Options, RenderTimes, SceneSource, ShownTimes, WindowTimes,
+};
 
 /// Runs `nimbus view` until its window is closed.
 ///
@@ -30,22 +32,25 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
     let _keeping = interrupt::close_window(PATIENCE_WITH_CHILDREN);
     let mut choice = device_choice(&args.options);
     choice.options.captured_frame = args.capture;
-    let WindowTimes { loops, panels_ms, captured } = scene_window::run(Options {
-        source,
-        choice,
-        skips: !args.options.no_skip,
-        mode: args.present,
-        n_frames: args.frames,
-        stop,
-        is_quiet: args.options.quiet,
-        has_panels: !args.no_panels,
-        captures: args.captures.clone(),
-    })?;
+    let WindowTimes { frames: RenderTimes { loops, shown }, panels_ms, captured } =
+        scene_window::run(Options {
+            source,
+            choice,
+            skips: !args.options.no_skip,
+            mode: args.present,
+            n_frames: args.frames,
+            stop,
+            is_quiet: args.options.quiet,
+            has_panels: !args.no_panels,
+            captures: args.captures.clone(),
+        })?;
     capture_note::print(captured, args.capture, args.options.quiet);
     if args.json {
         let rows: Vec<Value> = loops.iter().map(row).collect();
         let panels = Summary::of(&panels_ms).map(|s| numbers(&s));
-        return output::object(&json!({ "loops": rows, "panels": panels }));
+        return output::object(&json!({
+            "loops": rows, "panels": panels, "shown": shown.as_ref().map(shown_json),
+        }));
     }
     let mut table = header(["loop", "panels", "n", "p50 ms", "p95", "p99", "max"]);
     table.extend(loops.iter().map(|t| {
@@ -55,7 +60,30 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         [vec![t.threading.name().to_owned(), panels.to_owned(), s.n.to_string()], times.to_vec()]
             .concat()
     }));
-    output::text(&output::table(&table))
+    let mut text = output::table(&table);
+    if let Some(line) = shown.as_ref().and_then(shown_line) {
+        text.push_str(&line);
+    }
+    output::text(&text)
+}
+
+/// Returns a line on the times at which pictures became visible; `None` without pictures.
+fn shown_line(shown: &ShownTimes) -> Option<String> {
+    let [interval, to_screen] = [shown.intervals()?, shown.to_screen()?];
+    Some(format!(
+        "{} pictures were seen, {} were replaced before; one each {:.3} ms (p99 {:.3}), {:.3} ms \
+         after the start of its game step (p99 {:.3})\n",
+        to_screen.n, shown.n_replaced, interval.p50, interval.p99, to_screen.p50, to_screen.p99
+    ))
+}
+
+fn shown_json(shown: &ShownTimes) -> Value {
+    json!({
+        "n": shown.frames.len(),
+        "n_replaced": shown.n_replaced,
+        "interval_ms": shown.intervals().as_ref().map(numbers),
+        "to_screen_ms": shown.to_screen().as_ref().map(numbers),
+    })
 }
 
 fn row(times: &LoopTimes) -> Value {

@@ -59,6 +59,8 @@ pub(super) struct SharedDevice {
     pub executed: Executed,
     /// Whether the device may be at work for ever, so that nothing that it may use can be freed.
     is_abandoned: AtomicBool,
+    /// Whether the times at which presented pictures are visible can be asked for.
+    pub tells_shown: bool,
     /// Whether commands can count invocations.
     pub counts_invocations: bool,
     /// The frame to capture, if one is to be captured.
@@ -141,6 +143,7 @@ impl Device {
             pass_times: options.pass_times,
             executed: Executed::default(),
             is_abandoned: AtomicBool::new(false),
+            tells_shown: presents(instance, &info) && info.tells_shown,
             counts_invocations,
             capture,
             reports: options.reports_pipelines.then(|| Reports::new(statistics)),
@@ -323,6 +326,11 @@ impl<H: vk::Handle + Copy> Drop for Owned<H> {
     }
 }
 
+/// Whether a device is opened to present to windows.
+fn presents(instance: &Instance, info: &DeviceInfo) -> bool {
+    !instance.vulkan.surface_extensions.is_empty() && info.has_swapchain
+}
+
 fn create(
     instance: &Instance,
     info: &DeviceInfo,
@@ -335,18 +343,23 @@ fn create(
         .queue_family_index(info.queue_family)
         .queue_priorities(&priorities)];
     let (mut v12, mut v13) = features::enabled(&info.limits);
-    let presents = !instance.vulkan.surface_extensions.is_empty() && info.has_swapchain;
+    let presents = presents(instance, info);
     let swapchain = presents.then_some(khr::swapchain::NAME);
+    let tells_shown = presents && info.tells_shown;
+    let [present_id, present_wait] =
+        [khr::present_id::NAME, khr::present_wait::NAME].map(|name| tells_shown.then_some(name));
     let statistics = has_statistics.then_some(khr::pipeline_executable_properties::NAME);
     // A device that has it demands that it is enabled.
     let portable = info.is_portable.then_some(khr::portability_subset::NAME);
     let faults = info.tells_faults.then_some(ext::device_fault::NAME);
     let calibration = info.clock_calibration.map(|calibration| calibration.extension);
-    let optional = [calibration, swapchain, statistics, portable, faults];
+    let optional = [calibration, swapchain, present_id, present_wait, statistics, portable, faults];
     let extensions: Vec<_> = optional.into_iter().flatten().map(CStr::as_ptr).collect();
     let mut fault = vk::PhysicalDeviceFaultFeaturesEXT::default().device_fault(true);
     let mut executables = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default()
         .pipeline_executable_info(true);
+    let mut ids = vk::PhysicalDevicePresentIdFeaturesKHR::default().present_id(true);
+    let mut waits = vk::PhysicalDevicePresentWaitFeaturesKHR::default().present_wait(true);
     let features = vk::PhysicalDeviceFeatures::default()
         .shader_int64(info.limits.has_int64)
         .shader_float64(info.limits.has_float64)
@@ -361,6 +374,9 @@ fn create(
         .push_next(&mut v13);
     if has_statistics {
         create = create.push_next(&mut executables);
+    }
+    if tells_shown {
+        create = create.push_next(&mut ids).push_next(&mut waits);
     }
     if info.tells_faults {
         create = create.push_next(&mut fault);

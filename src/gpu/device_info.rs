@@ -38,6 +38,8 @@ pub struct DeviceInfo {
     pub limits: Limits,
     /// Whether it can present to windows.
     pub has_swapchain: bool,
+    /// Whether it tells when presented pictures are visible (VK_KHR_present_wait).
+    pub tells_shown: bool,
     /// The way in which the device reads its clock and the host's at one moment, where it can.
     pub clock_calibration: Option<ClockCalibration>,
     /// Whether the device is one over another API (VK_KHR_portability_subset), such as MoltenVK's.
@@ -195,6 +197,7 @@ impl DeviceInfo {
                 timestamp_period_ns: f64::from(limits.timestamp_period),
             },
             has_swapchain: has_extension(vulkan, physical, khr::swapchain::NAME),
+            tells_shown: features::has_present_wait(vulkan, physical),
             clock_calibration: clock_calibration(instance, physical),
             is_portable: has_extension(vulkan, physical, khr::portability_subset::NAME),
             has_pipeline_statistics: has_pipeline_statistics(vulkan, physical),
@@ -222,6 +225,7 @@ impl DeviceInfo {
             unusable: None,
             limits,
             has_swapchain: false,
+            tells_shown: false,
             clock_calibration: None,
             is_portable: false,
             has_pipeline_statistics: false,

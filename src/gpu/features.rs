@@ -1,7 +1,8 @@
 //! Features of Vulkan 1.2 and 1.3 that devices are opened with.
 
-use ash::vk;
+use ash::{khr, vk};
 
+use super::extensions::has_extension;
 use super::limits::Limits;
 
 /// Returns the features that nimbus enables: those that it needs, and 16-bit floats where the
@@ -29,4 +30,17 @@ pub(super) fn has_float16(instance: &ash::Instance, physical: vk::PhysicalDevice
     // A device that is older than Vulkan 1.2 leaves the structure as it is.
     unsafe { instance.get_physical_device_features2(physical, &mut all) };
     v12.shader_float16 == vk::TRUE
+}
+
+/// Returns whether a device tells when the pictures that it presents are visible.
+pub(super) fn has_present_wait(instance: &ash::Instance, physical: vk::PhysicalDevice) -> bool {
+    let extensions = [khr::swapchain::NAME, khr::present_id::NAME, khr::present_wait::NAME];
+    if !extensions.iter().all(|name| has_extension(instance, physical, name)) {
+        return false;
+    }
+    let mut id = vk::PhysicalDevicePresentIdFeaturesKHR::default();
+    let mut wait = vk::PhysicalDevicePresentWaitFeaturesKHR::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut id).push_next(&mut wait);
+    unsafe { instance.get_physical_device_features2(physical, &mut all) };
+    [id.present_id, wait.present_wait] == [vk::TRUE; 2]
 }

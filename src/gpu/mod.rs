@@ -49,6 +49,8 @@ mod rate;
 mod recorder;
 mod reflect;
 mod shader;
+#[cfg(feature = "window")]
+mod shown;
 mod stamp;
 mod statistics;
 #[cfg(feature = "window")]
@@ -88,6 +90,8 @@ pub use pass_times::PassTimes;
 pub use recorder::{DeviceCount, RecordCount, Recorder};
 pub use reflect::{Binding, BindingKind, Member, Reflection, Struct, reflect};
 pub use shader::{Compiler, Optimize, Sources, cache_folder, hex};
+#[cfg(feature = "window")]
+pub use shown::Shown;
 pub use statistics::{PipelineReport, Program};
 #[cfg(feature = "window")]
 pub use surface::{PresentMode, Surface};

@@ -8,12 +8,13 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ash::{khr, vk};
 
 use super::commands::Submission;
 use super::device::SharedDevice;
+use super::shown::Presented;
 use crate::error::{Error, Result};
 
 /// Images that may be on their way to the window: slots, each with a semaphore and commands of its
@@ -50,6 +51,8 @@ pub(super) struct Drawn {
     pub i_image: usize,
     pub i_slot: usize,
     pub submission: Submission,
+    /// When work on the picture began.
+    pub begun: Instant,
     /// Dropped when the window system has the image.
     pub handed_over: SyncSender<()>,
 }
@@ -63,6 +66,8 @@ pub(super) struct PresentQueue {
     pub ready: [vk::Semaphore; FRAMES_IN_FLIGHT],
     /// By image: it may be presented.
     pub drawn: Vec<vk::Semaphore>,
+    /// Takes the pictures whose visibility is watched.
+    pub presented: Option<SyncSender<Presented>>,
     pub shared: Arc<SharedDevice>,
 }
 
@@ -115,7 +120,7 @@ impl PresentQueue {
         // Slots without an image, and their last submissions.
         let mut idle: VecDeque<(usize, Option<Submission>)> =
             (0..FRAMES_IN_FLIGHT).map(|i| (i, None)).collect();
-        let mut wait = Duration::ZERO;
+        let (mut wait, mut id) = (Duration::ZERO, 0);
         loop {
             // Drawn images are presented before another one is acquired.
             let next = match idle.is_empty() {
@@ -123,8 +128,9 @@ impl PresentQueue {
                 false => drawn.recv_timeout(std::mem::take(&mut wait)),
             };
             match next {
-                Ok(Drawn { i_image, i_slot, submission, handed_over }) => {
-                    let presented = self.present(i_image);
+                Ok(Drawn { i_image, i_slot, submission, begun, handed_over }) => {
+                    id += 1;
+                    let presented = self.present(i_image, Presented { id, begun });
                     drop(handed_over);
                     presented?;
                     idle.push_back((i_slot, Some(submission)));
@@ -164,14 +170,26 @@ impl PresentQueue {
     }
 
     /// Presents an image.
-    fn present(&self, i_image: usize) -> PresentResult<()> {
+    fn present(&self, i_image: usize, presented: Presented) -> PresentResult<()> {
         let (drawn, chains, images) = ([self.drawn[i_image]], [self.raw], [i_image as u32]);
-        let info = vk::PresentInfoKHR::default()
+        let ids = [presented.id];
+        let mut numbered = vk::PresentIdKHR::default().present_ids(&ids);
+        let mut info = vk::PresentInfoKHR::default()
             .wait_semaphores(&drawn)
             .swapchains(&chains)
             .image_indices(&images);
-        let queue = self.shared.lock_queue();
-        match unsafe { self.loader.queue_present(*queue, &info) } {
+        if self.presented.is_some() {
+            info = info.push_next(&mut numbered);
+        }
+        let outcome = {
+            let queue = self.shared.lock_queue();
+            unsafe { self.loader.queue_present(*queue, &info) }
+        };
+        if let (Ok(_), Some(watcher)) = (&outcome, &self.presented) {
+            // A watcher that is behind, or has ended, does without this picture.
+            let _ = watcher.try_send(presented);
+        }
+        match outcome {
             Ok(false) => Ok(()),
             // The window has another size by now.
             Ok(true) => Err(Event::Outdated),

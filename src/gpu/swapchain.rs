@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ash::{khr, vk};
 
@@ -13,6 +13,7 @@ use super::device::{Device, Owned, SharedDevice};
 use super::image::{Image, TargetFormat};
 use super::presenter::{Drawn, Event, FRAMES_IN_FLIGHT, PresentQueue, Presenter};
 use super::recorder::Recorder;
+use super::shown::{Shown, Watcher};
 use super::surface::{COLOR_SPACE, PresentMode, Surface};
 use crate::error::{Error, Result};
 
@@ -43,6 +44,8 @@ pub struct Swapchain {
     drawn: Vec<Owned<vk::Semaphore>>,
     /// The thread that acquires and presents; none until all of the above is there.
     presenter: Option<Presenter>,
+    /// The thread that learns when pictures are visible, where the device tells.
+    watcher: Option<Watcher>,
     raw: vk::SwapchainKHR,
     loader: khr::swapchain::Device,
     format: TargetFormat,
@@ -106,6 +109,7 @@ impl Swapchain {
             ready: vec![],
             drawn: vec![],
             presenter: None,
+            watcher: None,
             raw,
             loader,
             format,
@@ -132,11 +136,18 @@ impl Swapchain {
             self.commands.push(Commands::whole(device, "window.show")?);
             self.ready.push(shared.semaphore("window.ready", kind)?);
         }
+        let watched = shared.tells_shown.then(|| {
+            let vulkan = &shared.instance.vulkan.raw;
+            Watcher::start(khr::present_wait::Device::new(vulkan, &shared.raw), self.raw)
+        });
+        let (watcher, presented) = watched.transpose()?.unzip();
+        self.watcher = watcher;
         self.presenter = Some(Presenter::start(PresentQueue {
             raw: self.raw,
             loader: self.loader.clone(),
             ready: std::array::from_fn(|i| self.ready[i].raw),
             drawn: self.drawn.iter().map(|semaphore| semaphore.raw).collect(),
+            presented,
             shared: self.shared.clone(),
         })?);
         Ok(())
@@ -158,12 +169,14 @@ impl Swapchain {
     }
 
     /// Has `draw` fill an image, and has it presented. When this returns, `draw`'s commands are
-    /// submitted, ahead of the next submission.
+    /// submitted, ahead of the next submission. Work on the picture began at `begun`, which
+    /// [`Swapchain::take_shown`] returns with its other times.
     ///
     /// # Errors
     /// `draw` fails, or the device is lost.
     pub fn show(
         &mut self,
+        begun: Instant,
         draw: impl FnOnce(&mut Recorder<'_>, &mut Image) -> Result<()>,
     ) -> Result<PresentOutcome> {
         let Some(presenter) = &self.presenter else { return Ok(PresentOutcome::Outdated) };
@@ -193,8 +206,16 @@ impl Swapchain {
         self.i_unused_slot = None;
         let (handed_over, is_handed_over) = sync_channel(0);
         self.last = Some((submission.clone(), is_handed_over));
-        presenter.present(Drawn { i_image, i_slot, submission, handed_over });
+        presenter.present(Drawn { i_image, i_slot, submission, begun, handed_over });
         Ok(PresentOutcome::Presented)
+    }
+
+    /// Takes the pictures that the window system has done with since the last call, in their
+    /// order; none where the device does not tell ([`DeviceInfo::tells_shown`]).
+    ///
+    /// [`DeviceInfo::tells_shown`]: super::DeviceInfo::tells_shown
+    pub fn take_shown(&self) -> impl Iterator<Item = Shown> {
+        self.watcher.iter().flat_map(|watcher| watcher.shown.try_iter())
     }
 
     /// Returns when the last picture has been drawn and handed to the window system.
@@ -235,6 +256,9 @@ impl Drop for Swapchain {
         if let Some(mut presenter) = self.presenter.take() {
             presenter.end();
             self.take_back(&presenter);
+        }
+        if let Some(watcher) = &mut self.watcher {
+            watcher.end();
         }
         if self.shared.is_abandoned() {
             return;

@@ -157,8 +157,24 @@ unsafe extern "system" fn on_message(
     vk::FALSE
 }
 
-/// Returns whether a message is a known error of the layer: two presents of one swapchain image are
-/// said to conflict.
+/// Returns whether a message is a known error of the layer.
+fn is_error_of_layer(id: &str, message: &str) -> bool {
+    is_conflict_of_presents(id, message) || is_wait_beside_acquire(id, message)
+}
+
+/// Returns whether a swapchain is said to be used by two threads, one of which waits for a picture
+/// to be visible.
+///
+/// Layers before 1.3.271 report this, although Vulkan allows vkWaitForPresentKHR beside every other
+/// use of the swapchain but its end (KhronosGroup/Vulkan-ValidationLayers issue 3615). Either of
+/// the two calls may be named. Only the thread that presents acquires images.
+fn is_wait_beside_acquire(id: &str, message: &str) -> bool {
+    id == "UNASSIGNED-Threading-MultipleThreads"
+        && message.contains("object of type VkSwapchainKHR is simultaneously used")
+        && ["vkWaitForPresentKHR()", "vkAcquireNextImageKHR()"].iter().any(|c| message.contains(c))
+}
+
+/// Returns whether two presents of one swapchain image are said to conflict.
 ///
 /// Layers from 1.4.304 to 1.4.357 at least report this if one thread submits while another acquires
 /// and presents (KhronosGroup/Vulkan-ValidationLayers issues 8576, 10586 and 13117). The order of
@@ -166,7 +182,7 @@ unsafe extern "system" fn on_message(
 /// vkAcquireNextImageKHR has returned it, and another rule reports a present of an image that was
 /// not acquired (VUID-VkPresentInfoKHR-pImageIndices-01430). So the message never tells of a fault
 /// of the program. A conflict of drawing with a present has another text, and is not left out.
-fn is_error_of_layer(id: &str, message: &str) -> bool {
+fn is_conflict_of_presents(id: &str, message: &str) -> bool {
     id == "SYNC-HAZARD-WRITE-AFTER-PRESENT"
         && message.starts_with("vkQueuePresentKHR(): ")
         && message.contains("previously written by another vkQueuePresentKHR")
@@ -202,5 +218,22 @@ mod tests {
             writes to resource, which was previously written by vkQueuePresentKHR.";
         assert!(!is_error_of_layer(id, drawing));
         assert!(!is_error_of_layer(id, &presents.replace("another vkQueuePresentKHR", "a copy")));
+    }
+
+    #[test]
+    fn only_a_wait_for_a_picture_beside_another_use_is_left_out() {
+        let id = "UNASSIGNED-Threading-MultipleThreads";
+        let of = |call: &str, object: &str| {
+            format!(
+                "THREADING ERROR : {call}(): object of type {object} is simultaneously used in \
+                 thread 140137163896512 and thread 140137165997760"
+            )
+        };
+        for call in ["vkWaitForPresentKHR", "vkAcquireNextImageKHR"] {
+            assert!(is_error_of_layer(id, &of(call, "VkSwapchainKHR")));
+            assert!(!is_error_of_layer(id, &of(call, "VkSemaphore")));
+        }
+        assert!(!is_error_of_layer(id, &of("vkDestroySwapchainKHR", "VkSwapchainKHR")));
+        assert!(!is_error_of_layer(id, &of("vkQueueSubmit2", "VkQueue")));
     }
 }

@@ -1,13 +1,13 @@
 //! A window as a render target: surface, swapchain images, and the draws that fill them.
 
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::egui_layer::{WidgetFrame, take_widgets};
 use crate::error::Result;
 use crate::frame::{DeviceChoice, GpuContext, Renderer};
 use crate::gpu::{
-    Buffer, Commands, Instance, MemoryUsage, Overlay, PresentMode, PresentOutcome, Recorder,
+    Buffer, Commands, Instance, MemoryUsage, Overlay, PresentMode, PresentOutcome, Recorder, Shown,
     Surface, Swapchain,
 };
 use crate::model::film::{Film, ToneMap};
@@ -113,7 +113,8 @@ impl WindowTarget {
     }
 
     /// Presents the last picture of `first` with `widgets` over it. `compare` adds the last picture
-    /// of `second`. Without `first` only the background shows.
+    /// of `second`. Without `first` only the background shows. Work on the picture began at
+    /// `begun`.
     ///
     /// Returns false where the swapchain no longer fits the window.
     ///
@@ -121,6 +122,7 @@ impl WindowTarget {
     /// Recording, submission or presentation failed.
     pub fn present(
         &mut self,
+        begun: Instant,
         draw: &PictureDraw,
         [first, second]: [Option<&mut Renderer>; 2],
         compare: Option<Compare>,
@@ -130,7 +132,7 @@ impl WindowTarget {
             return Ok(false);
         };
         let widgets = take_widgets(widgets, overlay)?;
-        let shown = swapchain.show(|rec, image| {
+        let shown = swapchain.show(begun, |rec, image| {
             let [own_first, own_second] = &draw.pictures;
             let first = picture(rec, first, own_first);
             let second = if second.is_some() { picture(rec, second, own_second) } else { first };
@@ -139,6 +141,16 @@ impl WindowTarget {
             widgets.map_or(Ok(()), |widgets| overlay.record(rec, image, &widgets))
         })?;
         Ok(shown != PresentOutcome::Outdated)
+    }
+
+    /// Whether the device tells when pictures are visible.
+    pub fn tells_shown(&self) -> bool {
+        self.gpu.device.info().tells_shown
+    }
+
+    /// Takes the pictures that the window system has done with since the last call.
+    pub fn take_shown(&self) -> impl Iterator<Item = Shown> {
+        self.swapchain.iter().flat_map(Swapchain::take_shown)
     }
 
     /// Waits until the last picture has been drawn and handed to the window system.

@@ -16,6 +16,8 @@
  *   NIMBUS_FAKE_DROP         FIRST:EVERY: the submission FIRST, from 1, and from there on each EVERY-th
  *                            one ends without having executed its commands
  *   NIMBUS_FAKE_TELLS        1: the device tells why it was lost (fault_info.h)
+ *   NIMBUS_FAKE_SHOWN_MS     the device tells when pictures are visible: so long after they were
+ *                            presented (shown.h)
  *
  * After DEVICE_LOST every call in the table CALLS fails with it. HANG stands for a device that
  * never finishes: vkWaitSemaphores returns VK_TIMEOUT at once and the log has the time that it
@@ -34,6 +36,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 #define EXPORT __attribute__((visibility("default")))
@@ -113,6 +116,7 @@ static const struct {
     X(CmdBeginDebugUtilsLabelEXT)       \
     X(CmdEndDebugUtilsLabelEXT)         \
     X(GetPhysicalDeviceFeatures2)       \
+    X(QueuePresentKHR)                  \
     X(GetPhysicalDeviceProperties)      \
     X(GetPhysicalDeviceProperties2)     \
     X(GetPhysicalDeviceProperties2KHR)  \
@@ -205,7 +209,9 @@ __attribute__((destructor)) static void at_exit(void) {
         add_line("NIMBUS_FAKE_LOG", "alive at exit: %s %lld\n", "Device", n_alive[KIND_Device]);
 }
 
+#include "extensions.h"
 #include "fault_info.h"
+#include "shown.h"
 
 /* Waits for all commands, so that the program may free what a lost or hung device would use. */
 static void finish_commands(void) {
@@ -261,9 +267,9 @@ static int32_t answer(int call, Word a, Word b, Word c, Word d, Word e, Word f) 
             add_line("NIMBUS_FAKE_LOG", "never returns: %s %lld\n", NAMES[call], n_calls[call]);
     }
     char info[72];
-    const char *names[64];
-    if (call == CALL_CreateDevice && tells()) {
-        without_extension((char *)b, info, names);
+    const char *names[MOST_EXTENSIONS];
+    if (call == CALL_CreateDevice) {
+        without_extensions((char *)b, info, names);
         b = (Word)info;
     }
     int32_t result;
@@ -403,8 +409,10 @@ static Function myGetDeviceProcAddr(void *device, const char *name) {
 
 /* Returns the wrapper of a function, or the function itself. */
 static Function wrap(const char *name, Function real) {
-    if (tells() && !strcmp(name, "vkGetDeviceFaultInfoEXT"))
+    if (getenv("NIMBUS_FAKE_TELLS") && !strcmp(name, "vkGetDeviceFaultInfoEXT"))
         return (Function)myGetDeviceFaultInfoEXT;
+    if (getenv("NIMBUS_FAKE_SHOWN_MS") && !strcmp(name, "vkWaitForPresentKHR"))
+        return (Function)myWaitForPresentKHR;
     if (!real || strncmp(name, "vk", 2)) return real;
     const char *devices = getenv("NIMBUS_FAKE_DEVICES");
     if (devices && !strcmp(devices, "0") && !strcmp(name, "vkEnumeratePhysicalDevices"))

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use winit::event_loop::EventLoopProxy;
 
@@ -264,6 +264,7 @@ impl EditRenderer {
         let Some(active) = &mut self.active else { return Ok(false) };
         let is_shown = state.has_cloud && active.drawn.is_some();
         let renderer = is_shown.then_some(&mut active.scene.player.renderer);
-        self.target.present(&active.draw, [renderer, None], None, &self.links.widgets)
+        let begun = Instant::now();
+        self.target.present(begun, &active.draw, [renderer, None], None, &self.links.widgets)
     }
 }

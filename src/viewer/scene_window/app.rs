@@ -16,7 +16,7 @@ use winit::window::WindowId;
 use super::captures::Captures;
 use super::error_meter::ErrorMeter;
 use super::file_watch::FileWatch;
-use super::frame_loop::{LoopTimes, WindowTimes};
+use super::frame_loop::{RenderTimes, WindowTimes};
 use super::panels;
 use super::render_links::{RenderEvent, RenderLinks};
 use super::render_thread::SceneRenderer;
@@ -102,10 +102,10 @@ pub fn run(options: Options) -> Result<WindowTimes> {
         return Err(error);
     }
     ran?;
-    let loops = rendered.unwrap_or_else(|| Ok(vec![]))?;
+    let frames = rendered.unwrap_or_else(|| Ok(RenderTimes::default()))?;
     let panels_ms = std::mem::take(&mut lock(&app.links.widgets).update_ms);
     let captured = lock(&app.links.status).captured.take();
-    Ok(WindowTimes { loops, panels_ms, captured })
+    Ok(WindowTimes { frames, panels_ms, captured })
 }
 
 /// Position of the pointer, and the buttons that turn the camera.
@@ -120,7 +120,7 @@ struct App {
     options: Options,
     links: RenderLinks,
     files: FileWatch,
-    thread: Option<RenderThread<Vec<LoopTimes>>>,
+    thread: Option<RenderThread<RenderTimes>>,
     layer: Option<EguiLayer>,
     pointer: Pointer,
     error_meter: ErrorMeter,

@@ -7,10 +7,11 @@ use std::time::{Duration, Instant};
 
 use super::comparison::{CameraQueue, compare_of};
 use super::render_links::{Readback, RenderEvent, RenderLinks};
+use super::shown_times::{ShownClock, ShownFrame, ShownTimes};
 use super::view_state::ViewState;
 use crate::error::Result;
 use crate::frame::{Counts, FrameTimes, Game, Renderer, parallel, serial};
-use crate::gpu::Captured;
+use crate::gpu::{Captured, Shown};
 use crate::measure::stats::Summary;
 use crate::model::scene::{Scene, Threading};
 use crate::viewer::fly_camera::FlyCamera;
@@ -18,10 +19,19 @@ use crate::viewer::posed_player::PosedPlayer;
 use crate::viewer::sync::lock;
 use crate::viewer::window_target::{PictureDraw, WindowTarget};
 
-/// The results of a window that was open.
-pub struct WindowTimes {
+/// The times of the frames of a window.
+#[derive(Debug, Default)]
+pub struct RenderTimes {
     /// Frame times of each loop that ran.
     pub loops: Vec<LoopTimes>,
+    /// Times at which pictures became visible; `None` where the device does not tell.
+    pub shown: Option<ShownTimes>,
+}
+
+/// The results of a window that was open.
+pub struct WindowTimes {
+    /// Times of its frames.
+    pub frames: RenderTimes,
     /// Time that each update of the panels took on the window's thread, ms.
     pub panels_ms: Vec<f64>,
     /// The result of the capture that was asked for; none if its frame was not drawn.
@@ -65,6 +75,10 @@ pub struct FrameLoop<'a> {
     pub links: &'a RenderLinks,
     /// Frame times so far.
     pub samples: &'a mut LoopSamples,
+    /// Times at which pictures became visible.
+    pub shown: &'a mut ShownTimes,
+    /// The clock of this loop's pictures.
+    pub shown_clock: ShownClock,
     /// Frames until the window closes; `None`: no limit.
     pub n_left: &'a mut Option<u32>,
     /// The draw that shows a picture.
@@ -139,19 +153,24 @@ impl FrameLoop<'_> {
         let second = self.variant.as_mut().map(|variant| &mut variant.player.renderer);
         let compare = second.as_ref().map(|_| compare_of(now.comparison, self.scene.film.width));
         let renderers = [Some(&mut *renderer), second];
-        let is_current = self.target.present(self.draw, renderers, compare, &self.links.widgets)?;
+        let [begun, _] = times.marks.game;
+        let widgets = &self.links.widgets;
+        let is_current = self.target.present(begun, self.draw, renderers, compare, widgets)?;
         // In the serial loop no game step may run beside the presentation.
         if threading == Threading::Serial {
             self.target.wait()?;
         }
         // With B, a frame draws two pictures, so its time is not that of the scene.
-        if is_warm && self.variant.is_none() {
+        let counts = is_warm && self.variant.is_none();
+        let shown = self.take_shown(counts);
+        if counts {
             self.samples.entry((threading, now.has_panels)).or_default().push(times.frame_ms);
         }
         let mut status = lock(&self.links.status);
         status.has_picture = true;
         if now.has_panels {
             status.timeline.push(times);
+            status.timeline.push_shown(&shown);
         }
         drop(status);
         if let Some(n) = self.n_left {
@@ -164,6 +183,19 @@ impl FrameLoop<'_> {
             && !now.wants_counts
             && !self.links.is_closing()
             && *self.n_left != Some(0))
+    }
+
+    /// Returns the times of the pictures that became visible since the last call, and keeps them if
+    /// they count.
+    fn take_shown(&mut self, counts: bool) -> Vec<ShownFrame> {
+        let all: Vec<Shown> = self.target.take_shown().collect();
+        let frames: Vec<ShownFrame> =
+            all.iter().filter_map(|shown| self.shown_clock.times(shown)).collect();
+        if counts {
+            self.shown.n_replaced += all.len() - frames.len();
+            self.shown.frames.extend(&frames);
+        }
+        frames
     }
 
     /// Reads the frame's pictures back where the window has asked for them.

@@ -28,6 +28,8 @@ mod render_thread;
 #[cfg(feature = "window")]
 mod scene_source;
 #[cfg(feature = "window")]
+mod shown_times;
+#[cfg(feature = "window")]
 mod status;
 #[cfg(feature = "window")]
 mod timeline;
@@ -36,7 +38,8 @@ mod view_state;
 #[cfg(feature = "window")]
 pub(crate) use self::{
     app::{Options, run},
-    frame_loop::{LoopTimes, WindowTimes},
+    frame_loop::{LoopTimes, RenderTimes, WindowTimes},
     scene_source::SceneSource,
+    shown_times::ShownTimes,
 };
 pub use view_state::ViewState;

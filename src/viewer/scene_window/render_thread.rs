@@ -4,8 +4,9 @@
 use std::sync::Arc;
 
 use super::comparison::CameraQueue;
-use super::frame_loop::{FrameLoop, LoopSamples, LoopTimes, loop_times};
+use super::frame_loop::{FrameLoop, LoopSamples, RenderTimes, loop_times};
 use super::render_links::{RenderEvent, RenderLinks};
+use super::shown_times::{ShownClock, ShownTimes};
 use super::view_state::{Variant, ViewState};
 use crate::error::{Error, Result};
 use crate::frame::{DeviceChoice, Player};
@@ -68,6 +69,7 @@ pub struct SceneRenderer {
     /// Frames until the window closes; `None`: no limit.
     n_left: Option<u32>,
     samples: LoopSamples,
+    shown: ShownTimes,
 }
 
 impl SceneRenderer {
@@ -97,14 +99,15 @@ impl SceneRenderer {
             failed_at: None,
             n_left: n_frames,
             samples: LoopSamples::default(),
+            shown: ShownTimes::default(),
         })
     }
 
-    /// Renders until the window closes. Returns the times of each loop that ran.
+    /// Renders until the window closes. Returns the times of its frames.
     ///
     /// # Errors
     /// The device failed, or the first scene cannot be drawn.
-    pub fn run(mut self) -> Result<Vec<LoopTimes>> {
+    pub fn run(mut self) -> Result<RenderTimes> {
         let mut good: Option<GoodScene> = None;
         while !self.links.is_closing() && self.n_left != Some(0) {
             let state = lock(&self.links.state).clone();
@@ -140,8 +143,9 @@ impl SceneRenderer {
             }
         }
         lock(&self.links.status).captured = self.target.gpu.device.captured();
+        let shown = self.target.tells_shown().then_some(self.shown);
         self.target.close()?;
-        Ok(loop_times(&self.samples))
+        Ok(RenderTimes { loops: loop_times(&self.samples), shown })
     }
 
     /// Recreates the swapchain by the state's size and present mode. Returns false where the window
@@ -265,6 +269,8 @@ impl SceneRenderer {
             target: &mut self.target,
             links: &self.links,
             samples: &mut self.samples,
+            shown: &mut self.shown,
+            shown_clock: ShownClock::default(),
             n_left: &mut self.n_left,
             draw: &draw,
             scene: &scene,

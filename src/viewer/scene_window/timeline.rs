@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
+use super::shown_times::{self, ShownFrame};
 use crate::frame::FrameTimes;
 use crate::measure::stats::{Summary, median};
 
@@ -27,6 +28,7 @@ pub struct PassTime {
 #[derive(Debug, Clone, Default)]
 pub struct Timeline {
     frames: VecDeque<FrameTimes>,
+    shown: VecDeque<ShownFrame>,
 }
 
 impl Timeline {
@@ -36,6 +38,18 @@ impl Timeline {
             self.frames.pop_front();
         }
         self.frames.push_back(times.clone());
+    }
+
+    /// Adds pictures that became visible, and drops the oldest where there are too many.
+    pub fn push_shown(&mut self, shown: &[ShownFrame]) {
+        self.shown.extend(shown);
+        self.shown.drain(..self.shown.len().saturating_sub(CAPACITY));
+    }
+
+    /// Returns the statistics of the intervals between visible pictures, and of the times until
+    /// they were visible, ms; `None` where the device does not tell.
+    pub fn shown_summaries(&self) -> [Option<Summary>; 2] {
+        [shown_times::intervals(&self.shown), shown_times::to_screen(&self.shown)]
     }
 
     /// Returns the frames, oldest first.

@@ -19,12 +19,15 @@ pub fn show(ui: &mut Ui, timeline: &Timeline) {
         return;
     };
     graph(ui, timeline, &frame);
+    let [interval, to_screen] = timeline.shown_summaries();
     let rows = [
         ("frame", Some(frame)),
         ("game step", timeline.summary(|f| f.game_ms)),
         ("recording", timeline.summary(recording_ms)),
         ("waiting", timeline.summary(|f| f.wait_ms)),
         ("latency", timeline.summary(|f| f.latency_ms)),
+        ("to screen", to_screen),
+        ("on screen", interval),
     ];
     let is_wide = ui.available_width() >= WIDE;
     // A narrow table leaves out one percentile.

@@ -70,25 +70,32 @@ pub fn measure(
             .map_or(SAMPLE_S, |ms| SAMPLE_S.min(1e-3 * SHARE_OF_LIMIT * ms)),
         stop,
     };
-    let mut roofs = Vec::new();
-    let mut done = |roof: Roof| {
-        roofs.push(roof);
-        tick(roofs.len() as u64, n_loads);
+    let mut n_done = 0;
+    let mut measured = |sampler: &mut Sampler<'_>, load: &dyn Load| {
+        let roof = sampler.roof(load)?;
+        n_done += 1;
+        tick(n_done, n_loads);
+        Ok::<Roof, Error>(roof)
     };
+    // Arithmetic comes first: on a slow device the large sets take more than their share of time.
+    let mut of_arithmetic = Vec::new();
+    let (loads, mut absent) = arithmetic(device, context.compiler())?;
+    for load in &loads {
+        of_arithmetic.push(measured(&mut sampler, load)?);
+    }
+    for is_spread in [false, true] {
+        let atomics = Atomics::new(device, context.compiler(), is_spread)?;
+        of_arithmetic.push(measured(&mut sampler, &atomics)?);
+    }
+    let mut roofs = Vec::new();
     let kernels = Kernels::new(device, context.compiler())?;
     for bytes in sets {
         let set = Set::new(device, &mut sampler.commands, &kernels, bytes)?;
         for load in set.loads() {
-            done(sampler.roof(&load)?);
+            roofs.push(measured(&mut sampler, &load)?);
         }
     }
-    let (loads, mut absent) = arithmetic(device, context.compiler())?;
-    for load in &loads {
-        done(sampler.roof(load)?);
-    }
-    for is_spread in [false, true] {
-        done(sampler.roof(&Atomics::new(device, context.compiler(), is_spread)?)?);
-    }
+    roofs.append(&mut of_arithmetic);
     if !device.limits().has_texel_buffers() {
         absent.push("read by texels: the device reads few texels of a buffer".to_owned());
     }

@@ -136,6 +136,19 @@ fn statistics_of_a_fresh_bench_are_those_of_run_json() {
     assert_eq!(read[0]["tables"]["cases"][0]["rmse"], check["rmse"]["value"], "{check}");
     assert!(check["rmse"]["value"].is_f64() && check["verdict"] == "right", "{check}");
 
+    // The least work of passes is that of the record.
+    let passes = read[0]["tables"]["passes"].as_array().expect("passes");
+    let of_record = cases.iter().flat_map(|case| case["modes"].as_array().expect("modes"));
+    let of_record: Vec<&Value> =
+        of_record.flat_map(|mode| mode["passes"].as_array().expect("passes")).collect();
+    assert_eq!(passes.len(), of_record.len());
+    assert!(of_record.iter().any(|pass| pass["bytes"].is_f64()), "no pass has bytes");
+    for (pass, written) in passes.iter().zip(of_record) {
+        for key in ["name", "bytes", "operations", "roof_share"] {
+            assert_eq!(pass[key], written[key], "{key} of {written}");
+        }
+    }
+
     // A comparison of the run with itself.
     let compared = program::path(&dir, "compared.json");
     fs::write(&compared, nimbus(&["compare", &run, &run, "--json"])).expect("a file");

@@ -876,7 +876,9 @@ class Run(_Result):
     "1 % low" are in frames a second.
 
     `passes`: a row for each pass of each loop, with the median GPU time (`p50_ms`) of the timed
-    frames that ran it, its `share` of the GPU time, and `saved_ms` a frame.
+    frames that ran it, its `share` of the GPU time, and `saved_ms` a frame. `bytes` and
+    `operations` are the least that the pass moves and computes, and `roof_share` the share of the
+    device's roof that its median time reaches; NaN where they are not known.
 
     `cases`: a row for each phase of the scene and point of the sweep, with one column for each
     swept key. `ratio` is parallel by serial median frame time. `verdict` says whether the pictures
@@ -1008,7 +1010,8 @@ class Run(_Result):
         types.update(empty_frames=float, block_spread=float)
         pass_types = {
             **of_loop, "name": str, "p50_ms": float, "share": float, "n_run": int,
-            "n_skipped": int, "reason": str, "saved_ms": float,
+            "n_skipped": int, "reason": str, "saved_ms": float, "bytes": float,
+            "operations": float, "roof_share": float,
         }  # fmt: skip
         loops, passes = [], []
         for i, case in enumerate(cases):
@@ -1044,6 +1047,7 @@ class Run(_Result):
             "n_skipped": of["n_skipped"].integer(),
             "reason": of["reason"].text_or_empty(),
             "saved_ms": of["saved_ms"].number(),
+            **{key: of.get(key).number() for key in ("bytes", "operations", "roof_share")},
         }
 
     def _is_timed(self) -> np.ndarray:

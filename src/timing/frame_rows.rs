@@ -89,6 +89,11 @@ impl FrameRow {
     pub fn is_timed(&self) -> bool {
         !self.warm_up && !self.discarded
     }
+
+    /// Returns the time of recording, submission and waiting, in ms.
+    pub fn render_ms(&self) -> f64 {
+        self.record_ms + self.submit_ms + self.wait_ms
+    }
 }
 
 /// The columns before those of the passes; `image_hash` and [`LATER_COLUMNS`] follow these.

@@ -45,6 +45,7 @@ pub mod starts;
 pub mod state;
 pub mod still;
 pub mod sweep;
+mod timed_rows;
 pub mod trace;
 pub mod verdict;
 

@@ -216,7 +216,7 @@ pub struct Measured {
 
 /// One loop of a case. Warm-up frames enter no statistic; a statistic is null if no finite time was
 /// measured.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mode {
     /// "serial" or "parallel".
     pub threading: String,

@@ -208,8 +208,7 @@ fn timed_modes(run: &Run, table: &FrameTable) -> BTreeMap<String, TimedMode> {
 
 /// Returns the times of a frame in the order of [`TimedMode::measures`].
 pub(super) fn row_times(row: &FrameRow) -> Vec<Option<f64>> {
-    let render_ms = row.record_ms + row.submit_ms + row.wait_ms;
-    let of_frame = [row.frame_ms, row.game_ms, render_ms].map(Some).into_iter();
+    let of_frame = [row.frame_ms, row.game_ms, row.render_ms()].map(Some).into_iter();
     let times = of_frame.chain([row.gpu_ms]).chain(row.pass_ms.iter().copied());
     times.map(|ms| ms.filter(|ms| ms.is_finite())).collect()
 }

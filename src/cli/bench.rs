@@ -28,7 +28,7 @@ use crate::timing::cases::Case;
 use crate::timing::machine;
 use crate::timing::results::open_results;
 use crate::timing::running::{self, Event, Finished};
-use crate::timing::state::Sampler;
+use crate::timing::state::{Judging, Sampler};
 
 /// Readings of the device's clock and the host's, before the frames and again after them.
 const N_CLOCK_READINGS: usize = 8;
@@ -178,10 +178,15 @@ fn bench_scene(
         clocks,
         zones,
         readings,
-        state: sampler.as_ref().map(Sampler::log),
+    });
+    let judging = sampler.as_ref().map(|sampler| Judging {
+        log: sampler.log(),
+        is_cpu: recorder.info.kind == "cpu",
+        n_cores: machine::cpu().logical_cores,
+        discard: recorder.args.discard_throttled,
     });
     let watch = sampler.as_ref().map(Sampler::watch).unwrap_or_default();
-    let outcome = Arc::new(Mutex::new(Outcome { watch, ..Outcome::default() }));
+    let outcome = Arc::new(Mutex::new(Outcome { watch, judging, ..Outcome::default() }));
     let mut keeping = {
         let (recorder, outcome, runs) = (recorder.clone(), outcome.clone(), runs.clone());
         interrupt::keep(PATIENCE, move || recorder.keep(&outcome, &runs))
@@ -200,7 +205,7 @@ fn bench_scene(
     }
     keeping.finish();
     let mut outcome = std::mem::take(&mut *blocks::lock(&outcome));
-    recorder.judge(&mut outcome);
+    outcome.judge();
     let Finished { stage, failure } = ended;
     if let (Some(failure), true) = (&failure, outcome.samples.is_empty()) {
         drop(lock_folder(&recorder.folder).take());

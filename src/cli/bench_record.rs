@@ -15,7 +15,6 @@ use crate::io::console::say;
 use crate::io::process_info::command_line;
 use crate::measure::zones::Zones;
 use crate::timing::attachments::Attachments;
-use crate::timing::bench_state::Judging;
 use crate::timing::blocks::{self, BenchPlan, Outcome};
 use crate::timing::cases::Case;
 use crate::timing::frame_rows::FrameTable;
@@ -25,7 +24,7 @@ use crate::timing::precision::PrecisionRecord;
 use crate::timing::records::Run;
 use crate::timing::results::write_results;
 use crate::timing::roofs::Roofs;
-use crate::timing::state::{BenchState, STATE_FILE, StateLog, rows_text};
+use crate::timing::state::{BenchState, STATE_FILE, rows_text};
 use crate::timing::{shares, trace};
 
 /// The conditions of a bench of one scene, and where its results go.
@@ -56,22 +55,12 @@ pub struct Recorder {
     pub zones: Option<Zones>,
     /// Readings of the device's clock and the host's before the frames.
     pub readings: Vec<ClockSample>,
-    /// The state of the machine, if it is read.
-    pub state: Option<StateLog>,
 }
 
 /// The records of the scenes that are done, for `--json`.
 pub type Runs = Arc<Mutex<Vec<Run>>>;
 
 impl Recorder {
-    /// Judges the frames by the state of the machine, before they are recorded.
-    pub fn judge(&self, outcome: &mut Outcome) {
-        let Some(log) = &self.state else { return };
-        let is_cpu = self.info.kind == "cpu";
-        let n_cores = machine::cpu().logical_cores;
-        outcome.judge(log, Judging { is_cpu, n_cores, discard: self.args.discard_throttled });
-    }
-
     /// Writes and prints the results, and returns the record. `later` are the readings of the
     /// clocks after the frames.
     ///
@@ -123,7 +112,7 @@ impl Recorder {
             say!("no frame was finished, nothing is kept");
             return Error::Interrupted;
         }
-        self.judge(&mut outcome);
+        outcome.judge();
         let printed = self.record(&outcome, &[], true).and_then(|run| {
             before.lock().unwrap_or_else(PoisonError::into_inner).push(run);
             print_json(&self.args, before)

@@ -5,23 +5,14 @@ use std::time::Instant;
 
 use super::blocks::{Outcome, Sample};
 use super::state::rules::FrameSpan;
-use super::state::{BenchState, FrameMark, Observed, StateLog, TimedFrame};
+use super::state::{BenchState, FrameMark, Judging, Observed, TimedFrame};
 use crate::model::scene::Threading;
 
-/// The conditions under which frames are judged.
-#[derive(Debug, Clone, Copy)]
-pub struct Judging {
-    /// Whether the device is the processor.
-    pub is_cpu: bool,
-    /// Logical cores of the processor.
-    pub n_cores: usize,
-    /// Whether throttled frames are left out of the statistics.
-    pub discard: bool,
-}
-
 impl Outcome {
-    /// Marks the timed frames that ran at a low clock, and keeps the readings and their summary.
-    pub fn judge(&mut self, log: &StateLog, how: Judging) {
+    /// Marks the timed frames that ran at a low clock, and keeps the readings and their summary,
+    /// where the state of the machine is read.
+    pub fn judge(&mut self) {
+        let Some(Judging { log, is_cpu, n_cores, discard }) = self.judging.clone() else { return };
         let (rows, sources, zero) = (log.rows(), log.sources(), log.zero);
         let mut loops = BTreeMap::new();
         let frames: Vec<TimedFrame> = self
@@ -36,7 +27,6 @@ impl Outcome {
                 TimedFrame { i_case: sample.i_case, i_loop, span: span(sample, zero) }
             })
             .collect();
-        let Judging { is_cpu, n_cores, discard } = how;
         let observed =
             Observed { rows: &rows, sources: &sources, frames: &frames, is_cpu, n_cores, discard };
         let (flags, run, cases) = observed.judge();

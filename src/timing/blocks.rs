@@ -9,7 +9,7 @@ use super::check::{Check, DevicePicture, Stages};
 use super::invocations::PassInvocations;
 use super::precision::Reached;
 use super::schedule::{Rounds, n_frames_of};
-use super::state::{BenchState, BlockWatch, FrameMark};
+use super::state::{BenchState, BlockWatch, FrameMark, Judging};
 use crate::frame::{Amounts, Counts, FrameTimes};
 use crate::measure::blocked::N_BLOCKS_NEEDED;
 
@@ -98,7 +98,9 @@ pub struct Outcome {
     pub interrupted: bool,
     /// Is told which block runs, without waiting for it.
     pub watch: BlockWatch,
-    /// The state of the machine, if it was read.
+    /// The conditions by which frames are judged, if the state of the machine is read.
+    pub judging: Option<Judging>,
+    /// The state of the machine, once it was judged.
     pub state: Option<BenchState>,
 }
 

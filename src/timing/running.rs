@@ -188,6 +188,13 @@ impl Bench<'_> {
         if n_rounds < self.next_look[i_case] && ended_by.is_none() {
             return false;
         }
+        {
+            // Frames that are left out of the results must be left out of the intervals.
+            let mut outcome = lock(self.outcome);
+            if outcome.judging.as_ref().is_some_and(|judging| judging.discard) {
+                outcome.judge();
+            }
+        }
         let intervals = |widening: f64| lock(self.outcome).intervals(i_case, case, widening);
         let look = look(wanted.wanted, n_rounds, n_segments, intervals);
         let ended_by = ended_by.filter(|_| look.next.is_some());

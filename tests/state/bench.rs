@@ -10,19 +10,26 @@ use nimbus::frame::{DeviceChoice, Stage};
 use nimbus::gpu::{DeviceOptions, LoweredLimits};
 use nimbus::io::scene_file;
 use nimbus::model::scene::Threading;
-use nimbus::timing::bench_state::Judging;
 use nimbus::timing::blocks::{BenchPlan, Outcome};
 use nimbus::timing::cases::{Case, LoopChoice, cases};
+use nimbus::timing::precision::Precision;
 use nimbus::timing::running::{self, Event as BenchEvent};
 use nimbus::timing::schedule::Rounds;
-use nimbus::timing::state::{DeviceNames, Event, Folders, Sampler, StateRow};
+use nimbus::timing::state::{DeviceNames, Event, Folders, Judging, Sampler, StateRow};
 
 const N_FRAMES: u32 = 6;
 const N_WARM_UP: u32 = 2;
 const N_ROUNDS: u32 = 4;
 
-/// Times a small scene in four blocks of one loop; in block 2 the clock is at 60 %.
+/// Times a small scene in four blocks of one loop, and judges the frames.
 fn benched(valid_bits: u32, discard: bool) -> (Vec<Case>, BenchPlan, Outcome) {
+    let (cases, plan, mut outcome) = timed(Rounds::Fixed(N_ROUNDS), valid_bits, discard);
+    outcome.judge();
+    (cases, plan, outcome)
+}
+
+/// Times a small scene in one loop; in block 2 the clock is at 60 %.
+fn timed(rounds: Rounds, valid_bits: u32, discard: bool) -> (Vec<Case>, BenchPlan, Outcome) {
     let sys = tempfile::tempdir().expect("a folder");
     let clock = sys.path().join("devices/system/cpu/cpu0/cpufreq/scaling_cur_freq");
     fs::create_dir_all(clock.parent().expect("a folder")).expect("room");
@@ -44,14 +51,16 @@ fn benched(valid_bits: u32, discard: bool) -> (Vec<Case>, BenchPlan, Outcome) {
     let log = sampler.log();
     let plan = BenchPlan {
         n_warm_up: N_WARM_UP,
-        rounds: Rounds::Fixed(N_ROUNDS),
+        rounds,
         hash_frames: false,
         pictures: false,
         checked: None,
         cold_bytes: None,
         counts_invocations: false,
     };
-    let outcome = Mutex::new(Outcome { watch: sampler.watch(), ..Outcome::default() });
+    let judging = Judging { log: sampler.log(), is_cpu: true, n_cores: 2, discard };
+    let (watch, judging) = (sampler.watch(), Some(judging));
+    let outcome = Mutex::new(Outcome { watch, judging, ..Outcome::default() });
     let mut n_frames = 0;
     // The first frame of a block waits until the thread has read the end of the block before, and
     // the last frame of its warm-up has set the clock before the thread reads the begin.
@@ -76,13 +85,12 @@ fn benched(valid_bits: u32, discard: bool) -> (Vec<Case>, BenchPlan, Outcome) {
     };
     let ended = running::run(stage, &cases, &plan, &AtomicBool::new(false), &outcome, &mut tick);
     assert_eq!(ended.failure, None);
-    let last = |row: &StateRow| row.event == Event::End && row.block == Some(N_ROUNDS - 1);
+    let n_blocks = n_frames / (N_WARM_UP + N_FRAMES);
+    let last = |row: &StateRow| row.event == Event::End && row.block == Some(n_blocks - 1);
     wait(|| log.rows().iter().any(last));
     drop(sampler);
     ended.stage.expect("a stage").close().expect("no validation message");
-    let mut outcome = outcome.into_inner().expect("an outcome");
-    outcome.judge(&log, Judging { is_cpu: true, n_cores: 2, discard });
-    (cases, plan, outcome)
+    (cases, plan, outcome.into_inner().expect("an outcome"))
 }
 
 fn wait(is_so: impl Fn() -> bool) {
@@ -126,6 +134,20 @@ fn throttled_frames_are_left_out_of_the_statistics_and_stay_in_the_table() {
         assert!(ends[ends.len() - 1] <= end, "{ends:?} {end}");
     }
     assert!(outcome.state.expect("a state").run.clock == "cpu");
+}
+
+#[test]
+fn frames_are_left_out_before_the_stopping_rule_looks_at_the_intervals() {
+    let precision = Precision { wanted: 1e-9, seed: 1, limit: Duration::ZERO };
+    for discard in [true, false] {
+        let (_, _, outcome) = timed(Rounds::Until(precision), 64, discard);
+        // Without the throttled one there are fewer blocks than an interval needs.
+        assert_eq!(outcome.reached[&0].half_width.is_none(), discard);
+        for sample in outcome.samples.iter().filter(|sample| !sample.warm_up) {
+            let is_out = discard && sample.i_block == 2;
+            assert_eq!(sample.mark.is_discarded, is_out, "block {}", sample.i_block);
+        }
+    }
 }
 
 #[test]

@@ -27,5 +27,5 @@ pub use row::{Event, STATE_FILE, StateRow, parse_rows, rows_text};
 pub use rules::{Flags, FrameMark};
 pub use sampler::{BlockWatch, Sampler, StateLog};
 pub use sources::{DeviceNames, Folders, Sources};
-pub use summary::{BenchState, Observed, TimedFrame};
+pub use summary::{BenchState, Judging, Observed, TimedFrame};
 pub use text::{case_line, remark_lines, run_line};

@@ -6,6 +6,7 @@ use std::time::Instant;
 use super::record::{CaseState, RunState, Spread, ThrottleCount};
 use super::row::{Event, StateRow};
 use super::rules::{self, ClockPoint, Flags, FrameSpan};
+use super::sampler::StateLog;
 use super::text;
 
 /// A timed frame of a bench.
@@ -29,6 +30,19 @@ pub struct Observed<'a> {
     /// All timed frames.
     pub frames: &'a [TimedFrame],
     /// Whether the device is the processor, whose clock then judges frames.
+    pub is_cpu: bool,
+    /// Logical cores of the processor.
+    pub n_cores: usize,
+    /// Whether throttled frames are left out of the statistics.
+    pub discard: bool,
+}
+
+/// The conditions by which frames are judged.
+#[derive(Debug, Clone)]
+pub struct Judging {
+    /// The readings of the machine's state.
+    pub log: StateLog,
+    /// Whether the device is the processor.
     pub is_cpu: bool,
     /// Logical cores of the processor.
     pub n_cores: usize,

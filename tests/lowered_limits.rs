@@ -68,7 +68,13 @@ fn every_scene_draws_the_same_picture_under_the_limits_of_other_devices() {
             for (name, context) in &others {
                 let what = format!("{} by {draw:?} on {name}", path.display());
                 let found = picture(context, &scene).unwrap_or_else(|e| panic!("{what}: {e}"));
-                assert!(found == expected, "{what}: {}", difference(&found, &expected));
+                if found != expected {
+                    // A picture that differs by chance is another fault than one of a limit.
+                    let again = |of: &GpuContext| picture(of, &scene).expect("a picture");
+                    let same = [again(context) == found, again(&whole) == expected];
+                    let difference = difference(&found, &expected);
+                    panic!("{what}: {difference}; drawn again, each is the same: {same:?}");
+                }
             }
         }
     }

@@ -95,16 +95,36 @@ fn finder(what: &str) -> &'static [&'static str] {
     }
 }
 
+/// Returns a folder with a shader in which `from` is replaced by `to`.
+fn faulty(what: &str, [file, from, to]: [&str; 3]) -> TempDir {
+    let dir = TempDir::new().expect("a folder");
+    let mut sources = passes::sources();
+    assert!(sources.replace(file, from, to), "{what}: {file} does not contain {from}");
+    let path = dir.path().join(file);
+    fs::create_dir_all(path.parent().expect("a folder")).expect("room");
+    fs::write(&path, sources.text(file).expect("a shader")).expect("room");
+    dir
+}
+
+#[test]
+fn a_wrong_stage_is_told_where_the_picture_is_within_its_bounds() {
+    let erf = |(what, ..): &&faults::Fault| what.ends_with("coefficient of erf");
+    let (what, file, from, to, _) = FAULTS.iter().find(erf).expect("a fault");
+    let dir = faulty(what, [file, from, to]);
+    let words = ["bench", "scenes/hello.toml", "--size", "64x48", "--frames", "2", "--repeat", "1"];
+    let shaders = ["--shaders", dir.path().to_str().expect("UTF-8"), "-q"];
+    let output = run(&[&words[..], &shaders].concat());
+    let table = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(table.contains("THE DEVICE IS WRONG in functions/erf"), "{table}");
+    assert!(!table.contains("the picture is right") && !table.contains("INTERRUPTED"), "{table}");
+}
+
 #[test]
 fn every_faulty_shader_is_found() {
     let mut missed = vec![];
     for (what, file, from, to, _) in FAULTS {
-        let dir = TempDir::new().expect("a folder");
-        let mut sources = passes::sources();
-        assert!(sources.replace(file, from, to), "{what}: {file} does not contain {from}");
-        let path = dir.path().join(file);
-        fs::create_dir_all(path.parent().expect("a folder")).expect("room");
-        fs::write(&path, sources.text(file).expect("a shader")).expect("room");
+        let dir = faulty(what, [file, from, to]);
         let shaders = ["--shaders", dir.path().to_str().expect("UTF-8")];
         let (output, json) = bench(&[finder(what), &SMALL, &SINGLE, &shaders].concat());
         let error = stderr(&output);

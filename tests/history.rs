@@ -119,19 +119,56 @@ fn a_series_without_a_step_has_no_change_and_a_page() {
 
 #[test]
 fn runs_without_known_revisions_are_ordered_by_date() {
+    let (repo, _) = checkout(1);
     let dir = tempfile::tempdir().expect("a folder");
     let folders: Vec<PathBuf> =
         (0..7).map(|i| write(dir.path(), i, "0123456789ab", 20.0)).collect();
-    let (code, text, stderr) = history(dir.path(), &folders, &[]);
+    let (code, text, stderr) = history(repo.path(), &folders, &[]);
     assert_eq!((code, stderr.as_str()), (0, ""));
     assert!(text.contains("7 runs in the order of dates"), "{text}");
-    let json = parsed(&history(dir.path(), &folders, &["--json"]).1);
+    let json = parsed(&history(repo.path(), &folders, &["--json"]).1);
     assert_eq!(json["order"], "date");
     // Later folders have earlier dates.
     let first = json["runs"][0]["folder"].as_str().expect("a folder");
     assert!(first.ends_with("run-6"), "{first}");
-    let (code, _, stderr) = history(dir.path(), &folders[..1], &["-o", "page.txt"]);
+    let (code, _, stderr) = history(repo.path(), &folders[..1], &["-o", "page.txt"]);
     assert!(code == 2 && stderr.contains("ends in .html"), "{stderr}");
+}
+
+#[test]
+fn what_can_mislead_is_refused_or_told() {
+    let (repo, _) = checkout(1);
+    let dir = tempfile::tempdir().expect("a folder");
+    let mut folders: Vec<PathBuf> =
+        (0..5).map(|i| write(dir.path(), i, "0123456789ab", 20.0)).collect();
+    // A folder that is no checkout.
+    let (code, _, stderr) = history(dir.path(), &folders, &[]);
+    assert!(code == 2 && stderr.contains("not a git repository"), "{stderr}");
+    // Too few runs for a change.
+    let (code, text, _) = history(repo.path(), &folders, &[]);
+    assert!(code == 0 && text.contains("5 of the 6 runs that a change needs"), "{text}");
+    assert!(!text.contains("no change"), "{text}");
+    // A run that was cut short, and one whose device is wrong.
+    let edit = |i: usize, change: &dyn Fn(&mut Value)| {
+        let file = folders[i].join("run.json");
+        let mut run = parsed(&fs::read_to_string(&file).expect("a run"));
+        change(&mut run);
+        fs::write(&file, run.to_string()).expect("a run");
+    };
+    edit(4, &|run| run["interrupted"] = true.into());
+    let failed = serde_json::json!({
+        "n_cases": 49, "failed": ["functions/erf"], "seconds": 1.0, "from_cache": false,
+    });
+    edit(3, &|run| run["stages"] = failed.clone());
+    let (_, text, _) = history(repo.path(), &folders, &[]);
+    assert!(text.contains("run 0: interrupted: "), "{text}");
+    assert!(text.contains("run 1: the device is wrong in functions/erf"), "{text}");
+    let json = parsed(&history(repo.path(), &folders, &["--json"]).1);
+    assert_eq!(json["remarks"].as_array().map(Vec::len), Some(2), "{json}");
+    // One folder under two names.
+    folders.push(dir.path().join("./run-2/../run-2"));
+    let (code, _, stderr) = history(repo.path(), &folders, &[]);
+    assert!(code == 2 && stderr.contains("are one folder"), "{stderr}");
 }
 
 #[test]

@@ -163,6 +163,55 @@ fn check_results(threading: &str, out: &str, whole: &str) {
     }
 }
 
+/// A bench of three processes, whose temporary files go to `temporary`.
+fn starts(out: &str, temporary: &Path) -> Child {
+    let words = ["bench", "scenes/hello.toml", "--size", "64x48", "--starts", "3", "--repeat", "1"];
+    let more = ["--frames", "60", "--no-saved", "--no-check", "--out", out];
+    nimbus(&[&words[..], &more].concat()).env("TMPDIR", temporary).spawn().expect("a child")
+}
+
+#[test]
+fn an_interrupted_bench_of_several_starts_keeps_those_that_ended() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let temporary = dir.path().join("temporary");
+    fs::create_dir(&temporary).expect("room");
+    let path = |name: &str| dir.path().join(name).to_str().expect("UTF-8").to_owned();
+    let begin = Instant::now();
+    assert!(
+        starts(&path("whole"), &temporary).wait_with_output().expect("an end").status.success()
+    );
+    let whole = begin.elapsed();
+    let mut after = whole / 2;
+    for attempt in 0..40 {
+        let out = path(&format!("part{attempt}"));
+        let child = starts(&out, &temporary);
+        std::thread::sleep(after);
+        let pid = child.id().to_string();
+        let _ = Command::new("kill").args(["-INT", &pid]).stderr(Stdio::null()).status();
+        let output = child.wait_with_output().expect("an end");
+        // The processes of the starts have ended, too, and left nothing behind.
+        let left: Vec<_> = fs::read_dir(&temporary).expect("a folder").collect();
+        assert!(left.is_empty(), "{left:?}");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        if output.status.success() {
+            after /= 2;
+            continue;
+        }
+        assert_eq!(output.status.code(), Some(130), "{stderr}");
+        if !Path::new(&out).exists() {
+            assert!(stderr.contains("nothing is kept"), "{stderr}");
+            after = after * 3 / 2;
+            continue;
+        }
+        let run = read_results(Path::new(&out)).expect("results").run;
+        assert!(run.interrupted && (1..3).contains(&run.n_starts()), "{}", run.n_starts());
+        assert!(run.modes().any(|(_, mode)| mode.frames > 0));
+        assert!(String::from_utf8_lossy(&output.stdout).contains("INTERRUPTED"), "{stderr}");
+        return;
+    }
+    panic!("no bench was interrupted in the midst of its starts");
+}
+
 /// One after the other: each is timed.
 #[test]
 fn an_interrupted_bench_leaves_results_of_what_it_finished() {

@@ -2,12 +2,13 @@
 //! a precision was not reached. Whether it was is up to the machine, so that only limits of 0 s have
 //! a number of rounds that is known.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use assert_cmd::Command;
 use nimbus::timing::precision::Limit;
 use nimbus::timing::results::{BenchResults, read_results};
+use nimbus::timing::state::parse_rows;
 
 fn bench(dir: &Path, name: &str, more: &[&str]) -> (i32, String, String) {
     let mut command = Command::cargo_bin("nimbus").expect("the program is built");
@@ -50,7 +51,7 @@ fn eight_rounds_of_segments_in_random_order_come_first() {
     let case = &a.run.cases[0];
     let reached = case.precision.expect("a precision");
     assert_eq!((reached.rounds, reached.ended_by), (8, Some(Limit::Time)));
-    assert!(reached.half_width.is_some_and(|width| width > 1e-9));
+    assert!(reached.reach.is_some_and(|width| width > 1e-9));
     // Three loops in eight rounds; 25 frames in two segments of 12 and 13, four times each.
     assert_eq!(a.run.block_order.len(), 24);
     for mode in &a.modes {
@@ -87,7 +88,7 @@ fn a_precision_that_is_reached_has_narrow_intervals() {
             assert!(table.contains("PRECISION NOT REACHED"), "{table}");
             continue;
         }
-        assert!(reached.half_width.is_some_and(|width| width <= 0.5), "{reached:?}");
+        assert!(reached.reach.is_some_and(|width| width <= 0.5), "{reached:?}");
         for mode in &case.modes {
             let frame = mode.frame_ms.expect("times");
             let width = frame.p50_high.expect("high") - frame.p50_low.expect("low");
@@ -136,6 +137,14 @@ fn starts_are_processes_whose_frames_are_joined() {
     }
     assert!(case.ratio.is_some_and(|ratio| ratio.low.is_some()), "{:?}", case.ratio);
     assert!(dir.path().join("a/case-0.png").exists(), "the picture of the first start");
+    // The state of the machine is that of all starts, on one clock.
+    let state = case.state.as_ref().expect("a state");
+    assert!(state.n_readings >= 9 && state.peak_own_bytes.is_some_and(|n| n > 0), "{state:?}");
+    let text = std::fs::read_to_string(dir.path().join("a/state.csv")).expect("readings");
+    let rows = parse_rows(&text, Path::new("state.csv")).expect("readings");
+    assert!(rows.windows(2).all(|w| w[0].time_s <= w[1].time_s));
+    let blocks: BTreeSet<u32> = rows.iter().filter_map(|row| row.block).collect();
+    assert_eq!(blocks, (0..9).collect());
     assert!(table.contains("the last frames of all blocks are the same"), "{table}");
 
     // Two starts have no interval, and a faulty scene fails before any process.

@@ -127,7 +127,7 @@ fn sample() -> Run {
         skipping: Some(Skipping { gpu_ms: 1.0, gpu_no_skip_ms: 3.0, same_bytes: Some(true) }),
         counts: Some(Counts { values: 8, ..Counts::default() }),
         state: Some(run_state().all),
-        precision: Some(Reached { half_width: Some(0.01), rounds: 8, ended_by: None }),
+        precision: Some(Reached { reach: Some(0.01), rounds: 8, ended_by: None }),
         ..blank.cases[0].clone()
     };
     let base = BaseTime { threading: "serial".to_owned(), skip: true, p50_ms: Some(1.5) };

@@ -82,9 +82,12 @@ SCHEMAS = {"run": 3, "study": 1, "ledger": 1, "stress": 1}
 COMPARISON_SCHEMAS = (2, 3)
 """The schema versions of nimbus compare --json that this file reads."""
 
+HISTORY_SCHEMAS = (1,)
+"""Those of nimbus history --json."""
+
 COMMANDS = {
     "run": "bench", "study": "error", "ledger": "ledger", "stress": "stress",
-    "comparison": "compare", "frames": "farm merge",
+    "comparison": "compare", "history": "history", "frames": "farm merge",
 }  # fmt: skip
 """The command of nimbus that writes a kind of result."""
 
@@ -292,7 +295,13 @@ def median_interval(values: Sequence[float]) -> Optional[Interval]:
     given = np.asarray(values, dtype=np.float64).ravel()
     if given.size < N_FRAMES_NEEDED:
         return None
-    return _bootstrap([_finite(given)], given.size, lambda of: of)
+    finite = _finite(given)
+    interval = _bootstrap([finite], given.size, lambda of: of)
+    if interval is None:
+        return None
+    # The widened interval can reach beyond the values, which no median does.
+    low, high = max(interval.low, float(finite.min())), min(interval.high, float(finite.max()))
+    return Interval(interval.estimate, low, high)
 
 
 def ratio_of_medians(b: Sequence[float], a: Sequence[float]) -> Optional[Interval]:
@@ -508,14 +517,20 @@ def _kind_of(record: _Node) -> str:
         for kind, key in (("run", "block_order"), ("study", "configurations"), ("ledger", "rows")):
             if key in record.value:
                 return kind
-        if "modes" in record.value or "matrix" in record.value:
+        if "matrix" in record.value:
+            what = "compares more than two runs; expected the output of nimbus compare A B --json"
+            raise _error(record.path, what)
+        if "modes" in record.value:
             return "comparison"
+        if "series" in record.value:
+            return "history"
         if "cases" in record.value and "scene" not in record.value:
             return "stress"
     if isinstance(record.value, dict) and "metrics" in record.value:
         what = "compares two pictures; its `metrics` are a table already, which json.load reads"
         raise _error(record.path, what)
-    what = "is no result of nimbus; expected JSON of nimbus bench, error, ledger, stress or compare"
+    what = "is no result of nimbus; expected JSON of nimbus bench, error, ledger, stress, compare"
+    what = f"{what} or history"
     raise _error(record.path, what)
 
 
@@ -524,7 +539,8 @@ def _check_schema(record: _Node, kind: str) -> None:
     if not isinstance(record.value, dict) or "schema" not in record.value:
         what = f"names no schema version; expected the JSON of nimbus {COMMANDS[kind]}"
         raise _error(record.path, what)
-    known = COMPARISON_SCHEMAS if kind == "comparison" else (SCHEMAS[kind],)
+    several = {"comparison": COMPARISON_SCHEMAS, "history": HISTORY_SCHEMAS}
+    known = several[kind] if kind in several else (SCHEMAS[kind],)
     version = record["schema"].integer()
     if version > known[-1]:
         what = f"has schema {version}, newer than {known[-1]}, which this reader knows"
@@ -687,7 +703,7 @@ class Metadata:
     """The conditions of a result. None: the file does not name them."""
 
     kind: str
-    """run, study, ledger, stress, comparison or frames."""
+    """run, study, ledger, stress, comparison, history or frames."""
     path: str
     """The file or folder, as it was named."""
     nimbus: Optional[str] = None
@@ -1381,9 +1397,6 @@ class Comparison(_Result):
 
     def __init__(self, metadata: Metadata, record: _Node) -> None:
         super().__init__(metadata, record)
-        if "matrix" in record.object():
-            what = "compares more than two runs; expected the output of nimbus compare A B --json"
-            raise _error(record.path, what)
         self.headline = record["headline"].text()
         """The measure that decides; the others are not corrected for many comparisons."""
         self.margin = record.get("margin").number()
@@ -1439,6 +1452,82 @@ class Comparison(_Result):
         return names + _aligned(rows, 2) + [f"{_plain(self.headline)} decides"]
 
 
+class History(_Result):
+    """The results of `nimbus history DIR… --json`.
+
+    `runs`: a row for each run, in `order`: its number, folder, date, version, revision, device and
+    scene.
+
+    `points`: a row for each figure of each run: the `value` with its 95 % interval within the run,
+    in `unit`, and the `level` between two changes. `quantity` is frame or RMSE, and `name` the case
+    and the loop.
+
+    `changes`: a row for each change: the first run after it (`run`), the runs that may as well be
+    (`run_low` to `run_high`), the last run before it (`after`), and `by`, the level after by the
+    level before, with its 95 % interval. `p` is the chance of such a change at one place if nothing
+    had changed.
+    """
+
+    TABLES = ("points", "changes", "runs")
+
+    def __init__(self, metadata: Metadata, record: _Node) -> None:
+        super().__init__(metadata, record)
+        self.order = record["order"].one_of("revision", "date")
+        """What the runs are ordered by."""
+        self.remarks = [remark.text() for remark in record["remarks"].each()]
+        """Sentences on runs that may mislead."""
+        texts = ("folder", "date", "nimbus", "revision", "device", "scene_hash")
+        rows = [
+            {"run": i, **{name: run[name].text() for name in texts}}
+            for i, run in enumerate(record["runs"].each())
+        ]
+        self.runs = _columns(rows, {"run": int, **{name: str for name in texts}})
+        points: List[Dict[str, Any]] = []
+        changes: List[Dict[str, Any]] = []
+        for of in record["series"].each():
+            names = {name: of[name].text() for name in ("quantity", "unit", "name")}
+            points.extend({**names, **self._point(point)} for point in of["points"].each())
+            changes.extend({**names, **self._change(change)} for change in of["changes"].each())
+        self.points = _columns(points, {**self.NAMES, **self.POINT_TYPES})
+        self.changes = _columns(changes, {**self.NAMES, **self.CHANGE_TYPES})
+
+    NAMES = {"quantity": str, "unit": str, "name": str}
+    POINT_TYPES = {"run": int, "value": float, "low": float, "high": float, "level": float}
+    CHANGE_TYPES = {
+        "run": int, "run_low": int, "run_high": int, "after": int, "by": float, "by_low": float,
+        "by_high": float, "p": float,
+    }  # fmt: skip
+
+    @staticmethod
+    def _point(of: _Node) -> Dict[str, Any]:
+        figure = of["figure"]
+        ends = {key: figure.get(key).number() for key in ("low", "high")}
+        numbers = {"value": figure["value"].number(), **ends, "level": of["level"].number()}
+        return {"run": of["run"].integer(), **numbers}
+
+    @staticmethod
+    def _change(of: _Node) -> Dict[str, Any]:
+        low, high = (run.integer() for run in of["runs"].each())
+        ends = (("", "estimate"), ("_low", "low"), ("_high", "high"))
+        row: Dict[str, Any] = {"run": of["run"].integer(), "run_low": low, "run_high": high}
+        row.update((f"by{end}", of["by"][key].number()) for end, key in ends)
+        return {**row, "after": of["after"].integer(), "p": of["p"].number()}
+
+    def _lines(self) -> List[str]:
+        rows = [["quantity", "name", "run", "value", "95 %", "level", "change"]]
+        changed = {
+            (of["quantity"], of["name"], of["run"]): f"x {_number(of['by'])}"
+            for of in _rows(self.changes)
+        }
+        for of in _rows(self.points):
+            form = _number if of["unit"] else _small
+            interval = _between(of["low"], of["high"], form)
+            change = changed.get((of["quantity"], of["name"], of["run"]), "")
+            numbers = [str(of["run"]), form(of["value"]), interval, form(of["level"])]
+            rows.append([of["quantity"], of["name"], *numbers, change])
+        return _aligned(rows, 2) + [_plain(remark) for remark in self.remarks]
+
+
 class Frames(_Result):
     """The merged frames of `nimbus farm merge`: an animation, a picture a file.
 
@@ -1486,7 +1575,7 @@ class Frames(_Result):
         return lines
 
 
-Result = Union[Run, Study, Ledger, Stress, Comparison, Frames]
+Result = Union[Run, Study, Ledger, Stress, Comparison, History, Frames]
 
 
 def _times_of_study(path: Path, record: _Node) -> Table:
@@ -1507,6 +1596,8 @@ def _read_record(record_path: Path, path: Path, folder: Optional[Path], verify: 
     _check_schema(record, kind)
     if kind == "comparison":
         return Comparison(_metadata(kind, path, None, False), record)
+    if kind == "history":
+        return History(_metadata(kind, path, None, False), record)
     verified = folder is not None and verify and _check_list(folder, kind)
     metadata = _metadata(kind, path, record, verified)
     if kind == "run":
@@ -1558,7 +1649,7 @@ def _record_of_folder(folder: Path) -> Path:
 
 
 def read(path: Union[str, "os.PathLike[str]"], verify: bool = True) -> Result:
-    """Reads a result of nimbus and returns a Run, Study, Ledger, Stress, Comparison or Frames.
+    """Reads a result of nimbus and returns an object of the class of its command.
 
     `path`: a folder of --out or of farm merge, its run.json, study.json or ledger.json, a file with
     the output of --json, or one with that of nimbus stress --csv. `verify`: whether the files must
@@ -1600,7 +1691,8 @@ Prints a short table of each result of nimbus.
 PATH is one of:
   a folder of        nimbus bench --out, nimbus error --out or nimbus ledger --out,
                      or of nimbus farm merge
-  a JSON file from   nimbus bench, error, ledger, stress or compare with --json
+  a JSON file from   nimbus bench, error, ledger, stress, compare or history with
+                     --json
   a CSV file from    nimbus stress --csv
 """
 

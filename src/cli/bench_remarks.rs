@@ -238,7 +238,7 @@ pub fn precision_lines(run: &Run) -> String {
     for (case, reached) in cases().filter(|(_, reached)| reached.ended_by.is_some()) {
         let name =
             if case.name().is_empty() { String::new() } else { format!("{}: ", case.name()) };
-        let (found, rounds) = (or_dash(reached.half_width, percent), reached.rounds);
+        let (found, rounds) = (or_dash(reached.reach, percent), reached.rounds);
         let why = match reached.ended_by {
             Some(Limit::Memory) => "more frames would not fit in memory".to_owned(),
             _ => format!("further rounds would take longer than --time-limit {limit_s}"),
@@ -248,7 +248,7 @@ pub fn precision_lines(run: &Run) -> String {
         );
     }
     let reached = cases().filter(|(_, reached)| reached.ended_by.is_none());
-    let widest = reached.clone().filter_map(|(_, r)| r.half_width).reduce(f64::max);
+    let widest = reached.clone().filter_map(|(_, r)| r.reach).reduce(f64::max);
     if let Some(widest) = widest {
         let rounds = reached.map(|(_, r)| r.rounds);
         let rounds = match extremes(rounds.map(f64::from)) {
@@ -271,8 +271,8 @@ fn rmse_text(rmse: Figure) -> String {
 }
 
 /// Returns two lines about the error of a case's picture: how far it is from its reference, and
-/// whether that is right.
-pub fn error_lines(case: &Case) -> String {
+/// whether that is right. `failed` are the stages that the device computes wrongly.
+pub fn error_lines(case: &Case, failed: &[String]) -> String {
     let Some(check) = &case.check else { return String::new() };
     let reason = check.reason.as_deref().unwrap_or_default();
     if check.verdict == CheckVerdict::NotChecked {
@@ -280,7 +280,7 @@ pub fn error_lines(case: &Case) -> String {
     }
     let settings = check.settings_rms.filter(|rms| *rms > 0.0);
     let settings = settings.map(|rms| format!("; the settings of `draw` make {rms:.1e} of it"));
-    let mut out = format!(
+    let out = format!(
         "error: RMSE {} against f64, at most {}, over {} pixels of frame {}{}\n",
         or_dash(check.rmse, rmse_text),
         or_dash(check.max, |max| format!("{max:.1e}")),
@@ -300,6 +300,12 @@ pub fn error_lines(case: &Case) -> String {
         .map(|Bounded { rms, bound }| format!("light off by {rms:.1e} of {bound:.1e} allowed"));
     let reason = Some(reason.to_owned()).filter(|reason| !reason.is_empty());
     let parts: Vec<String> = [drawing, light, reason].into_iter().flatten().collect();
-    out += &format!("the picture is right: {}\n", parts.join("; "));
-    out
+    let verdict = match failed {
+        [] => "the picture is right".to_owned(),
+        _ => format!(
+            "THE DEVICE IS WRONG in {}; the picture is within its bounds",
+            failed.join(", ")
+        ),
+    };
+    out + &format!("{verdict}: {}\n", parts.join("; "))
 }

@@ -4,12 +4,17 @@ use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use clap::ColorChoice;
+use tempfile::TempDir;
 
 use super::args::BenchArgs;
 use super::bench::{self, Context, out_dirs};
 use super::bench_cases::bench_cases;
-use super::bench_record::{Runs, print_json};
+use super::bench_record::print_json;
+use super::interrupt::{self, PATIENCE_WITH_CHILDREN};
 use super::output::{self, wrote_folder};
 use super::progress::progress;
 use super::{bench_plot, bench_table};
@@ -17,13 +22,14 @@ use crate::error::{Error, Result};
 use crate::farm::process::{self, IDLE_LIMIT};
 use crate::io::console::say;
 use crate::io::process_info::command_line;
-use crate::io::result_folder::Existing;
+use crate::io::result_folder::{Existing, ResultFolder};
 use crate::io::text_file::{TABLE_LIMIT, read_result};
 use crate::timing::attachments::{Attachments, picture_file};
 use crate::timing::frame_rows::{FRAMES_FILE, parse_frames};
 use crate::timing::json;
 use crate::timing::results::{open_results, write_results};
 use crate::timing::starts::{Start, join};
+use crate::timing::state::{STATE_FILE, parse_rows, rows_text};
 
 /// Runs `nimbus bench`, in this process or in those of `--starts`.
 ///
@@ -45,11 +51,11 @@ fn of_start(args: &BenchArgs, folder: &Path) -> BenchArgs {
     args
 }
 
-/// Runs the bench of every scene in `--starts` processes.
+/// Runs the bench of a scene in `--starts` processes.
 ///
 /// # Errors
-/// Fails if the arguments or a scene are faulty, a process fails, or Ctrl-C came. Starts that ended
-/// before are kept.
+/// Fails if the arguments or the scene are faulty, a process fails, or Ctrl-C came. Starts that
+/// ended before are kept.
 fn run_starts(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
     if args.scenes.len() > 1 {
         let n = args.scenes.len();
@@ -59,64 +65,106 @@ fn run_starts(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
     let mut quiet = args.options.clone();
     (quiet.quiet, quiet.verbose) = (true, false);
     let n_cases = bench_cases(args, &args.scenes[0], &quiet)?.cases.len();
-    let mut folder = out
+    let folder = out
         .map(|dir| open_results(&dir, Existing::new(args.force), n_cases, args.plot))
         .transpose()?;
     let places = tempfile::tempdir().map_err(|cause| Error::io(Path::new("--starts"), cause))?;
-    let bar = progress(u64::from(args.starts), "starts", args.options.quiet);
-    let mut starts = Vec::new();
-    let mut ended = Ok(());
-    for i in 0..args.starts {
-        let place = places.path().join(i.to_string());
-        ended = start(&place, context, i == 0 && !args.options.quiet);
-        // A start that was cut short has other frames than the others.
-        if ended.is_ok() || starts.is_empty() {
-            starts.extend(read(&place)?);
+    let path = places.path().to_owned();
+    let (args, color) = (args.clone(), context.color);
+    let ended = Ended { args, color, n_cases, places, folder, starts: vec![] };
+    let (n_starts, is_quiet) = (ended.args.starts, ended.args.options.quiet);
+    let ended = Arc::new(Mutex::new(Some(ended)));
+    let mut keeping = {
+        let ended = ended.clone();
+        interrupt::keep(PATIENCE_WITH_CHILDREN, move || {
+            let kept = lock(&ended).take().map_or(Ok(()), |ended| ended.record(true));
+            kept.err().unwrap_or(Error::Interrupted)
+        })
+    };
+    let bar = progress(u64::from(n_starts), "starts", is_quiet);
+    let (begin, mut outcome) = (Instant::now(), Ok(()));
+    for i in 0..n_starts {
+        let place = path.join(i.to_string());
+        let begin_s = begin.elapsed().as_secs_f64();
+        outcome = start(&place, context, i == 0 && !is_quiet);
+        if let Some(ended) = lock(&ended).as_mut() {
+            // A start that was cut short has other frames than the others.
+            if outcome.is_ok() || ended.starts.is_empty() {
+                ended.starts.extend(read(&place, begin_s)?);
+            }
         }
-        if ended.is_err() {
+        if outcome.is_err() {
             break;
         }
         bar.advance();
     }
     drop(bar);
-    if starts.is_empty() {
-        return ended;
+    keeping.finish();
+    let Some(ended) = lock(&ended).take() else { return outcome };
+    // A wrong picture takes no frame away.
+    let is_cut = matches!(&outcome, Err(error) if !matches!(error, Error::Check { .. }));
+    if is_cut && ended.starts.is_empty() && outcome == Err(Error::Interrupted) {
+        say!("no frame was finished, nothing is kept");
     }
-    let mut joined = join(&starts)?;
-    joined.run.command = command_line();
-    joined.run.interrupted |= ended.is_err();
-    let Start { run, table } = joined;
-    let written = folder.as_mut().map_or(Ok(()), |folder| {
-        let charts = if args.plot { bench_plot::files(&run, &table.rows)? } else { vec![] };
-        let copy = |i: usize| {
-            let from = places.path().join("0").join(picture_file(i));
-            from.exists().then(|| (picture_file(i), from))
-        };
-        let copies = (0..n_cases).filter_map(copy).collect();
-        write_results(
-            folder,
-            &run,
-            &table,
-            &Attachments { charts, copies, ..Attachments::default() },
-        )
-    });
-    // The tables appear even where the files cannot be written.
-    if !args.json {
-        let same: Vec<Option<bool>> = (0..n_cases).map(|i| same_pictures(&starts, i)).collect();
-        let text = bench_table::report(&args.scenes[0], &run, &same, args.options.verbose);
-        output::text(&text)?;
-        if args.plot {
-            output::painted(&bench_plot::text(&run, &table.rows, context.color)?)?;
+    if ended.starts.is_empty() { outcome } else { ended.record(is_cut).and(outcome) }
+}
+
+/// The starts that have ended, and where their results go.
+struct Ended {
+    args: BenchArgs,
+    color: ColorChoice,
+    n_cases: usize,
+    /// The folders of the starts, by their numbers.
+    places: TempDir,
+    folder: Option<ResultFolder>,
+    starts: Vec<Start>,
+}
+
+fn lock(ended: &Mutex<Option<Ended>>) -> MutexGuard<'_, Option<Ended>> {
+    ended.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Ended {
+    /// Writes and prints the results of the starts that have ended; `is_cut` if others are missing.
+    fn record(self, is_cut: bool) -> Result<()> {
+        let Ended { args, color, n_cases, places, mut folder, starts } = self;
+        if starts.is_empty() {
+            say!("no start was finished, nothing is kept");
+            return Ok(());
         }
+        let mut joined = join(&starts)?;
+        joined.run.command = command_line();
+        joined.run.interrupted |= is_cut;
+        let Start { run, table, readings, .. } = joined;
+        let written = folder.as_mut().map_or(Ok(()), |folder| {
+            let charts = if args.plot { bench_plot::files(&run, &table.rows)? } else { vec![] };
+            let copy = |i: usize| {
+                let from = places.path().join("0").join(picture_file(i));
+                from.exists().then(|| (picture_file(i), from))
+            };
+            let copies = (0..n_cases).filter_map(copy).collect();
+            let mut tables = vec![];
+            if !readings.is_empty() {
+                tables.push((STATE_FILE.to_owned(), rows_text(&readings)?));
+            }
+            let attachments = Attachments { charts, copies, tables, ..Attachments::default() };
+            write_results(folder, &run, &table, &attachments)
+        });
+        // The tables appear even where the files cannot be written.
+        if !args.json {
+            let same: Vec<Option<bool>> = (0..n_cases).map(|i| same_pictures(&starts, i)).collect();
+            let text = bench_table::report(&args.scenes[0], &run, &same, args.options.verbose);
+            output::text(&text)?;
+            if args.plot {
+                output::painted(&bench_plot::text(&run, &table.rows, color)?)?;
+            }
+        }
+        written?;
+        if let Some(folder) = &folder {
+            wrote_folder(folder, !run.interrupted, args.options.quiet);
+        }
+        print_json(&args, &Arc::new(Mutex::new(vec![run])))
     }
-    written?;
-    if let Some(folder) = &folder {
-        wrote_folder(folder, !run.interrupted, args.options.quiet);
-    }
-    let runs: Runs = Arc::new(Mutex::new(vec![]));
-    runs.lock().unwrap_or_else(PoisonError::into_inner).push(run);
-    print_json(args, &runs)?;
-    ended
 }
 
 /// Returns whether the last frames of a case are the same in all loops and starts; None if fewer
@@ -182,11 +230,16 @@ fn words(own: impl Iterator<Item = OsString>, place: &Path) -> Vec<OsString> {
 }
 
 /// Reads what a start wrote; none if it has written nothing.
-fn read(place: &Path) -> Result<Option<Start>> {
+fn read(place: &Path, begin_s: f64) -> Result<Option<Start>> {
     let path = place.join(FRAMES_FILE);
     if !path.exists() {
         return Ok(None);
     }
     let table = parse_frames(&read_result(&path, TABLE_LIMIT)?, &path)?;
-    Ok(Some(Start { run: json::read(place)?, table }))
+    let path = place.join(STATE_FILE);
+    let readings = match path.exists() {
+        true => parse_rows(&read_result(&path, TABLE_LIMIT)?, &path)?,
+        false => vec![],
+    };
+    Ok(Some(Start { run: json::read(place)?, table, readings, begin_s }))
 }

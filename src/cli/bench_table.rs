@@ -46,9 +46,10 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
         out += &skipped_text(run).map_or(String::new(), |text| text + "\n");
         out += &format!("\n{}\n", table(&pass_by_case_rows(run)));
     }
+    let failed = run.stages.as_ref().map_or(&[][..], |stages| &stages.failed);
     for (case, same) in run.cases.iter().zip(same) {
         if run.cases.len() == 1 || verbose {
-            out += &case_report(case, *same);
+            out += &case_report(case, *same, failed);
             let state = case.state.as_ref().filter(|_| run.cases.len() > 1);
             out += &state.and_then(case_line).unwrap_or_default();
             if verbose {
@@ -74,8 +75,9 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
 
 const DIFFER: &str = "THE LAST FRAMES DIFFER between the blocks\n";
 
-/// Returns the tables and remarks of one case.
-fn case_report(case: &Case, same: Option<bool>) -> String {
+/// Returns the tables and remarks of one case; `failed` are the stages that the device computes
+/// wrongly.
+fn case_report(case: &Case, same: Option<bool>, failed: &[String]) -> String {
     let mut out = String::new();
     if !case.name().is_empty() {
         out += &format!("{}\n", case.name());
@@ -86,7 +88,7 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
     }
     out += &bench_invocations::text(case);
     if case.is_still() {
-        return out + &still_line(case) + &last_frame_lines(case, same);
+        return out + &still_line(case) + &last_frame_lines(case, same, failed);
     }
     if let Some(ratio) = case.ratio {
         let interval = match ratio.low.zip(ratio.high) {
@@ -100,12 +102,12 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
     out += &latency_line(case).unwrap_or_default();
     out += &drawn_line(case).unwrap_or_default();
     out += &empty_line(case).unwrap_or_default();
-    out + &last_frame_lines(case, same)
+    out + &last_frame_lines(case, same, failed)
 }
 
 /// Returns what skipping saved, and the remarks on the last frames.
-fn last_frame_lines(case: &Case, same: Option<bool>) -> String {
-    let mut out = error_lines(case);
+fn last_frame_lines(case: &Case, same: Option<bool>, failed: &[String]) -> String {
+    let mut out = error_lines(case, failed);
     out += &case.skipping.as_ref().map_or(String::new(), skipping_line);
     out += &case.counts.map_or(String::new(), |counts| format!("last frame: {}\n", counts.text()));
     out += match same {

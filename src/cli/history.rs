@@ -1,7 +1,8 @@
 //! `nimbus history DIR…`: a series of results, and where it changes.
 
+use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
@@ -13,8 +14,8 @@ use crate::error::{Error, Result};
 use crate::io::atomic;
 use crate::report::pages::{HistoryRun, history_page};
 use crate::timing::compare::HEADLINE;
-use crate::timing::difference::{Condition, differences};
-use crate::timing::history::{NamedFigure, Series, SeriesChange, figures, history};
+use crate::timing::difference::{Condition, differences, wrong_text};
+use crate::timing::history::{LEAST_RUNS, NamedFigure, Series, SeriesChange, figures, history};
 use crate::timing::records::Run;
 use crate::timing::results::{BenchResults, read_results};
 
@@ -45,6 +46,11 @@ pub fn run(args: &HistoryArgs) -> Result<()> {
         let path = path.display();
         return Err(Error::usage(format!("{path}: expected a file name that ends in .html")));
     }
+    check_folders(&args.runs)?;
+    let repository = Repository::new(args.repo.as_deref().unwrap_or(Path::new(".")));
+    if args.repo.is_some() {
+        repository.check()?;
+    }
     let _claim = page.map(|path| claim_file(path, args.force)).transpose()?;
     let mut entries = Vec::new();
     for folder in &args.runs {
@@ -55,7 +61,6 @@ pub fn run(args: &HistoryArgs) -> Result<()> {
         entries.push(Entry { folder: folder.clone(), run, figures });
     }
     check_conditions(args, &entries)?;
-    let repository = Repository::new(&args.repo);
     let by_revision = sort(&mut entries, &repository);
     let all: Vec<Vec<NamedFigure>> = entries.iter().map(|e| e.figures.clone()).collect();
     let series = history(&all);
@@ -71,15 +76,45 @@ pub fn run(args: &HistoryArgs) -> Result<()> {
         return output::object(&json!({
             "schema": REPORT_SCHEMA, "runs": sides,
             "order": if by_revision { "revision" } else { "date" },
-            "series": series, "next": next.map(|next| next.json()),
+            "remarks": remarks(&entries), "series": series,
+            "next": next.map(|next| next.json()),
         }));
     }
     let mut out = runs_text(&entries, by_revision);
+    remarks(&entries).iter().for_each(|remark| out += &format!("{remark}\n"));
     for of in &series {
         out += &format!("\n{}", series_text(of, &entries));
     }
     out += &next.map_or(String::new(), |next| format!("\n{}", next.text()));
     output::text(&out)
+}
+
+/// Refuses a folder that is named twice: its run would count as two that agree.
+fn check_folders(folders: &[PathBuf]) -> Result<()> {
+    let mut known: BTreeMap<PathBuf, &Path> = BTreeMap::new();
+    for folder in folders {
+        // A folder that is not there is reported when it is read.
+        let Ok(place) = folder.canonicalize() else { continue };
+        if let Some(other) = known.insert(place, folder) {
+            let (a, b) = (other.display(), folder.display());
+            let what = format!("{a} and {b} are one folder; name each run once");
+            return Err(Error::usage(what));
+        }
+    }
+    Ok(())
+}
+
+/// Returns sentences about runs that may mislead.
+fn remarks(entries: &[Entry]) -> Vec<String> {
+    let of = |(i, entry): (usize, &Entry)| {
+        let run = &entry.run;
+        let cut = run.interrupted.then(|| "interrupted: its last block is incomplete".to_owned());
+        let cold =
+            run.cold_bytes.map(|_| "cold caches, so its frame times are left out".to_owned());
+        let all = [cut, cold, wrong_text(run)].into_iter().flatten();
+        all.map(move |text| format!("run {i}: {text}")).collect::<Vec<String>>()
+    };
+    entries.iter().enumerate().flat_map(of).collect()
 }
 
 /// Refuses runs whose times cannot be compared. Builds differ in a history.
@@ -165,7 +200,10 @@ fn series_text(of: &Series, entries: &[Entry]) -> String {
         ]);
     }
     let mut out = output::table(&rows);
-    if of.changes.is_empty() {
+    let n = of.points.len();
+    if n < LEAST_RUNS {
+        out += &format!("{n} of the {LEAST_RUNS} runs that a change needs to be found\n");
+    } else if of.changes.is_empty() {
         out += "no change beyond the noise\n";
     }
     out

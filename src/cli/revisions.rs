@@ -23,6 +23,14 @@ impl Repository {
         Repository(folder.to_owned())
     }
 
+    /// Returns whether this is a checkout.
+    ///
+    /// # Errors
+    /// Fails if it is not.
+    pub fn check(&self) -> Result<()> {
+        self.git(&["rev-parse", "--git-dir"]).map(|_| ())
+    }
+
     /// Returns for each of `revisions` its place among all of them, an ancestor before its
     /// descendants. None if this is no checkout that has them all.
     pub fn places(&self, revisions: &[&str]) -> Option<Vec<usize>> {

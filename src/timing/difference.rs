@@ -6,6 +6,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::check::Check;
 use super::records::Run;
 
 /// A condition that two runs must share to be comparable, as `--allow` names it.
@@ -172,11 +173,28 @@ pub(super) fn remarks(a: &Run, b: &Run) -> Vec<String> {
             ));
         }
     }
+    for (name, run) in [("A", a), ("B", b)] {
+        remarks.extend(wrong_text(run).map(|text| format!("{name}: {text}")));
+    }
     let [of_a, of_b] = [a, b].map(|run| relevant_words(&run.command).join(" "));
     if of_a != of_b {
         remarks.push(format!("the commands of A and B differ: A \"{of_a}\", B \"{of_b}\""));
     }
     remarks
+}
+
+/// Returns a sentence on a run whose pictures or stages are wrong; `None` if none is known to be.
+pub fn wrong_text(run: &Run) -> Option<String> {
+    let is_wrong = run.cases.iter().any(|case| case.check.as_ref().is_some_and(Check::is_wrong));
+    let failed = run.stages.as_ref().map_or(&[][..], |stages| &stages.failed);
+    if is_wrong {
+        Some("the device's picture is wrong, so its times are not those of the scene".to_owned())
+    } else if failed.is_empty() {
+        None
+    } else {
+        let failed = failed.join(", ");
+        Some(format!("the device is wrong in {failed}, so its times may not be those of the scene"))
+    }
 }
 
 /// Returns the command without the program and the arguments that change no time: the place of the

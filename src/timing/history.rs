@@ -7,13 +7,16 @@ use super::intervals::{median_interval, values};
 use super::records::{Case, Mode};
 use super::results::{BenchResults, TimedMode};
 use crate::measure::bootstrap::Interval;
-use crate::measure::changes::{Change, changes};
+use crate::measure::changes::{Change, LEAST_SEGMENT, changes};
 use crate::measure::figure::Figure;
 use crate::measure::stats::median;
 
 /// The 97.5th percentile of the normal distribution: how many standard errors a 95 % interval
 /// reaches to each side.
 const Z: f64 = 1.96;
+
+/// Least runs in which a change can be found: some on each side of it.
+pub const LEAST_RUNS: usize = 2 * LEAST_SEGMENT;
 
 /// A figure of one loop or case, run after run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -70,9 +73,11 @@ pub struct NamedFigure {
 }
 
 /// Returns the median frame time of every loop of a run, and the error of every case. A loop that
-/// draws nothing is left out if its case has another loop.
+/// draws nothing is left out if its case has another loop. Runs with cold caches have no frame
+/// times: theirs contain what is written between passes.
 pub fn figures(run: &BenchResults) -> Vec<NamedFigure> {
-    let drawing = run.timed().filter(|(case, mode, _)| !case.is_left_out(mode));
+    let is_cold = run.run.cold_bytes.is_some();
+    let drawing = run.timed().filter(|(case, mode, _)| !is_cold && !case.is_left_out(mode));
     let time = |(.., timed): (&Case, &Mode, &TimedMode)| {
         let blocks = timed.times(HEADLINE);
         let (low, high) = median_interval(blocks, timed.widening).map(|i| (i.low, i.high)).unzip();

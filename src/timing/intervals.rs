@@ -40,7 +40,13 @@ pub fn median_interval(blocks: &[Block], widening: f64) -> Option<Interval> {
         Some(median) => Some(median.interval(widening)),
         // Frames of a start do not tell how starts differ.
         None if has_starts(blocks) => None,
-        None => Bootstrap::of_neighbours(ms.len()).median(&ms),
+        None => {
+            let interval = Bootstrap::of_neighbours(ms.len()).median(&ms)?;
+            // The widened interval can reach beyond the values, which no median does.
+            let (least, most) = extremes(ms.iter().copied())?;
+            let Interval { estimate, low, high } = interval;
+            Some(Interval { estimate, low: low.max(least), high: high.min(most) })
+        }
     }
 }
 

@@ -35,7 +35,7 @@ const MOST_GROWTH: f64 = 4.0;
 /// What a bench with `--precision` was asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Precision {
-    /// Half the width of every interval, relative to its estimate.
+    /// How far every interval may reach to either side of its estimate, relative to it.
     pub wanted: f64,
     /// Seed of the random order of blocks.
     pub seed: u64,
@@ -53,8 +53,8 @@ pub fn n_segments(n_frames: u32) -> u32 {
 /// The answer of a look at the intervals of a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
-    /// Half the width of the widest interval, relative to its estimate, as it is to be reported;
-    /// none without an interval.
+    /// How far the widest interval reaches from its estimate, relative to it, as it is to be
+    /// reported; none without an interval.
     pub widest: Option<f64>,
     /// The number of rounds at the next look; none if the intervals are narrow enough.
     pub next: Option<u32>,
@@ -73,7 +73,7 @@ pub fn look(
     if n_rounds < floor {
         return Look { widest: None, next: Some(floor) };
     }
-    let widths = intervals(WIDENING).map(|all| all.into_iter().map(half_width).collect::<Vec<_>>());
+    let widths = intervals(WIDENING).map(|all| all.into_iter().map(reach).collect::<Vec<_>>());
     let widest = widths.filter(|w| !w.is_empty()).map(|w| w.into_iter().fold(0.0, f64::max));
     let next = match widest {
         Some(widest) if widest <= wanted => None,
@@ -87,19 +87,17 @@ pub fn look(
     Look { widest, next }
 }
 
-/// Returns half the width of an interval, relative to its estimate.
-fn half_width(interval: Interval) -> f64 {
-    if interval.estimate > 0.0 {
-        0.5 * (interval.high - interval.low) / interval.estimate
-    } else {
-        f64::INFINITY
-    }
+/// Returns how far an interval reaches from its estimate, on the wider side, relative to it.
+pub(super) fn reach(interval: Interval) -> f64 {
+    let Interval { estimate, low, high } = interval;
+    if estimate > 0.0 { (high - estimate).max(estimate - low) / estimate } else { f64::INFINITY }
 }
 
 /// The rule that decided how many blocks were timed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PrecisionRecord {
-    /// Half the width that every 95 % interval should have at most, relative to its estimate.
+    /// How far every 95 % interval should reach to either side of its estimate at most, relative to
+    /// it.
     pub wanted: f64,
     /// Seed of the random order of the blocks.
     pub seed: u64,
@@ -110,8 +108,9 @@ pub struct PrecisionRecord {
 /// How narrow the intervals of a case are.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reached {
-    /// Half the width of the widest interval, relative to its estimate; null without an interval.
-    pub half_width: Option<f64>,
+    /// How far the widest interval reaches from its estimate, relative to it; null without an
+    /// interval.
+    pub reach: Option<f64>,
     /// Rounds, each with a block of every loop.
     pub rounds: u32,
     /// What ended the case before its intervals were narrow enough: "time" or "memory"; null if

@@ -203,7 +203,7 @@ impl Bench<'_> {
             (self.on)(Event::More(of_cycle(next - n_rounds.max(floor.min(next)))));
             return false;
         }
-        let reached = Reached { half_width: look.widest, rounds: n_rounds, ended_by };
+        let reached = Reached { reach: look.widest, rounds: n_rounds, ended_by };
         lock(self.outcome).reached.insert(i_case, reached);
         true
     }

@@ -10,7 +10,8 @@ use crate::frame::{Amounts, floor};
 
 /// Fills in bytes, operations and shares of all passes. `amounts` are by case; a case that did not
 /// run to its end has none. Without ceilings there are no shares. With cold caches the times of
-/// frames contain what is written between passes, and no loop is a case's figure.
+/// frames contain what is written between passes: no loop is a case's figure, and none is compared
+/// with another.
 pub fn add(
     cases: &mut [Case],
     amounts: &BTreeMap<usize, Amounts>,
@@ -18,7 +19,9 @@ pub fn add(
     is_cold: bool,
 ) {
     for (i, case) in cases.iter_mut().enumerate() {
-        case.figure = case.figure.take().filter(|_| !is_cold);
+        if is_cold {
+            (case.figure, case.ratio, case.overlap) = (None, None, None);
+        }
         let Some(amounts) = amounts.get(&i) else { continue };
         for pass in case.modes.iter_mut().flat_map(|mode| &mut mode.passes) {
             let known = Pass::ALL.into_iter().find(|known| known.name() == pass.name);

@@ -8,9 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::difference::{Facts, fact_differences};
 use super::frame_rows::{FrameRow, FrameTable};
-use super::records::{Block, Case, Mode, Pass, Reason, Run};
+use super::precision::{Reached, WIDENING, reach};
+use super::records::{Block, Case, Mode, Pass, Ratio, Reason, Run};
+use super::state::rules::FrameSpan;
+use super::state::{CaseState, Observed, RunState, StateRow, TimedFrame};
 use super::timed_rows::{self, TimedRows};
 use crate::error::{Error, Result};
+use crate::measure::bootstrap::Interval;
 
 /// The results of one start.
 #[derive(Debug, Clone)]
@@ -19,6 +23,10 @@ pub struct Start {
     pub run: Run,
     /// Its frames.
     pub table: FrameTable,
+    /// Readings of the machine's state; none if it was not read.
+    pub readings: Vec<StateRow>,
+    /// Its beginning, in seconds since that of the first start.
+    pub begin_s: f64,
 }
 
 /// Joins starts of one bench, in their order. The record is the first one's where they agree.
@@ -36,32 +44,43 @@ pub fn join(starts: &[Start]) -> Result<Start> {
         return Err(Error::Check { what: format!("starts of one bench differ:\n  {list}") });
     }
     let mut block_order = Vec::new();
-    let mut rows = Vec::new();
+    let (mut rows, mut readings) = (Vec::new(), Vec::new());
     for (start, of) in (0..).zip(starts) {
         let n_before = block_order.len() as u32;
         let block = |block: &Block| Block { start, ..block.clone() };
         block_order.extend(of.run.block_order.iter().map(block));
-        let row = |row: &FrameRow| FrameRow { block: n_before + row.block, ..row.clone() };
+        let row = |row: &FrameRow| FrameRow {
+            block: n_before + row.block,
+            end_s: row.end_s.map(|s| of.begin_s + s),
+            ..row.clone()
+        };
         rows.extend(of.table.rows.iter().map(row));
+        let reading = |row: &StateRow| StateRow {
+            time_s: of.begin_s + row.time_s,
+            block: row.block.map(|block| n_before + block),
+            ..row.clone()
+        };
+        readings.extend(of.readings.iter().map(reading));
     }
     let joined = Joined { starts, block_order: &block_order, rows: &rows };
-    let cases = (0..first.run.cases.len()).map(|i| joined.case(i)).collect();
+    let (state, states) = joined.states(&readings);
+    let of_case = |i: usize| Case { state: states.get(&i).cloned(), ..joined.case(i) };
+    let cases = (0..first.run.cases.len()).map(of_case).collect();
     let chosen: BTreeSet<&String> = starts.iter().flat_map(|start| &start.run.chosen).collect();
     let run = Run {
         cases,
         chosen: chosen.into_iter().cloned().collect(),
-        // Each start has its own.
-        state: None,
+        state,
         interrupted: starts.iter().any(|start| start.run.interrupted),
         block_order,
         ..first.run.clone()
     };
     let table = FrameTable { pass_names: first.table.pass_names.clone(), rows };
-    Ok(Start { run, table })
+    Ok(Start { run, table, readings, begin_s: 0.0 })
 }
 
 /// What starts of one bench share.
-fn facts(Start { run, table }: &Start) -> Facts {
+fn facts(Start { run, table, .. }: &Start) -> Facts {
     let cases = run.cases.iter().map(|case| {
         let loops = case.modes.iter().map(Mode::name).collect::<Vec<_>>().join(", ");
         format!("{} ({}): {loops}", case.name(), case.scene_hash)
@@ -89,7 +108,53 @@ impl<'a> Joined<'a> {
                 (b.case, &b.threading, b.skip) == (i_case, &mode.threading, mode.skip)
             })
         };
-        TimedRows::new(self.rows.iter().filter(is_of), self.block_order, 1.0)
+        // Where a precision was asked for, the rule has chosen the number of rounds.
+        let has_rule = self.starts[0].run.cases[i_case].precision.is_some();
+        let widening = if has_rule { WIDENING } else { 1.0 };
+        TimedRows::new(self.rows.iter().filter(is_of), self.block_order, widening)
+    }
+
+    /// Returns the state of the machine over all starts, and that of each case.
+    fn states(&self, readings: &[StateRow]) -> (Option<RunState>, BTreeMap<usize, CaseState>) {
+        let all: Vec<&RunState> = self.starts.iter().filter_map(|s| s.run.state.as_ref()).collect();
+        let (Some(first), run) = (all.first(), &self.starts[0].run) else {
+            return (None, BTreeMap::new());
+        };
+        let mut loops = BTreeMap::new();
+        let frame = |row: &FrameRow| {
+            let block = self.block_order.get(row.block as usize)?;
+            let next = loops.len();
+            let kind = (block.case, block.threading.as_str(), block.skip);
+            let i_loop = *loops.entry(kind).or_insert(next);
+            let end_s = row.end_s?;
+            let begin_s = end_s - 1e-3 * row.frame_ms;
+            let span = FrameSpan { i_block: row.block, begin_s, end_s };
+            Some(TimedFrame { i_case: block.case, i_loop, span })
+        };
+        let frames: Vec<TimedFrame> =
+            self.rows.iter().filter(|row| !row.warm_up).filter_map(frame).collect();
+        let observed = Observed {
+            rows: readings,
+            sources: &first.sources,
+            frames: &frames,
+            is_cpu: run.device.kind == "cpu",
+            n_cores: run.cpu.logical_cores,
+            discard: self.rows.iter().any(|row| row.discarded),
+        };
+        let (_, mut state, mut cases) = observed.judge();
+        // Times of processors are counted by each process from its own beginning.
+        let most =
+            |shares: &mut dyn Iterator<Item = Option<f64>>| shares.flatten().reduce(f64::max);
+        state.all.others_share = most(&mut all.iter().map(|state| state.all.others_share));
+        for (i, case) in &mut cases {
+            let of = |start: &Start| start.run.cases[*i].state.as_ref()?.others_share;
+            case.others_share = most(&mut self.starts.iter().map(of));
+        }
+        let remarks = all.iter().enumerate().flat_map(|(i, state)| {
+            state.remarks.iter().map(move |remark| format!("start {i}: {remark}"))
+        });
+        state.remarks = remarks.collect();
+        (Some(state), cases)
     }
 
     fn case(&self, i: usize) -> Case {
@@ -121,23 +186,38 @@ impl<'a> Joined<'a> {
             timed_rows::skipping(&timed[with], &timed[u], same_bytes)
         });
         let is_wrong = |case: &&&Case| case.check.as_ref().is_some_and(|check| check.is_wrong());
-        // Of starts whose precisions differ, the widest counts.
-        let precision = all.iter().filter_map(|case| case.precision).max_by(|a, b| {
-            (a.ended_by.is_some(), a.half_width.unwrap_or(f64::INFINITY))
-                .partial_cmp(&(b.ended_by.is_some(), b.half_width.unwrap_or(f64::INFINITY)))
-                .unwrap_or(std::cmp::Ordering::Equal)
+        let ratio = serial.zip(parallel).and_then(|(s, p)| timed_rows::ratio(s, p));
+        let reached: Vec<Reached> = all.iter().filter_map(|case| case.precision).collect();
+        let precision = (!reached.is_empty()).then(|| Reached {
+            reach: widest(&modes, ratio),
+            rounds: reached.iter().map(|of| of.rounds).sum(),
+            ended_by: reached.iter().find_map(|of| of.ended_by),
         });
         Case {
-            ratio: serial.zip(parallel).and_then(|(s, p)| timed_rows::ratio(s, p)),
+            ratio,
             overlap: serial.and_then(|serial| timed_rows::overlap(serial, parallel)),
             skipping,
             check: all.iter().find(is_wrong).unwrap_or(&first).check.clone(),
             precision,
-            state: None,
             modes,
             ..first.clone()
         }
     }
+}
+
+/// Returns how far the widest interval reaches, of the loops that draw and of their ratio; none
+/// without an interval.
+fn widest(modes: &[Mode], ratio: Option<Ratio>) -> Option<f64> {
+    let draws = |mode: &&Mode| 2 * mode.empty_frames.unwrap_or(0) < mode.frames;
+    let of_modes = modes.iter().filter(draws).map(|mode| {
+        let of = mode.frame_ms?;
+        Some(reach(Interval { estimate: of.of.p50, low: of.p50_low?, high: of.p50_high? }))
+    });
+    let of_ratio = ratio.map(|r| {
+        Some(reach(Interval { estimate: r.parallel_by_serial, low: r.low?, high: r.high? }))
+    });
+    let all: Option<Vec<f64>> = of_modes.chain(of_ratio).collect();
+    all?.into_iter().reduce(f64::max)
 }
 
 /// Joins the records of a loop; `whole` are the rows of the loop without skipping.

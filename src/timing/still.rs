@@ -30,6 +30,7 @@ impl StillRemark {
         };
         let empty = empty_frames_text(case).unwrap_or_default();
         let figure = match (case.figure_mode(), run.cases.len()) {
+            _ if run.cold_bytes.is_some() => "With cold caches no loop has a figure.".to_owned(),
             (None, _) => {
                 "Only a loop without skipping has a time for such a scene; none was timed."
                     .to_owned()

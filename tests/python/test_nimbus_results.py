@@ -430,6 +430,32 @@ class Others(InFolder):
         self.write("d.json", value)
         self.refused("d.json", "`modes.0.measures.0` has no key `verdict`")
 
+    def test_a_history(self):
+        side = {"folder": "night", "date": "2026-01-01T00:00:00Z", "nimbus": "0.1.0",
+                "revision": "abc", "device": "llvmpipe", "scene_hash": "00"}
+        figures = [(10.0, 9.9, 10.1, 10.0), (12.0, None, None, 12.0)]
+        points = [
+            {"run": i, "figure": {"value": value, "low": low, "high": high}, "level": level}
+            for i, (value, low, high, level) in enumerate(figures)
+        ]
+        by = {"estimate": 1.2, "low": 1.1, "high": 1.3}
+        change = {"after": 0, "run": 1, "runs": [1, 1], "by": by, "p": 1e-9}
+        series = {"quantity": "frame", "unit": "ms", "name": "serial", "points": points,
+                  "changes": [change]}
+        value = {"schema": 1, "runs": [side, {**side, "folder": "later"}], "order": "date",
+                 "remarks": ["run 1: interrupted"], "series": [series], "next": None}
+        found = nr.read(self.write("history.json", value))
+        self.assertEqual(found.runs["folder"].tolist(), ["night", "later"])
+        self.assertEqual(found.points["value"].tolist(), [10.0, 12.0])
+        self.assertTrue(found.points["low"][0] == 9.9 and math.isnan(found.points["low"][1]))
+        of = found.changes
+        self.assertEqual((of["run"][0], of["after"][0], of["by"][0], of["p"][0]), (1, 0, 1.2, 1e-9))
+        self.assertEqual((of["by_low"][0], of["by_high"][0], of["run_high"][0]), (1.1, 1.3, 1))
+        self.assertTrue("x 1.2" in str(found) and "run 1: interrupted" in str(found), str(found))
+        del value["series"][0]["changes"][0]["by"]
+        self.write("damaged.json", value)
+        self.refused("damaged.json", "`series.0.changes.0` has no key `by`")
+
     def merged(self, numbers):
         folder = self.folder / "frames"
         folder.mkdir()

@@ -142,7 +142,7 @@ fn frames_are_left_out_before_the_stopping_rule_looks_at_the_intervals() {
     for discard in [true, false] {
         let (_, _, outcome) = timed(Rounds::Until(precision), 64, discard);
         // Without the throttled one there are fewer blocks than an interval needs.
-        assert_eq!(outcome.reached[&0].half_width.is_none(), discard);
+        assert_eq!(outcome.reached[&0].reach.is_none(), discard);
         for sample in outcome.samples.iter().filter(|sample| !sample.warm_up) {
             let is_out = discard && sample.i_block == 2;
             assert_eq!(sample.mark.is_discarded, is_out, "block {}", sample.i_block);

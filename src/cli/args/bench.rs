@@ -69,10 +69,11 @@ pub struct BenchArgs {
         long,
         value_name = "PERCENT",
         value_parser = parse_precision,
+        allow_hyphen_values = true,
         conflicts_with_all = ["repeat", "part"]
     )]
     pub precision: Option<f64>,
-    /// Seconds after which --precision gives up, and says so; every frame is timed once in any case
+    /// Seconds after which --precision gives up, and says so; eight rounds are run in any case
     #[arg(
         long,
         value_name = "S",
@@ -152,7 +153,7 @@ pub struct BenchArgs {
     pub invocations: bool,
     /// Have RenderDoc capture this frame, counted from 0 over all frames of the command, warm-up
     /// included; nimbus must have been started under RenderDoc, and times then mean little
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = limited(0, u32::MAX, "frames have 32 bits"))]
     pub capture: Option<u32>,
     /// Print run.json instead of the table
     #[arg(long)]

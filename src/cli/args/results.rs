@@ -38,6 +38,7 @@ pub struct CompareArgs {
         value_name = "PERCENT",
         default_value = "1%",
         value_parser = parse_margin,
+        allow_hyphen_values = true,
         help_heading = "Results"
     )]
     pub margin: f64,
@@ -104,6 +105,7 @@ pub struct ReportArgs {
     nimbus bench scenes/threads.toml --out night-2\n  \
     nimbus bench scenes/threads.toml --out night-3\n  \
     nimbus history night-1 night-2 night-3 -o history.html\n\n\
+    A change is found once there are three runs before it and three after it.\n\n\
     Which revision brought the last change:\n  \
     nimbus history night-1 night-2 night-3 --bisect --repo .\n\n\
     Exit codes: 0 read, whatever was found; 2 not comparable, or no results of nimbus bench.")]
@@ -115,9 +117,9 @@ pub struct HistoryArgs {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT,…")]
     pub allow: Vec<Condition>,
     /// Git checkout of the builds: orders the runs by revision. Without one that has all revisions
-    /// they are ordered by date
-    #[arg(long, value_name = "DIR", default_value = ".")]
-    pub repo: PathBuf,
+    /// they are ordered by date [default: the present folder]
+    #[arg(long, value_name = "DIR")]
+    pub repo: Option<PathBuf>,
     /// Say which revision to measure next, to find the one that brought the last change of a frame
     /// time
     #[arg(long)]

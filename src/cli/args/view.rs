@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use super::scene::SceneArgs;
-use super::values::at_least_one;
+use super::values::{at_least_one, limited};
 use crate::gpu::PresentMode;
 
 /// Arguments of `nimbus view`.
@@ -31,7 +31,7 @@ pub struct ViewArgs {
     pub captures: PathBuf,
     /// Have RenderDoc capture this frame, counted from 0; nimbus must have been started under
     /// RenderDoc
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = limited(0, u32::MAX, "frames have 32 bits"))]
     pub capture: Option<u32>,
     /// Print the times of the loops that ran as JSON when the window is closed
     #[arg(long)]

@@ -145,7 +145,7 @@ class Tables(InFolder):
 
     def test_samples_are_small(self):
         files = [path for path in SAMPLES.rglob("*") if path.is_file()]
-        self.assertLessEqual(sum(path.stat().st_size for path in files), 200 * 1024)
+        self.assertLessEqual(sum(path.stat().st_size for path in files), 220 * 1024)
 
     def test_statistics_of_the_frames_are_those_of_run_json(self):
         run = nr.read(self.folder / "run")

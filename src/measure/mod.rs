@@ -13,5 +13,5 @@ pub mod lows;
 pub mod picture;
 pub(crate) mod random;
 pub mod stats;
-mod student;
+pub mod student;
 pub mod zones;

@@ -169,6 +169,9 @@ fn run_lines(page: &str, lines: Vec<String>) -> Vec<String> {
         std::os::unix::fs::symlink(Path::new(ROOT).join(name), folder.path().join(name))
             .expect("a link");
     }
+    // A checkout, as the project's folder is.
+    let git = Command::new("git").args(["init", "-q"]).current_dir(folder.path()).status();
+    assert!(git.expect("git runs").success());
     #[cfg(feature = "window")]
     let display = display::Display::open();
     let mut failures = Vec::new();

@@ -60,6 +60,7 @@ pub(super) struct SharedDevice {
     /// Whether the device may be at work for ever, so that nothing that it may use can be freed.
     is_abandoned: AtomicBool,
     /// Whether the times at which presented pictures are visible can be asked for.
+    #[cfg(feature = "window")]
     pub tells_shown: bool,
     /// Whether commands can count invocations.
     pub counts_invocations: bool,
@@ -143,6 +144,7 @@ impl Device {
             pass_times: options.pass_times,
             executed: Executed::default(),
             is_abandoned: AtomicBool::new(false),
+            #[cfg(feature = "window")]
             tells_shown: presents(instance, &info) && info.tells_shown,
             counts_invocations,
             capture,

@@ -89,7 +89,7 @@ fn run_starts(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
         outcome = start(&place, context, i == 0 && !is_quiet);
         if let Some(ended) = lock(&ended).as_mut() {
             // A start that was cut short has other frames than the others.
-            if outcome.is_ok() || ended.starts.is_empty() {
+            if is_whole(&outcome) || ended.starts.is_empty() {
                 ended.starts.extend(read(&place, begin_s)?);
             }
         }
@@ -101,12 +101,16 @@ fn run_starts(args: &BenchArgs, context: &Context<'_>) -> Result<()> {
     drop(bar);
     keeping.finish();
     let Some(ended) = lock(&ended).take() else { return outcome };
-    // A wrong picture takes no frame away.
-    let is_cut = matches!(&outcome, Err(error) if !matches!(error, Error::Check { .. }));
+    let is_cut = !is_whole(&outcome);
     if is_cut && ended.starts.is_empty() && outcome == Err(Error::Interrupted) {
         say!("no frame was finished, nothing is kept");
     }
     if ended.starts.is_empty() { outcome } else { ended.record(is_cut).and(outcome) }
+}
+
+/// Whether a start has run all its frames. A wrong picture takes none away.
+fn is_whole(outcome: &Result<()>) -> bool {
+    matches!(outcome, Ok(()) | Err(Error::Check { .. }))
 }
 
 /// The starts that have ended, and where their results go.

@@ -90,7 +90,7 @@ pub fn look(
     Look { widest, next }
 }
 
-/// Returns the factor by which an interval over the blocks of some cycles narrows with the blocks of
+/// Returns the factor by which an interval over the blocks of some cycles narrows with those of
 /// more cycles: the scatter of a mean falls as 1/√n, and Student's t with the degrees of freedom.
 fn narrowed(n_segments: u32, cycles: [u32; 2]) -> f64 {
     let [from, to] = cycles.map(|n| {
@@ -233,8 +233,8 @@ mod tests {
         sums.map(|sum| sum / f64::from(n_trials))
     }
 
-    /// The point of the rule. A bench of scenes/threads.toml runs 780 frames in three loops. A round
-    /// of the rule has 57: 15 and a warm-up of 4 in each.
+    /// The point of the rule. A bench of scenes/threads.toml runs 780 frames in three loops. A
+    /// round of the rule has 57: 15 and a warm-up of 4 in each.
     #[test]
     fn on_a_quiet_machine_two_percent_take_fewer_frames_than_a_bench_of_fixed_length() {
         // Frames scatter by 2 %, neighbours share some of it, and blocks differ by 0.3 %.

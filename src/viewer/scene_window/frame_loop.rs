@@ -79,6 +79,8 @@ pub struct FrameLoop<'a> {
     pub shown: &'a mut ShownTimes,
     /// The clock of this loop's pictures.
     pub shown_clock: ShownClock,
+    /// The beginning of the first frame that counts; `None` before it.
+    pub counts_from: Option<Instant>,
     /// Frames until the window closes; `None`: no limit.
     pub n_left: &'a mut Option<u32>,
     /// The draw that shows a picture.
@@ -162,7 +164,10 @@ impl FrameLoop<'_> {
         }
         // With B, a frame draws two pictures, so its time is not that of the scene.
         let counts = is_warm && self.variant.is_none();
-        let shown = self.take_shown(counts);
+        if counts {
+            self.counts_from.get_or_insert(begun);
+        }
+        let shown = self.take_shown();
         if counts {
             self.samples.entry((threading, now.has_panels)).or_default().push(times.frame_ms);
         }
@@ -185,15 +190,19 @@ impl FrameLoop<'_> {
             && *self.n_left != Some(0))
     }
 
-    /// Returns the times of the pictures that became visible since the last call, and keeps them if
-    /// they count.
-    fn take_shown(&mut self, counts: bool) -> Vec<ShownFrame> {
+    /// Returns the times of the pictures that became visible since the last call, and keeps those
+    /// of frames that count.
+    fn take_shown(&mut self) -> Vec<ShownFrame> {
         let all: Vec<Shown> = self.target.take_shown().collect();
-        let frames: Vec<ShownFrame> =
-            all.iter().filter_map(|shown| self.shown_clock.times(shown)).collect();
-        if counts {
-            self.shown.n_replaced += all.len() - frames.len();
-            self.shown.frames.extend(&frames);
+        let mut frames = Vec::new();
+        for shown in all {
+            let counts = self.counts_from.is_some_and(|from| shown.begun >= from);
+            let frame = self.shown_clock.times(&shown);
+            frames.extend(frame);
+            if counts {
+                self.shown.frames.extend(frame);
+                self.shown.n_replaced += usize::from(frame.is_none());
+            }
         }
         frames
     }

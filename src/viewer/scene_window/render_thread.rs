@@ -271,6 +271,7 @@ impl SceneRenderer {
             samples: &mut self.samples,
             shown: &mut self.shown,
             shown_clock: ShownClock::default(),
+            counts_from: None,
             n_left: &mut self.n_left,
             draw: &draw,
             scene: &scene,

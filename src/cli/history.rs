@@ -171,7 +171,9 @@ fn runs_text(entries: &[Entry], by_revision: bool) -> String {
     } else {
         "in the order of dates; --repo names a checkout that has all revisions"
     };
-    format!("{} runs {order}\n{}", entries.len(), output::table(&rows))
+    let n = entries.len();
+    let runs = if n == 1 { "run" } else { "runs" };
+    format!("{n} {runs} {order}\n{}", output::table(&rows))
 }
 
 /// Returns the table of a series, with its changes between its runs.

@@ -90,8 +90,8 @@ pub fn look(
     Look { widest, next }
 }
 
-/// Returns the factor by which an interval over the blocks of some cycles narrows with those of
-/// more cycles: the scatter of a mean falls as 1/√n, and Student's t with the degrees of freedom.
+/// Returns the factor by which an interval narrows from one number of cycles to another. The
+/// scatter of a mean falls as 1/√n, and Student's t falls with the degrees of freedom.
 fn narrowed(n_segments: u32, cycles: [u32; 2]) -> f64 {
     let [from, to] = cycles.map(|n| {
         // Blocks of one cycle are compared in pairs, later ones with those of their segment.

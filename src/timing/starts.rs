@@ -186,6 +186,8 @@ impl<'a> Joined<'a> {
             timed_rows::skipping(&timed[with], &timed[u], same_bytes)
         });
         let is_wrong = |case: &&&Case| case.check.as_ref().is_some_and(|check| check.is_wrong());
+        // With cold caches loops are not compared (see `shares`).
+        let serial = serial.filter(|_| self.starts[0].run.cold_bytes.is_none());
         let ratio = serial.zip(parallel).and_then(|(s, p)| timed_rows::ratio(s, p));
         let reached: Vec<Reached> = all.iter().filter_map(|case| case.precision).collect();
         let precision = (!reached.is_empty()).then(|| Reached {

@@ -51,6 +51,9 @@ TEXELS(9, pool)
 #if ELLIPSOIDS
 TEXELS(10, conics)
 #endif
+// 1: every splat has its own exponent at which it ends, the same for all its pixels. It is computed
+// where the splat is loaded: once, and not once for every row.
+#define OWN_EDGE (THRESHOLD && !ELLIPSOIDS)
 
 // 0: there is one round, and no state is kept.
 #ifndef ROUNDS
@@ -145,8 +148,8 @@ void compose(Loaded splat, float y) {
     // -scale (dx^2 + dy^2 + (s.x dy - s.y dx)^2) as a polynomial of dx.
     float a = -place.z * (1.0 + s.y * s.y), b = 2.0 * place.z * s.x * s.y * dy,
           c = -place.z * (1.0 + s.x * s.x) * dy * dy;
-#if THRESHOLD
-    float lowest = max(min_exponent, -log2(place.w * inv_threshold));
+#if OWN_EDGE
+    float lowest = splat.lowest;
 #else
     float lowest = min_exponent;
 #endif
@@ -203,6 +206,9 @@ void compose_some(uint k, uint n, uint spare, float y) {
     Loaded splat = load_splat(int(k + t < n ? found[k + t] : spare));
     splat.fours[0].w = k + t < n ? splat.fours[0].w : 0u;
     splat.fours[1].xyz = k + t < n ? splat.fours[1].xyz : uvec3(0);
+#if OWN_EDGE
+    splat.lowest = max(min_exponent, -log2(uintBitsToFloat(splat.fours[0].w) * inv_threshold));
+#endif
     uint end = min(n - k, INVOCATIONS);
 #if ONE_SUBGROUP
     // By twos: a loop writes its carried values again in each iteration.

@@ -81,14 +81,11 @@ fn frame(gpu: &Gpu, compiler: &Compiler, scene: &Scene) -> Frame {
     let mut picture =
         Picture::new(eye, eye + key.target - key.position, fov_y_deg, scene.camera.near);
     let draw = &scene.draw;
-    let (cutoff, threshold, smallest) =
-        (draw.cutoff, draw.threshold.bound(), draw.smallest.bound());
     picture.view = View {
         width: scene.film.width,
         height: scene.film.height,
-        cutoff,
-        threshold,
-        smallest,
+        edge: draw.edge(),
+        smallest: draw.smallest.bound(),
         ..picture.view
     };
     picture.placed = renderer.placed(&gpu.device).expect("places");

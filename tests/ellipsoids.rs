@@ -98,7 +98,7 @@ fn decks(threshold: f64) -> Vec<(&'static str, Picture)> {
     let all: Vec<_> = (0..60).map(|_| blobs()).collect();
     let seen = |eye: DVec3, target: DVec3, fov: f64| {
         let mut picture = Picture::new(eye, target, fov, 0.05);
-        picture.view.threshold = threshold;
+        picture.view.edge.tau = threshold;
         all.iter()
             .fold(picture, |p, (at, sigma, tau, aspect)| p.blob(*at, *sigma, *tau).shaped(*aspect))
     };

@@ -12,6 +12,7 @@ use nimbus::frame::Renderer;
 use nimbus::frame::{DeviceChoice, Stage};
 use nimbus::io::scene_file;
 use nimbus::model::cutoff::Cutoff;
+use nimbus::model::edge::Reach;
 use nimbus::model::scene::{LightingMode, Scene, Threading};
 use nimbus::reference::picture::{BlobModel, Pixels, ReferenceKind, RenderStage, drawn_as_set};
 use nimbus::viewer::error_probe::{ErrorProbe, ProbeRequest, ProbeStatus, Progress};
@@ -98,7 +99,7 @@ fn an_exact_picture_has_no_error_and_a_changed_one_has_its_own() {
         drop(probe);
         let probe = ErrorProbe::new(Some(dir.path().to_owned()), LONG).unwrap();
         let mut turned = view.clone();
-        Arc::make_mut(&mut turned.scene).draw.cutoff = 2.0;
+        Arc::make_mut(&mut turned.scene).draw.cutoff = Reach::Sigmas(2.0);
         probe.request(turned);
         let again = settled(&probe).reference.unwrap();
         assert!(

@@ -11,6 +11,7 @@ use glam::DVec3;
 use nimbus::io::scene_file::load;
 use nimbus::model::boxes::{BoxLaw, Form};
 use nimbus::model::cloud::CloudSource;
+use nimbus::model::edge::Reach;
 use nimbus::model::film::ToneMap;
 use nimbus::model::light::Light;
 use nimbus::model::scene::{Simulate, Threading};
@@ -33,7 +34,7 @@ fn a_cloud_alone_is_a_complete_scene() {
     assert_eq!(scene.camera.fov_y_rad, 45f64.to_radians());
     assert_eq!((scene.time.step_s, scene.time.n_frames), (0.0333, 300));
     assert_eq!((scene.lighting.grid, scene.lighting.step, scene.lighting.forward), (64, 1.0, 0.85));
-    assert_eq!((scene.draw.cutoff, scene.draw.sort_bits), (3.0, SortBits::Auto));
+    assert_eq!((scene.draw.cutoff, scene.draw.sort_bits), (Reach::Auto, SortBits::Auto));
     assert_eq!((scene.threads.mode, scene.threads.simulate), (Threading::Parallel, Simulate::Gpu));
     let [Light::Directional { direction, irradiance }, Light::Sky { constant, .. }] =
         scene.lights[..]
@@ -246,7 +247,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
                 "pair_size": 0.5, "pair_levels": 6, "pair_steps": 16, "summation": "plain",
                 "precision": "f32",
             },
-            "draw": { "path": "tiles", "impostors": "off", "impostor_error": 0.5, "cutoff": 3.0,
+            "draw": { "path": "tiles", "impostors": "off", "impostor_error": 0.5, "cutoff": "auto",
             "threshold": 0.0, "chunks": 0, "cull": "on", "smallest": 0.0, "sort_bits": "auto",
             "resolution": 1.0, "error": 1.0 / 1020.0, "count": "all", "count_a": 280.0,
             "count_d0": 1.0,

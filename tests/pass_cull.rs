@@ -16,6 +16,7 @@ use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::camera::Pose;
 use nimbus::model::cloud::SQRT_TAU;
+use nimbus::model::edge::Edge;
 use nimbus::passes::blobs::{BlobVariant, BlobView, Depths};
 use nimbus::passes::cull::{Cull, CullBuffers, CullView, Order};
 use nimbus::passes::sort::{Count, NO_COUNT, Sort, TILE};
@@ -65,8 +66,7 @@ impl Scene {
             pose,
             fov_y_rad,
             near: 0.5,
-            cutoff: 3.0,
-            threshold: 0.0,
+            edge: Edge { radius: 3.0, tau: 0.0 },
             smallest: 0.0,
             shift: glam::DVec2::ZERO,
         };
@@ -121,7 +121,7 @@ impl Scene {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let variant = BlobVariant {
             weighted: self.weighted,
-            threshold: self.view.threshold > 0.0,
+            threshold: self.view.edge.has_threshold(),
             ellipsoids: self.particles.iter().any(|p| p.aspect != 1.0),
             ..BlobVariant::default()
         };
@@ -130,9 +130,8 @@ impl Scene {
         let (i_group, drawn) = (gpu.upload(&self.i_group), gpu.upload(&self.drawn));
         let entries = gpu.upload(&vec![UNTOUCHED; self.placed.len()]);
         let kept = gpu.upload(&[KeptRecord { sort: [9; 4], draw: [9; 4], splat: [9; 4] }]);
-        let View { width, height, cutoff, threshold, smallest, .. } = self.view;
-        let blobs =
-            BlobView { camera: &self.camera, cutoff, threshold, saturated: 0.0, extents: None };
+        let View { width, height, edge, smallest, .. } = self.view;
+        let blobs = BlobView { camera: &self.camera, edge, saturated: 0.0, extents: None };
         let view = CullView { blobs, size: [width, height], smallest };
         let order = Order { depths: self.depths(), sort_tile: TILE, splat_block: 256 };
         let buffers = CullBuffers {
@@ -237,11 +236,12 @@ fn random(seed: u64, n: usize) -> Scene {
     let right = toward.cross(DVec3::Y).normalize();
     let pose = Pose { position: eye, right, up: right.cross(toward), forward: toward };
     let mut scene = Scene::new(width, height);
-    let threshold = if seed.is_multiple_of(2) { f64::from(within(0.001, 0.2)) } else { 0.0 };
+    let tau = if seed.is_multiple_of(2) { f64::from(within(0.001, 0.2)) } else { 0.0 };
     let smallest = if seed.is_multiple_of(3) { f64::from(within(0.1, 2.0)) } else { 0.0 };
-    let (cutoff, fov_y_rad) = (f64::from(within(1.0, 5.0)), f64::from(within(0.3, 2.3)));
+    let edge = Edge { radius: f64::from(within(1.0, 5.0)), tau };
+    let fov_y_rad = f64::from(within(0.3, 2.3));
     let near = f64::from(within(0.01, 0.5));
-    scene.view = View { pose, cutoff, threshold, smallest, fov_y_rad, near, ..scene.view };
+    scene.view = View { pose, edge, smallest, fov_y_rad, near, ..scene.view };
     scene.n_bits = if seed.is_multiple_of(2) { 16 } else { 32 };
     for i in 0..n {
         let at = [0; 3].map(|_| within(-4.0, 4.0));
@@ -309,12 +309,13 @@ fn no_ray_meets_what_is_left_out() {
             let (blob, view) = (scene.blob(i), &scene.view);
             let c = blob.position - view.pose.position;
             let drawn = (i as u32) < scene.drawn[scene.i_group[i] as usize].end;
-            let meets =
-                |d: DVec3| 0.5 * blob.along(c, d).off.powi(2) <= view.cut(blob.along(c, d).depth);
+            let meets = |d: DVec3| {
+                0.5 * blob.along(c, d).off.powi(2) <= view.edge.cut(blob.along(c, d).depth)
+            };
             let pixels = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
             let met = drawn
                 && c.dot(view.pose.forward) >= view.near
-                && view.cut(blob.deepest()) > 0.0
+                && view.edge.cut(blob.deepest()) > 0.0
                 && pixels.into_iter().any(|(i, j)| meets(view.ray(i, j)));
             assert!(outcome != CullOutcome::Culled || !met, "seed {seed}, {i}");
             n_left += u32::from(outcome == CullOutcome::Culled);

@@ -143,6 +143,13 @@ fn an_unstable_sort_and_a_swapped_pair_are_noticed() {
     let mut sources = passes::sources();
     let last_first = "tile * TILE + (TILE_INVOCATIONS - 1u - t) * RUN";
     assert!(sources.replace("sort_scatter.comp", "tile * TILE + t * RUN", last_first));
+    // The form with ballots likewise.
+    let last_first = "tile * TILE + (RUN - 1u - j) * TILE_INVOCATIONS + t";
+    assert!(sources.replace(
+        "sort_scatter.comp",
+        "tile * TILE + j * TILE_INVOCATIONS + t",
+        last_first
+    ));
     let compiler = Compiler::new(sources, None).expect("shaderc");
     let unstable = Sort::new(&gpu.device, &compiler, 1024).expect("sort");
     let keys: Vec<u32> = (0..1024).map(|i| i & 3).collect();

@@ -22,6 +22,7 @@ use nimbus::gpu::TargetFormat;
 use nimbus::gpu::{Barriers, BlendMode, Image, LoadOp, RecordCount, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
+use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
 use nimbus::passes::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
 use nimbus::passes::sprites::Sprites;
@@ -357,8 +358,7 @@ fn a_target_that_does_not_fit_is_refused() {
                 };
                 let view = BlobView {
                     camera: &camera,
-                    cutoff: 3.0,
-                    threshold: 0.0,
+                    edge: Edge { radius: 3.0, tau: 0.0 },
                     saturated: 0.0,
                     extents: None,
                 };

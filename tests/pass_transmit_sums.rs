@@ -89,7 +89,8 @@ fn wrong_doubles_and_floats_in_their_place_are_noticed() {
             &bounds[1],
         )
     };
-    assert!(ratio(None, KAHAN) > 1.0);
+    let of_floats = ratio(None, KAHAN);
+    assert!(of_floats > 1.0, "sums of floats: {of_floats} of the bound of doubles");
     if !has_doubles {
         return;
     }

@@ -21,6 +21,7 @@ use harness::{Gpu, assert_within};
 use nimbus::frame::saturation_bound;
 use nimbus::gpu::TargetFormat;
 use nimbus::layout::particle::{DrawnRecord, TexturedRecord};
+use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
 use nimbus::reference::composite::OpaquePixel;
@@ -50,8 +51,13 @@ fn random(seed: u64, pool: &Arc<Pool>) -> Picture {
         let at = v(&mut within);
         picture = picture.blob(at, 10f64.powf(within(-2.5, 0.0)), 10f64.powf(within(-4.5, 0.5)));
     }
-    let threshold = 2f64.powf(within(-13.0, -2.0));
-    let view = View { width: 60, height: 45, cutoff: within(1.0, 5.0), threshold, ..picture.view };
+    let tau = 2f64.powf(within(-13.0, -2.0));
+    let view = View {
+        width: 60,
+        height: 45,
+        edge: Edge { radius: within(1.0, 5.0), tau },
+        ..picture.view
+    };
     if seed.is_multiple_of(2) {
         let record = |i: u32| TexturedRecord {
             seed: 9,
@@ -80,8 +86,13 @@ fn random(seed: u64, pool: &Arc<Pool>) -> Picture {
     Picture { view, ..picture }
 }
 
+fn at_tau(picture: &Picture, tau: f64) -> Picture {
+    let edge = Edge { tau, ..picture.view.edge };
+    Picture { view: View { edge, ..picture.view }, ..picture.clone() }
+}
+
 fn without(picture: &Picture) -> Picture {
-    Picture { view: View { threshold: 0.0, ..picture.view }, ..picture.clone() }
+    at_tau(picture, 0.0)
 }
 
 fn usual(gpu: &Gpu) -> Tiled {
@@ -181,7 +192,7 @@ fn number_of_layers_bounds_the_omitted_parts() {
         let picture = random(seed, &pool);
         assert!(picture.textured.is_none());
         for pixel in cut_of(&picture) {
-            let of_layers = -(-f64::from(pixel.n_layers) * picture.view.threshold).exp_m1();
+            let of_layers = -(-f64::from(pixel.n_layers) * picture.view.edge.tau).exp_m1();
             assert!(pixel.share() <= of_layers);
             most = most.most(pixel);
         }
@@ -199,7 +210,7 @@ fn faulty_shaders_exceed_the_bounds() {
             picture.at(0.4 * f64::from(k) - 2.2, 0.2 * f64::from(k % 4), 4.0 + 0.1 * f64::from(k));
         picture = picture.blob(at, 0.1 + 0.04 * f64::from(k), 0.5 * 0.5f64.powi(k % 6));
     }
-    picture.view.threshold = 1.0 / 40.0;
+    picture.view.edge.tau = 1.0 / 40.0;
     let tiled = Way::Tiles(usual(&gpu));
     for (way, file, from, to) in [
         (
@@ -213,7 +224,7 @@ fn faulty_shaders_exceed_the_bounds() {
         (Way::Sprites, "sprites.frag", "? in_cut :", "? 1.02 * in_cut :"),
         (tiled, "tiles_splat.comp", "sqrt(2.0 * cut)", "sqrt(1.5 * cut)"),
         (tiled, "tiles_pairs.comp", "log2(splats[r].tau", "0.7 * log2(splats[r].tau"),
-        (tiled, "tiles.comp", "log2(place.w", "0.98 * log2(place.w"),
+        (tiled, "tiles.comp", "-log2(uintBits", "-0.98 * log2(uintBits"),
         (tiled, "tiles.comp", "max(min_exponent, -log2", "min(min_exponent, -log2"),
     ] {
         let (truths, bounds) = truth(&picture, way);
@@ -231,13 +242,13 @@ fn blobs_below_the_threshold_are_not_drawn() {
     let tiled = usual(&gpu);
     let mut picture =
         Picture::new(DVec3::Z * 5.0, DVec3::ZERO, 45.0, 0.1).blob(DVec3::ZERO, 0.5, 0.0099);
-    picture.view.threshold = 0.01;
+    picture.view.edge.tau = 0.01;
     for way in [Way::Sprites, Way::Tiles(tiled), Way::Chunks(2, tiled.saturated)] {
         let drawn = |p: &Picture, gpu: &mut Gpu| p.draw_by(gpu, None, FORMAT.0, way);
         assert!(drawn(&picture, &mut gpu).iter().all(|v| *v == 0.0));
         assert!(drawn(&without(&picture), &mut gpu).iter().any(|v| *v > 0.0));
         // A threshold so small that its inverse overflows f32 gives the same bytes as none.
-        let least = Picture { view: View { threshold: 1e-300, ..picture.view }, ..picture.clone() };
+        let least = at_tau(&picture, 1e-300);
         assert!(drawn(&least, &mut gpu) == drawn(&without(&picture), &mut gpu));
     }
 }

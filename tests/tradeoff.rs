@@ -62,7 +62,7 @@ impl Law {
 
 impl Runner for Law {
     fn add(&mut self, scene: &Arc<Scene>) {
-        self.of.push((scene.draw.cutoff, scene.draw.sort_bits == SortBits::Narrow));
+        self.of.push((scene.draw.edge().radius, scene.draw.sort_bits == SortBits::Narrow));
     }
 
     fn picture(&mut self, i: usize) -> Result<Vec<f32>> {

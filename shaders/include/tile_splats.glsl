@@ -7,6 +7,10 @@
 const uint N_FOURS = 2 + 3 * TEXTURED + ELLIPSOIDS;
 struct Loaded {
     uvec4 fours[N_FOURS];
+#if OWN_EDGE
+    // The exponent at which the splat ends.
+    float lowest;
+#endif
 };
 
 // Splats that reach the tile, collected before they are composed.
@@ -28,6 +32,9 @@ bool all_agree(bool b) { return subgroupAll(b); }
 #else
 shared uint votes[INVOCATIONS];
 shared uvec4 shared_splats[N_FOURS][INVOCATIONS];
+#if OWN_EDGE
+shared float shared_lowest[INVOCATIONS];
+#endif
 
 uint append(uint n, bool hit, uint r) {
     uint t = gl_LocalInvocationID.x;
@@ -77,17 +84,26 @@ Loaded of_invocation(Loaded splat, uint m) {
     [[unroll]] for (uint k = 0; k < N_FOURS; ++k) {
         splat.fours[k] = subgroupShuffle(splat.fours[k], m);
     }
+#if OWN_EDGE
+    splat.lowest = subgroupShuffle(splat.lowest, m);
+#endif
     return splat;
 }
 #else
 void share_splat(Loaded splat, uint t) {
     [[unroll]] for (uint k = 0; k < N_FOURS; ++k) { shared_splats[k][t] = splat.fours[k]; }
+#if OWN_EDGE
+    shared_lowest[t] = splat.lowest;
+#endif
     barrier();
 }
 
 Loaded of_invocation(uint m) {
     Loaded splat;
     [[unroll]] for (uint k = 0; k < N_FOURS; ++k) { splat.fours[k] = shared_splats[k][m]; }
+#if OWN_EDGE
+    splat.lowest = shared_lowest[m];
+#endif
     return splat;
 }
 #endif

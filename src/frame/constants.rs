@@ -3,6 +3,7 @@
 use super::features::{saturation_bound, target_format};
 use crate::gpu::TargetFormat;
 use crate::layout::frame::CameraRecord;
+use crate::model::edge::Edge;
 use crate::model::scene::Scene;
 use crate::passes::blobs::{BlobView, Extent};
 use crate::passes::transmit::MarchParams;
@@ -16,8 +17,7 @@ pub(super) struct FrameConstants {
     pub n_regions: u32,
     pub march: MarchParams,
     pub texture_seed: u32,
-    pub cutoff: f64,
-    pub threshold: f64,
+    pub edge: Edge,
     /// σ below which a blob is left out, in pixels of the film.
     pub smallest: f64,
     pub saturated: f64,
@@ -43,8 +43,7 @@ impl FrameConstants {
                 forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
             },
             texture_seed: scene.draw.texture_seed,
-            cutoff: scene.draw.cutoff,
-            threshold: scene.draw.threshold.bound(),
+            edge: scene.draw.edge(),
             smallest: scene.draw.smallest.bound(),
             saturated: saturation_bound(scene.film.format),
             format: target_format(scene.film.format),
@@ -59,7 +58,7 @@ impl FrameConstants {
 
     /// Returns `camera`'s view of the blobs of groups with `extents`.
     pub fn view<'a>(&self, camera: &'a CameraRecord, extents: &'a [Extent]) -> BlobView<'a> {
-        let FrameConstants { cutoff, threshold, saturated, .. } = *self;
-        BlobView { camera, cutoff, threshold, saturated, extents: Some(extents) }
+        let FrameConstants { edge, saturated, .. } = *self;
+        BlobView { camera, edge, saturated, extents: Some(extents) }
     }
 }

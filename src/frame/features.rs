@@ -168,7 +168,7 @@ pub(super) fn blob_variant(scene: &Scene) -> BlobVariant {
         grouped: is_grouped(scene),
         weighted: scene.draw.count.is_some(),
         textured: scene.is_textured(),
-        threshold: scene.draw.threshold.is_active(),
+        threshold: scene.draw.edge().has_threshold(),
         ellipsoids: scene.has_ellipsoids(),
     }
 }
@@ -195,15 +195,17 @@ pub(super) fn is_thin(scene: &Scene) -> bool {
 
 /// Returns a bound of the optical depth of every blob at any time.
 pub(super) fn tau_max(scene: &Scene) -> f64 {
+    let of = |g: &Group| tau_bound(scene, &g.grown(scene.clouds[g.i_cloud].growth.to.max(1.0)));
+    scene.groups().iter().map(of).fold(0.0, f64::max)
+}
+
+/// Returns a bound of the optical depth of every blob of `group`, as it has grown.
+pub(super) fn tau_bound(scene: &Scene, group: &Group) -> f64 {
     if scene.is_animated() {
         return f64::INFINITY;
     }
+    // At most, one particle stands for all of its group.
     let conserves = scene.draw.count.is_some_and(|c| c.conserve);
-    let of = |g: &Group| {
-        let growth = scene.clouds[g.i_cloud].growth.to.max(1.0);
-        // At most, one particle stands for all of its group.
-        let denser = if conserves { f64::from(g.n_particles) } else { 1.0 };
-        SQRT_TAU * g.kappa_max * g.sigma_widest() * growth * denser
-    };
-    scene.groups().iter().map(of).fold(0.0, f64::max)
+    let denser = if conserves { f64::from(group.n_particles) } else { 1.0 };
+    SQRT_TAU * group.kappa_max * group.sigma_widest() * denser
 }

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use tracing::info_span;
 
 use super::clock::ms;
-use super::features::{has_impostors, has_live, is_glossy};
+use super::features::{has_impostors, has_live, is_glossy, tau_bound};
 use super::live::{disc_records, live_particles};
 use super::packet::Packet;
 use super::tensor_shape::{Shape, basis_of, is_edited, kind_of};
@@ -19,7 +19,7 @@ use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
-use crate::model::cloud::{Group, mass, max_blob_mass};
+use crate::model::cloud::{Group, SQRT_TAU, mass, max_blob_mass};
 use crate::model::frame_state::FrameState;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::gust::Mode;
@@ -146,6 +146,7 @@ impl Game {
             ),
         };
         let heaviest = self.heaviest(&grown, live.as_ref());
+        let extents = self.extents(&grown, &origins, live.as_deref());
         Ok(Packet {
             i_frame,
             time_s,
@@ -178,7 +179,7 @@ impl Game {
             heaviest,
             radius: setting.radius,
             sort_bits: self.sort_bits(&grown, setting.radius),
-            extents: self.extents(&grown, &origins),
+            extents,
             game_ms: ms(begin, Instant::now()),
         })
     }
@@ -213,13 +214,23 @@ impl Game {
         self.scene.draw.sort_bits.of(radius, sigmas.fold(f64::INFINITY, f64::min))
     }
 
-    /// Returns the extents of the groups.
-    fn extents(&self, groups: &[Group], origins: &[DVec3]) -> Vec<Extent> {
+    /// Returns the extents of the groups; moving particles are looked at one by one.
+    fn extents(
+        &self,
+        groups: &[Group],
+        origins: &[DVec3],
+        live: Option<&[ParticleRecord]>,
+    ) -> Vec<Extent> {
+        let tau_of = |p: &ParticleRecord| f64::from(p.kappa * p.sigma * p.aspect.max(1.0));
+        let moved = live
+            .filter(|_| self.scene.is_animated())
+            .map(|all| SQRT_TAU * all.iter().map(tau_of).fold(0.0, f64::max));
         let of = |g: &Group| Extent {
             center: origins[g.i_cloud] + g.center,
             half: g.half_extent + DVec3::splat(g.gust_reach),
             sigma_max: g.sigma_widest(),
             sigma_mean: g.sigma_mean * g.aspects[0].min(1.0),
+            reach: self.scene.draw.edge().reach(moved.unwrap_or_else(|| tau_bound(&self.scene, g))),
             n_particles: g.n_particles,
         };
         groups.iter().filter(|g| g.n_particles > 0).map(of).collect()

@@ -39,7 +39,6 @@ pub struct CacheRules {
     size: [u32; 2],
     /// Pixels of the layer's picture.
     pub layer_size: [u32; 2],
-    cutoff: f64,
     /// Bound of the error, in pixels.
     error: f64,
 }
@@ -47,12 +46,7 @@ pub struct CacheRules {
 impl CacheRules {
     pub fn new(scene: &Scene) -> CacheRules {
         let size = [scene.film.width, scene.film.height];
-        CacheRules {
-            size,
-            layer_size: layer_size(size),
-            cutoff: scene.draw.cutoff,
-            error: scene.draw.impostor_error,
-        }
+        CacheRules { size, layer_size: layer_size(size), error: scene.draw.impostor_error }
     }
 }
 
@@ -223,14 +217,16 @@ impl ImpostorCache {
     /// Returns the layer of all blobs beyond `cut`; `None` if they are too near or surround a
     /// surface.
     fn layer_beyond(&self, packet: &Packet, now: &View, cut: f64) -> Option<CachedLayer> {
-        let CacheRules { size, layer_size, cutoff, .. } = self.rules;
+        let CacheRules { size, layer_size, .. } = self.rules;
         let beyond: Vec<(&Extent, [f64; 2])> = packet
             .extents
             .iter()
             .map(|e| (e, depths(e, now)))
             .filter(|(_, d)| d[1] >= cut)
             .collect();
-        let sigma = beyond.iter().map(|(e, _)| e.sigma_max).fold(0.0, f64::max);
+        let greatest =
+            |of: fn(&Extent) -> f64| beyond.iter().map(|(e, _)| of(e)).fold(0.0, f64::max);
+        let (sigma, radius) = (greatest(|e| e.sigma_max), greatest(Extent::radius));
         let lengths = now.eye.abs().element_sum() + packet.radius;
         let (last_key, quantum) =
             last_key(cut + now.eye.dot(now.forward), packet.radius, packet.sort_bits)?;
@@ -241,7 +237,7 @@ impl ImpostorCache {
         if least < MIN_SIGMA * self.pixel(now) {
             return None;
         }
-        let far = FarField { nearest, farthest, sigma, radius: cutoff * sigma };
+        let far = FarField { nearest, farthest, sigma, radius };
         // The sprites of the layer must lie wholly in front of the eye, and stay so.
         if nearest.is_nan()
             || nearest <= (MIN_RADII * far.radius).max(2.0 * f64::from(packet.camera.near))
@@ -270,7 +266,7 @@ impl ImpostorCache {
         let (mut low, mut high) = (now.tangents, -now.tangents);
         for extent in far {
             let c = extent.center - now.eye;
-            let reach = self.rules.cutoff * extent.sigma_max;
+            let reach = extent.radius();
             let along = |axis: DVec3| (c.dot(axis), axis.abs().dot(extent.half) + reach);
             let (z, deep) = along(now.forward);
             if z - deep <= 0.0 {
@@ -293,8 +289,8 @@ impl ImpostorCache {
     /// slope.
     fn cost(&self, extent: &Extent, now: &View, pixel: f64) -> f64 {
         let c = extent.center - now.eye;
-        let z = c.dot(now.forward).max(1e-3 * self.rules.cutoff * extent.sigma_mean);
-        let reach = extent.half.length() + self.rules.cutoff * extent.sigma_max;
+        let z = c.dot(now.forward).max(1e-3 * extent.reach * extent.sigma_mean);
+        let reach = extent.half.length() + extent.radius();
         let beside = |axis: DVec3, tan: f64| c.dot(axis).abs() - reach > tan * z.max(reach);
         if c.dot(now.forward) < -reach
             || beside(now.right, now.tangents.x)
@@ -302,7 +298,7 @@ impl ImpostorCache {
         {
             return 0.0;
         }
-        let radius = self.rules.cutoff * extent.sigma_mean / z;
+        let radius = extent.reach * extent.sigma_mean / z;
         let all = 4.0 * now.tangents.x * now.tangents.y;
         f64::from(extent.n_particles) * (std::f64::consts::PI * radius * radius).min(all)
             / (pixel * pixel)

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::features::tau_bound;
 use super::renderer::Rendered;
 use crate::error::Result;
 use crate::model::film::Film;
@@ -94,7 +95,9 @@ fn reason(scene: &Scene, frame: DrawnFrame, rgba: &[f32]) -> Result<String> {
 fn outside(scene: &Scene, time_s: f64) -> Result<Option<String>> {
     let groups = scene.groups();
     let pose = FrameState::at(scene, &groups, time_s)?.pose;
-    let all = scene.region_bounds(&groups, time_s, scene.draw.cutoff);
+    let edge = scene.draw.edge();
+    let reach = groups.iter().map(|g| edge.reach(tau_bound(scene, g))).fold(0.0, f64::max);
+    let all = scene.region_bounds(&groups, time_s, reach);
     // Greatest value of a linear function over a box.
     let most = |n: DVec3, (low, high): &(DVec3, DVec3)| {
         let (middle, half) = (0.5 * (*low + *high) - pose.position, 0.5 * (*high - *low));

@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 
+use super::features::tau_bound;
 use crate::layout::particle::DrawnRecord;
 use crate::model::cloud::Group;
 use crate::model::count::DrawnCount;
@@ -26,7 +27,7 @@ pub(super) fn drawn_groups(
     let of = |group: &Group| {
         let origin = scene.clouds[group.i_cloud].origin_at(setting.time_s) - eye;
         // The reach of an ellipsoid beyond that of its shortest axis is added to the box.
-        let reach = scene.draw.cutoff * group.sigma_bounds();
+        let reach = scene.draw.edge().reach(tau_bound(scene, group)) * group.sigma_bounds();
         let radius = reach.min_element();
         let half =
             group.half_extent + DVec3::splat(group.gust_reach) + (reach - DVec3::splat(radius));

@@ -2,6 +2,7 @@
 
 use super::count::Count;
 use super::cutoff::Cutoff;
+use super::edge::{EDGE, Edge, FARTHEST, Reach};
 use super::named::named;
 use super::resolution::Resolution;
 use super::sort_bits::SortBits;
@@ -71,9 +72,9 @@ pub struct Draw {
     pub error: f64,
     /// Chunks of the path "sprites".
     pub chunks: Chunks,
-    /// Radius at which sprites end, σ.
-    pub cutoff: f64,
-    /// Optical depth below which sprites end.
+    /// Distance from its centre at which a blob ends.
+    pub cutoff: Reach,
+    /// Optical depth below which blobs end.
     pub threshold: Cutoff,
     /// Whether particles that no pixel shows are left out.
     pub cull: Cull,
@@ -90,6 +91,15 @@ pub struct Draw {
 }
 
 impl Draw {
+    /// Returns where blobs end.
+    pub fn edge(&self) -> Edge {
+        let tau = self.threshold.bound();
+        match self.cutoff {
+            Reach::Sigmas(radius) => Edge { radius, tau },
+            Reach::Auto => Edge { radius: FARTHEST, tau: tau.max(EDGE) },
+        }
+    }
+
     /// Returns the settings with every "auto" replaced by the choice that changes nothing.
     pub fn exact(self) -> Draw {
         let least = |l: Cutoff| Cutoff::At(l.bound());

@@ -13,6 +13,7 @@ pub mod count;
 pub mod cutoff;
 pub mod disc;
 mod draw;
+pub mod edge;
 pub mod film;
 pub mod frame_state;
 pub mod grid;

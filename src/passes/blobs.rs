@@ -6,6 +6,7 @@ use glam::DVec3;
 use crate::gpu::RecordCount;
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
+use crate::model::edge::Edge;
 
 bindings! {
     /// The buffers that blobs are drawn from.
@@ -68,8 +69,17 @@ pub struct Extent {
     pub sigma_max: f64,
     /// Mean σ along the shortest axis.
     pub sigma_mean: f64,
+    /// Distance from its centre at which every blob has ended, σ.
+    pub reach: f64,
     /// Number of particles.
     pub n_particles: u32,
+}
+
+impl Extent {
+    /// Returns the distance from its centre at which every blob has ended.
+    pub fn radius(&self) -> f64 {
+        self.reach * self.sigma_max
+    }
 }
 
 /// The camera of a picture of blobs, and the bounds below which parts of it are left out.
@@ -77,10 +87,8 @@ pub struct Extent {
 pub struct BlobView<'a> {
     /// The camera of the picture.
     pub camera: &'a CameraRecord,
-    /// Radius of a blob's footprint, in σ.
-    pub cutoff: f64,
-    /// Optical depth below which a blob ends; 0 cuts nothing.
-    pub threshold: f64,
+    /// Where blobs end.
+    pub edge: Edge,
     /// Transmittance below which a pixel hides everything behind it.
     pub saturated: f64,
     /// Where the blobs' centres are, relative to the lighting origin; `None` where this is unknown.
@@ -90,7 +98,7 @@ pub struct BlobView<'a> {
 impl BlobView<'_> {
     /// Returns 1 / threshold; infinity, which cuts nothing, where f32 cannot hold the inverse.
     pub(super) fn inv_threshold(&self) -> f32 {
-        (1.0 / self.threshold) as f32
+        (1.0 / self.edge.tau) as f32
     }
 }
 

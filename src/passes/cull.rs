@@ -173,7 +173,7 @@ impl CullView<'_> {
         TestPush {
             camera: *blobs.camera,
             pixel,
-            cutoff: blobs.cutoff as f32,
+            cutoff: blobs.edge.radius as f32,
             inv_threshold: blobs.inv_threshold(),
             smallest: (smallest * f64::from(pixel[1])) as f32,
             n_particles,

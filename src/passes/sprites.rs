@@ -128,7 +128,7 @@ impl Sprites {
         let push = Push {
             camera: *view.camera,
             pixel: view.camera.pixel_slopes(width, height),
-            cutoff: view.cutoff as f32,
+            cutoff: view.edge.radius as f32,
             i_first_facet,
             inv_threshold: view.inv_threshold(),
             i_first,

@@ -18,6 +18,7 @@ use crate::gpu::{
 };
 use crate::layout::cull::KeptRecord;
 use crate::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
+use crate::model::edge::Edge;
 
 pub use division::{Division, RUN, TILES_ACROSS, invocations};
 pub use push::{ClearPush, PairsPush, Push, RangesPush, RoundsPush, SplatPush};
@@ -208,7 +209,7 @@ impl Tiles {
         let push = SplatPush {
             camera: *view.camera,
             pixel: self.pixel(view),
-            cutoff: view.cutoff as f32,
+            cutoff: view.edge.radius as f32,
             i_first_facet,
             width,
             height,
@@ -283,7 +284,7 @@ impl Tiles {
             tile: [pixel[0] * tile[0] as f32, pixel[1] * tile[1] as f32],
             n_bins_x,
             i_round,
-            cut: cut(view.cutoff),
+            cut: cut(view.edge),
             inv_threshold: view.inv_threshold(),
         };
         let buffers = [reaches, before, blocks, round, entries, splats, self.kept(n)];
@@ -318,7 +319,7 @@ impl Tiles {
             height,
             n_bins_x,
             i_round,
-            cut: cut(view.cutoff),
+            cut: cut(view.edge),
             saturated: view.saturated as f32,
             inv_threshold: view.inv_threshold(),
             y_right: view.camera.right[1],
@@ -344,6 +345,6 @@ impl Tiles {
 
 /// Returns b²/(2 σ²) at the cutoff in powers of two: at most 46, at 8 σ; the shader's power of two
 /// holds up to 125.
-fn cut(cutoff: f64) -> f32 {
-    (0.5 * cutoff * cutoff * std::f64::consts::LOG2_E) as f32
+fn cut(edge: Edge) -> f32 {
+    (edge.farthest_cut() * std::f64::consts::LOG2_E) as f32
 }

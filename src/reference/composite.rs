@@ -93,7 +93,8 @@ impl From<&OpaquePixel> for Layered {
 
 impl Layered {
     /// Composes C ← αL + (1−α)C, A ← α + (1−α)A. The target's α is within `off`, and it rounds the
-    /// result.
+    /// result. It may blend in its own few bits (Vulkan, "Blending": no less precise than the
+    /// target): source, factor and product are then rounded, too.
     pub fn over(&mut self, alpha: f64, off: f64, radiance: DVec3, r: &Rounding) {
         let source = [radiance.x, radiance.y, radiance.z, 1.0];
         for ((v, e), s) in self.value.iter_mut().zip(&mut self.bound).zip(source) {
@@ -103,9 +104,12 @@ impl Layered {
             }
             // C' − C'_t = (1 − α)(C − C_t) + (α − α_t)(L − C_t), |C_t − C| ≤ e.
             let inherited = (1.0 - alpha) * *e + off * ((s - *v).abs() + *e);
-            *v = alpha * s + (1.0 - alpha) * *v;
+            let (source, passed) = (alpha * s, (1.0 - alpha) * *v);
+            // α L; α and 1 − α as factors of C, whose errors are u_t C together; (1 − α) C.
+            let parts = r.unit * (source.abs() + v.abs() + passed.abs() + *e);
+            *v = source + passed;
             // Correct rounding errs by u_t of the number written, faithful rounding by 2 u_t.
-            *e = inherited + 2.0 * r.unit * (v.abs() + inherited).max(r.least_normal);
+            *e = inherited + parts + 2.0 * r.unit * (v.abs() + inherited).max(r.least_normal);
         }
     }
 }

@@ -53,7 +53,8 @@ fn shows(view: &View, blob: &Blob, slack: &CullTolerance) -> bool {
     let c = blob.position - view.pose.position;
     let (depth, off) = (c.dot(view.pose.forward), slack.depth * c.length());
     let (above, off_size) = view.above_smallest(blob, c, slack.depth);
-    let cut = view.cut(blob.deepest()) + if view.threshold > 0.0 { slack.log } else { 0.0 };
+    let cut =
+        view.edge.cut(blob.deepest()) + if view.edge.has_threshold() { slack.log } else { 0.0 };
     if !(depth + off >= view.near
         && blob.kappa * blob.sigma > 0.0
         && cut > 0.0
@@ -61,7 +62,7 @@ fn shows(view: &View, blob: &Blob, slack: &CullTolerance) -> bool {
     {
         return false;
     }
-    let reach = (1.0 + slack.growth) * (2.0 * cut.min(0.5 * view.cutoff * view.cutoff)).sqrt();
+    let reach = (1.0 + slack.growth) * (2.0 * cut.min(view.edge.farthest_cut())).sqrt();
     let (half_x, half_y) = view.half_slopes();
     let holds = |side: DVec3, half: f64, n: u32| {
         let (low, high) = blob.slopes(c, [side, view.pose.forward], reach);
@@ -79,6 +80,7 @@ fn shows(view: &View, blob: &Blob, slack: &CullTolerance) -> bool {
 mod tests {
     use super::*;
     use crate::model::camera::Pose;
+    use crate::model::edge::Edge;
 
     /// Four columns and two rows of slopes ½ wide: centres at ±¼, ±¾ and ±¼.
     const VIEW: View = View {
@@ -88,8 +90,7 @@ mod tests {
         // 2 arctan ½.
         fov_y_rad: 0.927_295_218_001_612_2,
         near: 0.5,
-        cutoff: 3.0,
-        threshold: 0.0,
+        edge: Edge { radius: 3.0, tau: 0.0 },
         smallest: 0.0,
         shift: glam::DVec2::ZERO,
     };
@@ -140,7 +141,7 @@ mod tests {
             )
         };
         let tau = crate::model::cloud::SQRT_TAU;
-        let thin = |share: f64| View { threshold: share * tau, ..VIEW };
+        let thin = |share: f64| View { edge: Edge { tau: share * tau, ..VIEW.edge }, ..VIEW };
         assert_eq!(
             (of(thin(0.999), 0.0), of(thin(1.001), 0.0)),
             (CullOutcome::Kept, CullOutcome::Culled)

@@ -2,16 +2,18 @@
 
 use super::Blob;
 use super::view::View;
+use crate::model::edge::Edge;
 
-/// Returns the number of blobs in whose rectangles, out to `reach` σ, each pixel lies: about its
+/// Returns the number of blobs in whose rectangles, out to the `edge`, each pixel lies: about its
 /// number of layers.
-pub fn n_layers(view: &View, blobs: &[Blob], reach: f64) -> Vec<u32> {
+pub fn n_layers(view: &View, blobs: &[Blob], edge: Edge) -> Vec<u32> {
     let (width, height) = (view.width as usize, view.height as usize);
     // Differences along rows and columns, with a place beyond either end.
     let mut steps = vec![0i64; (width + 1) * (height + 1)];
     for blob in blobs {
         let c = blob.position - view.pose.position;
-        if c.dot(view.pose.forward) < view.near {
+        let reach = edge.reach(blob.deepest());
+        if c.dot(view.pose.forward) < view.near || reach <= 0.0 {
             continue;
         }
         let [(left, right), (top, bottom)] = view.rectangle(blob, c, reach);
@@ -52,7 +54,7 @@ mod tests {
             kappa: 1.0,
         };
         let blobs = [at(0.0, 0.0, 4.0), at(0.9, -0.9, 4.0), at(0.0, 0.0, -4.0)];
-        let counts = n_layers(&view, &blobs, 3.0);
+        let counts = n_layers(&view, &blobs, view.edge);
         let rectangle = |b: &Blob| view.rectangle(b, b.position, 3.0);
         for (k, n) in counts.iter().enumerate() {
             let (i, j) = (k as u32 % 9, k as u32 / 9);

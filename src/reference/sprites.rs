@@ -245,7 +245,7 @@ impl Seen {
         r: &Rounding,
     ) -> Option<Layer> {
         let line = sprites.blobs[j].along(self.c, ray);
-        let cut = view.cut(line.depth);
+        let cut = view.edge.cut(line.depth);
         // A sprite ends in a step at its edge, and rounding decides on which side a pixel lies. The
         // depth of the opaque pixel decides likewise.
         let beyond = 0.5 * line.off.powi(2) - cut;
@@ -270,7 +270,7 @@ impl Sprites<'_> {
     fn footprint(&self, view: &View, j: usize, r: &Rounding) -> Option<Footprint> {
         let blob = &self.blobs[j];
         let seen = Seen::new(view, blob, r)?;
-        let most = view.cut(blob.deepest());
+        let most = view.edge.cut(blob.deepest());
         let reach = (2.0 * (most + r.slack(most)).max(0.0)).sqrt();
         if reach <= 0.0 {
             return None;

@@ -103,6 +103,7 @@ fn pixel(view: &View, surfaces: &[Surface], facets: &[DVec3], ray: DVec3) -> Opa
 mod tests {
     use super::*;
     use crate::model::camera::Pose;
+    use crate::model::edge::Edge;
 
     /// Eye at the origin, looking along −z; three by three pixels of 90 degrees: slopes −2/3, 0,
     /// 2/3.
@@ -112,8 +113,7 @@ mod tests {
         pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
         fov_y_rad: std::f64::consts::FRAC_PI_2,
         near: 0.5,
-        cutoff: 3.0,
-        threshold: 0.0,
+        edge: Edge { radius: 3.0, tau: 0.0 },
         smallest: 0.0,
         shift: glam::DVec2::ZERO,
     };

@@ -196,6 +196,7 @@ mod tests {
 
     use super::*;
     use crate::model::camera::Pose;
+    use crate::model::edge::Edge;
 
     /// From a height of 2, straight down; north is up in the picture: 3 by 3 pixels of 90 degrees,
     /// slopes −2/3, 0, 2/3.
@@ -211,8 +212,7 @@ mod tests {
             },
             fov_y_rad: std::f64::consts::FRAC_PI_2,
             near: 0.5,
-            cutoff: 3.0,
-            threshold: 0.0,
+            edge: Edge { radius: 3.0, tau: 0.0 },
             smallest: 0.0,
             shift: DVec2::ZERO,
         }

@@ -1,4 +1,4 @@
-//! Layers that a threshold and a smallest size omit from a picture, passes.md "threshold" and
+//! Layers that a threshold and a smallest size omit from a picture, passes.md "edges" and
 //! "cull", in f64. In: blobs and eye relative to O. Out: number and optical depth of the omitted
 //! layers of every pixel.
 
@@ -6,6 +6,7 @@ use super::Blob;
 use super::composite::OpaquePixel;
 use super::sprites::Factor;
 use super::view::View;
+use crate::model::edge::Edge;
 
 /// Omitted layers of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -38,7 +39,7 @@ pub fn omitted(
     factor: Option<Factor<'_>>,
 ) -> Vec<Omitted> {
     let mut pixels = vec![Omitted::default(); behind.len()];
-    let whole = View { threshold: 0.0, smallest: 0.0, ..*view };
+    let whole = View { edge: Edge { tau: 0.0, ..view.edge }, smallest: 0.0, ..*view };
     for (k, blob) in blobs.iter().enumerate() {
         let c = blob.position - view.pose.position;
         let depth = c.dot(view.pose.forward);
@@ -46,7 +47,7 @@ pub fn omitted(
             continue;
         }
         let is_large = view.above_smallest(blob, c, 0.0).0 >= 0.0;
-        let to = whole.cut(blob.deepest());
+        let to = whole.edge.cut(blob.deepest());
         let [columns, rows] = view.rectangle(blob, c, (2.0 * to).sqrt());
         for row in rows.0..rows.1 {
             for column in columns.0..columns.1 {
@@ -55,7 +56,7 @@ pub fn omitted(
                 let line = blob.along(c, ray);
                 let e = 0.5 * line.off.powi(2);
                 // Blobs that are too small are omitted entirely.
-                let from = if is_large { view.cut(line.depth) } else { 0.0 };
+                let from = if is_large { view.edge.cut(line.depth) } else { 0.0 };
                 if (e > from || from <= 0.0) && e <= to && depth <= behind[i].depth {
                     let delta = view.slopes_of(ray) - view.slopes_of(c);
                     let factor = factor.map_or(1.0, |f| f(k, delta));
@@ -81,15 +82,14 @@ mod tests {
             Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
         // Three pixels at slopes −1, 0 and 1.
         let (fov_y_rad, smallest) = (2.0 * 0.5f64.atan(), 0.0);
-        let (shift, threshold) = (DVec2::ZERO, 0.1);
+        let shift = DVec2::ZERO;
         let view = View {
             width: 3,
             height: 1,
             pose,
             fov_y_rad,
             near: 0.5,
-            cutoff: 3.0,
-            threshold,
+            edge: Edge { radius: 3.0, tau: 0.1 },
             smallest,
             shift,
         };
@@ -119,7 +119,7 @@ mod tests {
         assert_eq!(of(&[blob(0.2)], 1.9), [nothing; 3], "hidden");
         // Pixels are one slope wide, σ = 1 at depth 2 half of one.
         let of = |smallest: f64| {
-            let view = View { threshold: 0.0, smallest, ..view };
+            let view = View { edge: Edge { tau: 0.0, ..view.edge }, smallest, ..view };
             omitted(&view, &[OpaquePixel::EMPTY; 3], &[blob(0.2)], None)
                 .iter()
                 .map(|c| c.n_layers)

@@ -139,6 +139,7 @@ mod tests {
     use super::*;
     use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
+    use crate::model::edge::Edge;
     use crate::reference::{Blob, sprites};
 
     #[test]
@@ -151,8 +152,7 @@ mod tests {
             pose,
             fov_y_rad: 1.0,
             near: 0.5,
-            cutoff: 3.0,
-            threshold: 0.0,
+            edge: Edge { radius: 3.0, tau: 0.0 },
             smallest: 0.0,
             shift: glam::DVec2::ZERO,
         };

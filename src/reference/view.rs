@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 
 use super::Blob;
 use crate::model::camera::Pose;
+use crate::model::edge::Edge;
 
 /// A view: camera, picture size and cuts. `pose.position` is the eye relative to O.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,10 +20,8 @@ pub struct View {
     pub fov_y_rad: f64,
     /// Least view depth of a drawn particle's centre.
     pub near: f64,
-    /// Radius at which sprites end, σ.
-    pub cutoff: f64,
-    /// Optical depth below which sprites end.
-    pub threshold: f64,
+    /// Where sprites end.
+    pub edge: Edge,
     /// Width in pixels of σ below which blobs are left out; 0 leaves out none.
     pub smallest: f64,
     /// Offset of the rays from the pixels' centres, to the right and down, pixels within ±½.
@@ -38,8 +37,7 @@ impl View {
         pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
         fov_y_rad: 1.0,
         near: 0.5,
-        cutoff: 3.0,
-        threshold: 0.0,
+        edge: Edge { radius: 3.0, tau: 0.0 },
         smallest: 0.0,
         shift: DVec2::ZERO,
     };
@@ -49,13 +47,6 @@ impl View {
     pub(super) fn half_slopes(&self) -> (f64, f64) {
         let tan = (0.5 * self.fov_y_rad).tan();
         (tan * f64::from(self.width) / f64::from(self.height), tan)
-    }
-
-    /// Returns b²/2σ² where a sprite of central optical depth `tau` ends (passes.md
-    /// "threshold"). If it is not positive nothing is drawn.
-    pub fn cut(&self, tau: f64) -> f64 {
-        // Without a threshold the logarithm is infinite, or NaN for 0/0, which `min` ignores.
-        (0.5 * self.cutoff * self.cutoff).min((tau / self.threshold).ln())
     }
 
     /// Returns by how much a blob's σ exceeds the smallest drawn width, `c` its offset from the

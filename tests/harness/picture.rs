@@ -16,6 +16,7 @@ use nimbus::layout::facet::LitRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
 use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::cloud::SQRT_TAU;
+use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
 use nimbus::reference::composite::{OpaquePixel, Rounding};
@@ -80,8 +81,7 @@ impl Picture {
             pose,
             fov_y_rad: camera.fov_y_rad,
             near,
-            cutoff: 3.0,
-            threshold: 0.0,
+            edge: Edge { radius: 3.0, tau: 0.0 },
             smallest: 0.0,
             shift: DVec2::ZERO,
         };
@@ -296,7 +296,7 @@ impl Picture {
                 for i in 0..self.view.width {
                     let d = self.view.ray(i, j);
                     let line = blob.along(c, d);
-                    let cut = self.view.cut(line.depth);
+                    let cut = self.view.edge.cut(line.depth);
                     let at_cut = 0.5 * line.off.powi(2) - cut;
                     if at_cut > 0.2 * cut.max(1.0) {
                         continue;
@@ -334,8 +334,8 @@ impl Picture {
 
     /// Returns the error of the shaders' ln(τ₀/threshold), or of their log2.
     fn cut_error(&self, tau: Bounded) -> f64 {
-        let inverse = Bounded::once(1.0 / self.view.threshold);
-        if self.view.threshold > 0.0 { tau.times(inverse).log().error } else { 0.0 }
+        let inverse = Bounded::once(1.0 / self.view.edge.tau);
+        if self.view.edge.has_threshold() { tau.times(inverse).log().error } else { 0.0 }
     }
 
     fn half_slopes(&self) -> [Bounded; 2] {

@@ -231,9 +231,8 @@ impl Picture {
         };
         let i_first_facet = uploaded.n_surface_facets;
         let n = BlobCount { n: RecordCount::Known(uploaded.n_entries), i_first_facet };
-        let (cutoff, threshold) = (self.view.cutoff, self.view.threshold);
-        let view =
-            |saturated: f64| BlobView { camera, cutoff, threshold, saturated, extents: None };
+        let edge = self.view.edge;
+        let view = |saturated: f64| BlobView { camera, edge, saturated, extents: None };
         let start = if self.scenery.is_some() { LoadOp::Load } else { LoadOp::Clear };
         match made {
             Made::Sprites(sprites) => sprites.record(rec, &from, (target, start), &view(0.0), n),
@@ -278,7 +277,7 @@ impl Picture {
             grouped: self.i_facet.is_some(),
             weighted: self.drawn.is_some(),
             textured: self.textured.is_some(),
-            threshold: self.view.threshold > 0.0,
+            threshold: self.view.edge.has_threshold(),
             ellipsoids: self.has_ellipsoids(),
         }
     }

@@ -20,7 +20,7 @@ impl Picture {
             let d = view.ray(i, j);
             let covers = |b: &&Blob| {
                 let c = b.position - view.pose.position;
-                c.dot(view.pose.forward) >= view.near && b.along(c, d).off <= view.cutoff
+                c.dot(view.pose.forward) >= view.near && b.along(c, d).off <= view.edge.radius
             };
             blobs.iter().filter(covers).count()
         };

@@ -6,6 +6,7 @@ use half::f16;
 use nimbus::model::boxes::{BoxLaw, Form};
 use nimbus::model::camera::Pose;
 use nimbus::model::cloud::{SQRT_TAU, box_kappa};
+use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
 use nimbus::reference::composite::{OpaquePixel, Rounding};
@@ -38,8 +39,7 @@ fn view(width: u32, height: u32) -> View {
         pose,
         fov_y_rad: FRAC_PI_2,
         near: 0.1,
-        cutoff: 3.0,
-        threshold: 0.0,
+        edge: Edge { radius: 3.0, tau: 0.0 },
         smallest: 0.0,
         shift: DVec2::ZERO,
     }
@@ -129,7 +129,7 @@ fn layers(view: &View, blobs: &[Blob], radiance: &[DVec3], i: u32, j: u32) -> Ve
         blobs.iter().zip(radiance).filter(|(b, _)| b.position.dot(view.pose.forward) >= view.near);
     let lines = seen.map(|(blob, l)| (blob.along(blob.position, d), *l));
     lines
-        .filter(|(line, _)| line.off <= view.cutoff)
+        .filter(|(line, _)| line.off <= view.edge.radius)
         .map(|(line, l)| (alpha(line.tau()), l))
         .collect()
 }

@@ -1,5 +1,6 @@
 //! The number of layers to compose in each pixel of a picture.
 
+use crate::model::edge::Edge;
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
 use crate::reference::picture::{self, FrameReference, Tile};
@@ -15,8 +16,8 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// Counts the layers of a scene as `truth` has placed it. Blobs end at `reach` σ.
-    pub fn new(scene: &Scene, truth: &FrameReference, reach: f64) -> Layers {
+    /// Counts the layers of a scene as `truth` has placed it. Blobs end at `edge`.
+    pub fn new(scene: &Scene, truth: &FrameReference, edge: Edge) -> Layers {
         let view = picture::view(scene, truth);
         let origin = truth.state.light_origin;
         let placed: Vec<Surface> =
@@ -24,7 +25,7 @@ impl Layers {
         let sees = |i: u32, j: u32| surfaces::seen(&view, &placed, view.ray(i, j)).is_some();
         let all = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
         let is_solid = all.map(|(i, j)| !placed.is_empty() && sees(i, j)).collect();
-        Layers { width: view.width, n: layers::n_layers(&view, &truth.blobs, reach), is_solid }
+        Layers { width: view.width, n: layers::n_layers(&view, &truth.blobs, edge), is_solid }
     }
 
     /// Returns the layers over all pixels, with a layer a pixel for the background.

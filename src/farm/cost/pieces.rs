@@ -6,12 +6,13 @@ use super::layers::Layers;
 use crate::error::Result;
 use crate::farm::work::ReferenceWork;
 use crate::io::scene_file::LoadedScene;
+use crate::model::edge::Edge;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::picture::{FrameReference, ReferenceKind, n_reflections};
 
-/// A blob's reach in references that integrate without an end, in σ: it keeps all but a thousandth
-/// of its optical depth within.
-const REACH: f64 = 4.0;
+/// Where blobs end in references that integrate without an end: they keep all but a thousandth of
+/// their optical depth within.
+const VOLUME_EDGE: Edge = Edge { radius: 4.0, tau: 0.0 };
 
 /// Counts that hold for every division of a picture into pieces.
 pub struct PieceAmounts {
@@ -29,11 +30,11 @@ impl PieceAmounts {
     pub fn new(work: &ReferenceWork, loaded: &LoadedScene) -> Result<PieceAmounts> {
         let (scene, of) = (work.scene(loaded), work.reference()?);
         let truth = FrameReference::unlit(&scene, scene.time.at(work.frame))?;
-        let reach = if of == ReferenceKind::Thin { scene.draw.cutoff } else { REACH };
+        let edge = if of == ReferenceKind::Thin { scene.draw.edge() } else { VOLUME_EDGE };
         // The light of the other references uses no grid.
         let has_grid = matches!(of, ReferenceKind::Thin | ReferenceKind::Volume);
         let visits = if has_grid { CellVisits::new(&scene, &truth) } else { CellVisits::default() };
-        let layers = Layers::new(&scene, &truth, reach);
+        let layers = Layers::new(&scene, &truth, edge);
         Ok(PieceAmounts { scene, of, layers, visits })
     }
 

@@ -54,7 +54,7 @@ impl Parts {
             visits: CellVisits::new(scene, &truth),
             facet_pairs: if is_second { n_facets * n_facets * n_tests } else { 0.0 },
             n_pixels,
-            n_layers: Layers::new(scene, &truth, scene.draw.cutoff).n_total() - n_pixels,
+            n_layers: Layers::new(scene, &truth, scene.draw.edge()).n_total() - n_pixels,
         })
     }
 

@@ -128,6 +128,7 @@ pub fn toml_name<T: PartialEq>(names: &[(&str, T)], value: T) -> String {
 #[cfg(test)]
 pub mod tests {
     use super::*;
+    use crate::model::edge::Reach;
     use crate::model::sort_bits::SortBits;
 
     /// A `draw` in which every knob of the table is "auto".
@@ -138,7 +139,7 @@ pub mod tests {
         resolution: Resolution::Auto,
         error: 1e-3,
         chunks: Chunks::Auto,
-        cutoff: 3.0,
+        cutoff: Reach::Sigmas(3.0),
         threshold: Cutoff::Auto,
         cull: Cull::Auto,
         smallest: Cutoff::Auto,

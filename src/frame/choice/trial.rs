@@ -74,13 +74,13 @@ pub struct Trial<'a> {
 
 /// Returns the part of `draw` that a picture is made for; other numbers are push constants.
 fn picture_key(draw: &Draw) -> Draw {
-    let threshold = Cutoff::At(if draw.threshold.is_active() { 1.0 } else { 0.0 });
+    let threshold = Cutoff::At(if draw.edge().has_threshold() { 0.5 } else { 0.0 });
     Draw { threshold, smallest: Cutoff::NONE, cull: Cull::On, ..*draw }
 }
 
 /// Returns the part of `draw` that the pass `cull` is made for.
 fn culling_key(draw: &Draw) -> (Cull, bool) {
-    (draw.cull, draw.threshold.is_active())
+    (draw.cull, draw.edge().has_threshold())
 }
 
 impl<'a> Trial<'a> {

@@ -2,8 +2,7 @@ use super::*;
 use std::sync::Arc;
 use std::time::Instant;
 
-const RULES: CacheRules =
-    CacheRules { size: [160, 120], layer_size: [200, 150], cutoff: 3.0, error: 0.5 };
+const RULES: CacheRules = CacheRules { size: [160, 120], layer_size: [200, 150], error: 0.5 };
 
 /// Returns a packet of clouds in front of an eye at (x, 0, z) that looks along −z.
 fn packet(x: f64, z: f64) -> Packet {
@@ -12,6 +11,7 @@ fn packet(x: f64, z: f64) -> Packet {
         half: DVec3::splat(0.5),
         sigma_max: 0.6,
         sigma_mean: 0.5,
+        reach: 3.0,
         n_particles: 400,
     };
     Packet {

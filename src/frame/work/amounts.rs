@@ -84,7 +84,7 @@ pub struct Amounts {
 pub struct Blobs {
     /// Its pixels.
     pub pixels: f64,
-    /// Layers that its pixels are made of, over all pixels: blobs within the cutoff, near to far,
+    /// Layers that its pixels are made of, over all pixels: blobs that have not ended, near to far,
     /// until nothing behind them shows. A mean over some rays of the frame, times the pixels; 0
     /// where thresholds or other numbers of blobs leave some of them out. Blobs in and behind the
     /// bounds of a solid do not count.
@@ -116,16 +116,13 @@ impl Amounts {
         }
         if !has_impostors(scene) {
             let (camera, size) = renderer.blob_camera(&packet);
-            let is_whole = !scene.draw.threshold.is_active() && scene.draw.count.is_none();
             let pixels = f64::from(size[0]) * f64::from(size[1]);
             let mut per_pixel = 0.0;
-            if is_whole && of.particles > 0.0 {
+            if scene.draw.count.is_none() && of.particles > 0.0 {
                 let (placed, particles) = (renderer.placed(device)?, renderer.particles(device)?);
-                let cutoff = scene.draw.cutoff;
-                let saturated = renderer.saturated();
+                let bounds = (scene.draw.edge(), renderer.saturated());
                 let rays = Rays::new(&camera, size, placed.len());
                 let solids = solids(scene, &packet, &facets);
-                let bounds = [cutoff, saturated];
                 per_pixel = layers(&rays, &camera, &placed, &particles, &solids, bounds);
             }
             of.blobs = Some(Blobs { pixels, layers: pixels * per_pixel });

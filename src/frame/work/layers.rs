@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::layout::frame::CameraRecord;
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::cloud::SQRT_TAU;
+use crate::model::edge::Edge;
 
 /// Most pairs of ray and blob that are tested: about a tenth of a second.
 const MOST_TESTS: usize = 20_000_000;
@@ -36,7 +37,7 @@ impl Rays {
     }
 }
 
-/// Returns the mean number of layers along `rays`: blobs within the cutoff, in σ, near to far,
+/// Returns the mean number of layers along `rays`: blobs that have not ended there, near to far,
 /// until what passes is below `saturated`. Blobs that a solid in one of the boxes `solids` (low and
 /// high corner) may hide are none: those whose centres are not nearer than the box.
 pub(super) fn layers(
@@ -45,7 +46,7 @@ pub(super) fn layers(
     placed: &[PlacedRecord],
     particles: &[ParticleRecord],
     solids: &[[DVec3; 2]],
-    [cutoff, saturated]: [f64; 2],
+    (edge, saturated): (Edge, f64),
 ) -> f64 {
     let (eye, forward) = (vector(camera.eye), vector(camera.forward));
     let near = f64::from(camera.near);
@@ -62,10 +63,11 @@ pub(super) fn layers(
             let along = offset.dot(ray) / ray.length();
             let apart = offset.length_squared() - along * along;
             let tau = SQRT_TAU * f64::from(particle.kappa) * sigma / ray.length();
-            if apart > (cutoff * sigma).powi(2) || depth < near || depth > hidden || tau <= 0.0 {
+            let (off, cut) = (0.5 * apart / (sigma * sigma), edge.cut(tau));
+            if off > cut || cut <= 0.0 || depth < near || depth > hidden || tau <= 0.0 {
                 continue;
             }
-            met.push((depth, tau * (-0.5 * apart / (sigma * sigma)).exp()));
+            met.push((depth, tau * (-off).exp()));
         }
         met.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut n = 0;
@@ -101,6 +103,8 @@ fn vector(v: [f32; 3]) -> DVec3 {
 mod tests {
     use super::*;
 
+    const CUT: Edge = Edge { radius: 3.0, tau: 0.0 };
+
     fn camera() -> CameraRecord {
         CameraRecord {
             eye: [0.0; 3],
@@ -127,7 +131,7 @@ mod tests {
         // One pixel: its ray is the view direction.
         let rays = Rays::new(&camera(), [1, 1], placed.len());
         assert_eq!(rays.0, [DVec3::NEG_Z]);
-        layers(&rays, &camera(), &placed, &particles, &[], [3.0, saturated])
+        layers(&rays, &camera(), &placed, &particles, &[], (CUT, saturated))
     }
 
     #[test]
@@ -150,7 +154,7 @@ mod tests {
         let (placed, particle) = blob(-10.0, 5.0 / 3.0, 1e-3);
         let rays = Rays::new(&camera(), [640, 640], 1);
         assert_eq!(rays.0.len(), MOST_ALONG * MOST_ALONG);
-        let share = layers(&rays, &camera(), &[placed], &[particle], &[], [3.0, 1e-3]);
+        let share = layers(&rays, &camera(), &[placed], &[particle], &[], (CUT, 1e-3));
         assert!((share - std::f64::consts::PI / 12.0).abs() < 0.02, "{share}");
     }
 
@@ -160,7 +164,7 @@ mod tests {
         let (placed, particles): (Vec<_>, Vec<_>) = blobs.iter().copied().unzip();
         let rays = Rays::new(&camera(), [1, 1], 2);
         let n = |solids: &[[DVec3; 2]]| {
-            layers(&rays, &camera(), &placed, &particles, solids, [3.0, 1e-3])
+            layers(&rays, &camera(), &placed, &particles, solids, (CUT, 1e-3))
         };
         let at = |x: f64, z: f64| [DVec3::new(x - 1.0, -1.0, z - 0.5), DVec3::new(x + 1.0, 1.0, z)];
         assert_eq!(n(&[at(0.0, -7.0)]), 1.0);
@@ -183,6 +187,19 @@ mod tests {
         assert_eq!(count(&[at(2.0, 1.0)], 1e-3), 1.0);
         assert_eq!(count(&[at(2.0, 0.5)], 1e-3), 0.0);
         assert_eq!(count(&[at(1.4, 0.5)], 1e-3), 1.0);
+    }
+
+    #[test]
+    fn blobs_end_at_an_optical_depth() {
+        // The ray passes 2 σ from a blob of depth 0.1 e²: 0.1 is left.
+        let (mut placed, particle) = blob(-10.0, 1.0, (0.1 * 2f64.exp() / SQRT_TAU) as f32);
+        placed.position[1] = 2.0;
+        let rays = Rays::new(&camera(), [1, 1], 1);
+        let of = |tau| {
+            let bounds = (Edge { tau, ..CUT }, 1e-3);
+            layers(&rays, &camera(), &[placed], &[particle], &[], bounds)
+        };
+        assert_eq!([of(0.0999), of(0.1001), of(1.0)], [1.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -7,12 +7,18 @@ use crate::io::bounds::{Bounds, DIVISOR};
 use crate::io::document::section::Section;
 use crate::model::count::Count;
 use crate::model::cutoff::Cutoff;
+use crate::model::edge::{FARTHEST, Reach};
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, MAX_CHUNKS};
 use crate::model::sort_bits::SortBits;
 
 fn cutoff(bounds: Bounds) -> Spec<Cutoff> {
     one_of(0.0, [("auto".into(), Cutoff::Auto)], Some(number(0.0, bounds).map(Cutoff::At)))
+}
+
+fn reach() -> Spec<Reach> {
+    let numbers = number(0.0, Bounds::Within(0.5, FARTHEST)).map(Reach::Sigmas);
+    one_of("auto", [("auto".into(), Reach::Auto)], Some(numbers))
 }
 
 fn chunks() -> Spec<Chunks> {
@@ -38,12 +44,13 @@ keys! { DRAW: fn draw(s) -> Draw { Draw;
     impostors: choice("off", &Impostors::NAMES);
     /// Greatest predicted error of an impostor.
     impostor_error: number(0.5, Bounds::Within(0.01, 100.0)), "px";
-    /// Distance from its centre at which a sprite ends.
-    cutoff: number(3.0, Bounds::Within(0.5, 8.0)), "σ";
+    /// Distance from its centre at which a particle ends. With "auto" it ends where its own optical
+    /// depth falls under 0.0005.
+    cutoff: reach(), "σ";
     /// Chunks that sprites are drawn in, near to far; after each, pixels that are opaque are left
     /// out. With 0 all sprites are drawn far to near.
     chunks: chunks();
-    /// Optical depth below which a sprite ends.
+    /// Optical depth below which a particle ends.
     threshold: cutoff(Bounds::From(0.0, 1.0));
     /// Whether particles that show in no pixel are left out before the sort. No pixel changes.
     cull: choice("on", &Cull::NAMES);

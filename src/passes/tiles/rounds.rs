@@ -117,7 +117,7 @@ fn most_bins(division: &Division, view: &BlobView<'_>, extent: &Extent) -> u64 {
     let forward = vector(view.camera.forward);
     let middle = (extent.center - vector(view.camera.eye)).dot(forward);
     let reach = extent.half.dot(forward.abs());
-    let radius = SLACK * view.cutoff * extent.sigma_max;
+    let radius = SLACK * extent.radius();
     let near = f64::from(view.camera.near);
     if SLACK * (middle + reach) < near {
         return 0;

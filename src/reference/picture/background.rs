@@ -22,8 +22,7 @@ pub fn view(scene: &Scene, frame: &FrameReference) -> View {
         pose,
         fov_y_rad: scene.camera.fov_y_rad,
         near: scene.camera.near,
-        cutoff: scene.draw.cutoff,
-        threshold: scene.draw.threshold.bound(),
+        edge: scene.draw.edge(),
         smallest: scene.draw.smallest.bound(),
         shift: DVec2::ZERO,
     }

@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::model::cutoff::Cutoff;
+use crate::model::edge::{FARTHEST, Reach};
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Scene};
 use crate::model::sort_bits::SortBits;
@@ -64,14 +65,12 @@ impl ReferenceKind {
     /// Returns `scene` with every approximation of its drawing switched off: all particles, full
     /// size, sprites out to 8 σ.
     pub fn without_approximations(scene: &Scene) -> Scene {
-        /// Greatest cutoff that a scene may set, σ. There e^{−32} of a blob's depth is left.
-        const UNCUT: f64 = 8.0;
         let draw = Draw {
             path: DrawPath::Sprites,
             impostors: Impostors::Off,
             resolution: Resolution::Full,
             chunks: Chunks::Of(0),
-            cutoff: UNCUT,
+            cutoff: Reach::Sigmas(FARTHEST),
             threshold: Cutoff::NONE,
             cull: Cull::On,
             smallest: Cutoff::NONE,

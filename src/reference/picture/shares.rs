@@ -195,7 +195,8 @@ const TEXTURED: f64 = 1e-4;
 const NARROWER: f64 = 0.01;
 
 /// Returns the rounding of a device that draws `blobs`. The error of a particle's place relative to
-/// its σ moves the distance of a ray by that share: τ changes by up to the cutoff times the share.
+/// its σ moves the distance of a ray by that share: τ changes by up to b/σ at the blob's end times
+/// the share.
 pub(super) fn rounding(scene: &Scene, view: &View, blobs: &[Blob]) -> Rounding {
     let mut sigmas: Vec<f64> = blobs.iter().map(|b| b.sigma * b.aspect.min(1.0)).collect();
     sigmas.retain(|sigma| *sigma > 0.0);
@@ -206,7 +207,8 @@ pub(super) fn rounding(scene: &Scene, view: &View, blobs: &[Blob]) -> Rounding {
     let unit = f64::from(f32::EPSILON) / 2.0;
     let off = N_ROUNDINGS * unit * farthest / narrow.unwrap_or(1.0);
     let texture = if scene.is_textured() { TEXTURED } else { 0.0 };
-    let alpha = ONE_MINUS_EXP + scene.draw.cutoff * off + texture;
+    let reach = blobs.iter().map(|b| view.edge.reach(b.deepest())).fold(0.0, f64::max);
+    let alpha = ONE_MINUS_EXP + reach * off + texture;
     let stored = Rounding::of(scene.film.format, alpha, off);
     // Besides the store there are four roundings: L1 + L2, α L, (1 − α) C and their sum.
     Rounding { depth: N_ROUNDINGS * unit, unit: stored.unit + 2.0 * unit, ..stored }

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::*;
 use crate::model::camera::Pose;
 use crate::model::cloud::SQRT_TAU;
+use crate::model::edge::Edge;
 use crate::reference::sprites::{self, Sprites};
 
 /// Integrates the whole picture before `behind`, one a pixel.
@@ -23,8 +24,7 @@ fn view(n: u32) -> View {
         pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
         fov_y_rad: 0.9,
         near: 1e-3,
-        cutoff: 9.0,
-        threshold: 0.0,
+        edge: Edge { radius: 9.0, tau: 0.0 },
         smallest: 0.0,
         shift: glam::DVec2::ZERO,
     }

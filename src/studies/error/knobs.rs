@@ -15,7 +15,7 @@ struct Knob {
 const KNOBS: &[Knob] = &[
     Knob { key: "draw.path", values: &["sprites", "tiles"], applies: has_particles },
     Knob { key: "draw.resolution", values: &["1.0", "0.5", "0.25"], applies: has_particles },
-    Knob { key: "draw.cutoff", values: &["2.0", "2.5", "3.0", "4.0"], applies: has_particles },
+    Knob { key: "draw.cutoff", values: &["2.0", "3.0", "4.0", "auto"], applies: has_particles },
     Knob {
         key: "draw.threshold",
         values: &["0.0", "0.001", "0.01", "0.03"],

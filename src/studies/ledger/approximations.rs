@@ -3,6 +3,7 @@
 use crate::frame::{gathers_from_tree, is_glossy};
 use crate::model::basis::MAX_BASES;
 use crate::model::cutoff::Cutoff;
+use crate::model::edge::{EDGE, FARTHEST, Reach};
 use crate::model::film::FilmFormat;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, DrawPath, Gather, LightingMode, Scene};
@@ -19,9 +20,6 @@ pub struct Approximation {
     /// The scene without it.
     pub without: Scene,
 }
-
-/// Cutoff in σ beyond which e^{−32} of a blob's depth is left.
-const UNCUT: f64 = 8.0;
 
 /// Returns the approximations of `scene`, in which nothing is "auto". Each scene also lacks the
 /// approximations before it.
@@ -111,7 +109,7 @@ const ALL: [(&str, Part, Describe, Remove); 10] = [
         |s| if s.draw.count.is_some() { "by distance" } else { "all" }.into(),
         |s| s.draw.count = None,
     ),
-    ("cutoff", Part::Particles, |s| format!("{} sigma", s.draw.cutoff), |s| s.draw.cutoff = UNCUT),
+    ("cutoff", Part::Particles, cutoff_of, |s| s.draw.cutoff = Reach::Sigmas(FARTHEST)),
     (
         "bases",
         Part::Lobes,
@@ -133,6 +131,13 @@ const ALL: [(&str, Part, Describe, Remove); 10] = [
         },
     ),
 ];
+
+fn cutoff_of(scene: &Scene) -> String {
+    match scene.draw.cutoff {
+        Reach::Sigmas(sigmas) => format!("{sigmas} sigma"),
+        Reach::Auto => format!("tau {EDGE}"),
+    }
+}
 
 fn format_of(scene: &Scene) -> String {
     scene.film.format.name().to_owned()

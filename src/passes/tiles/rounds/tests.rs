@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::layout::frame::CameraRecord;
+use crate::model::edge::Edge;
 
 fn camera(tan_x: f32, tan_y: f32) -> CameraRecord {
     CameraRecord {
@@ -18,12 +19,12 @@ fn camera(tan_x: f32, tan_y: f32) -> CameraRecord {
 }
 
 fn view<'a>(camera: &'a CameraRecord, extents: &'a [Extent]) -> BlobView<'a> {
-    BlobView { camera, cutoff: 3.0, threshold: 0.0, saturated: 0.0, extents: Some(extents) }
+    BlobView { camera, edge: Edge::NONE, saturated: 0.0, extents: Some(extents) }
 }
 
 fn extent(center: DVec3, half: f64, sigma: f64, n_particles: u32) -> Extent {
     let half = DVec3::splat(half);
-    Extent { center, half, sigma_max: sigma, sigma_mean: sigma, n_particles }
+    Extent { center, half, sigma_max: sigma, sigma_mean: sigma, reach: 3.0, n_particles }
 }
 
 /// Bins that the silhouette of a ball covers, from the slopes of rays that touch it.

@@ -25,6 +25,7 @@ layout(push_constant) uniform Push {
     vec2 pixel;
     float cutoff;
     float inv_threshold;
+    float least_cut;
     float smallest;
     uint n_particles;
     uint width;
@@ -56,7 +57,8 @@ bool is_kept(uint i) {
     float reach = push.cutoff;
     bool is_dense = tau > 0.0;
     if (THRESHOLD != 0) {
-        float cut = min(0.5 * push.cutoff * push.cutoff, log(tau * push.inv_threshold));
+        float cut = max(log(tau * push.inv_threshold), push.least_cut);
+        cut = min(0.5 * push.cutoff * push.cutoff, cut);
         is_dense = is_dense && cut > 0.0;
         reach = sqrt(2.0 * max(cut, 0.0));
     }

@@ -53,7 +53,7 @@ void main() {
         tau *= sqrt((rest + up * up) / white);
         cut = 0.5 * push.cutoff * push.cutoff;
         if (THRESHOLD != 0) {
-            cut = min(cut, log(tau * push.inv_threshold));
+            cut = min(cut, max(log(tau * push.inv_threshold), push.least_cut));
         }
     }
     float alpha = 0.0;

@@ -67,7 +67,8 @@ void main() {
     float reach = push.cutoff;
     bool empty = !(tau > 0.0);
     if (THRESHOLD != 0) {
-        out_cut = min(0.5 * push.cutoff * push.cutoff, log(tau * push.inv_threshold));
+        out_cut = max(log(tau * push.inv_threshold), push.least_cut);
+        out_cut = min(0.5 * push.cutoff * push.cutoff, out_cut);
         empty = empty || !(out_cut > 0.0);
         reach = sqrt(2.0 * max(out_cut, 0.0));
     }

@@ -75,6 +75,7 @@ layout(push_constant) uniform Push {
     float cut;
     float saturated;
     float inv_threshold;
+    float least_cut;
     float y_right;
     float y_up;
     float y_forward;
@@ -174,7 +175,7 @@ void compose(Loaded splat, float y) {
         passed[j] = 1.0 - alpha[j];
         bool is_seen = e[j] >= lowest && !(passed[j] < saturated);
 #if ELLIPSOIDS && THRESHOLD
-        is_seen = is_seen && e[j] >= -log2(deep[j] * inv_threshold);
+        is_seen = is_seen && e[j] >= -max(log2(deep[j] * inv_threshold), push.least_cut);
 #endif
 #if BEHIND
         is_seen = is_seen && light.w >= depth_of[j];
@@ -207,7 +208,8 @@ void compose_some(uint k, uint n, uint spare, float y) {
     splat.fours[0].w = k + t < n ? splat.fours[0].w : 0u;
     splat.fours[1].xyz = k + t < n ? splat.fours[1].xyz : uvec3(0);
 #if OWN_EDGE
-    splat.lowest = max(min_exponent, -log2(uintBitsToFloat(splat.fours[0].w) * inv_threshold));
+    float cut = max(log2(uintBitsToFloat(splat.fours[0].w) * inv_threshold), push.least_cut);
+    splat.lowest = max(min_exponent, -cut);
 #endif
     uint end = min(n - k, INVOCATIONS);
 #if ONE_SUBGROUP

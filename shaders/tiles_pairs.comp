@@ -19,6 +19,7 @@ layout(push_constant) uniform Push {
     uint i_round;
     float cut;
     float inv_threshold;
+    float least_cut;
 } push;
 READS(0, uvec2, reach)
 READS(1, uint, n_before)
@@ -73,7 +74,7 @@ void main() {
     vec2 center = splats[r].center;
     float scale = splats[r].scale, cut = push.cut;
     if (THRESHOLD != 0) {
-        cut = min(cut, log2(splats[r].tau * push.inv_threshold));
+        cut = min(cut, max(log2(splats[r].tau * push.inv_threshold), push.least_cut));
     }
     uvec2 first = low / TILES_ACROSS, last = (high - 1u) / TILES_ACROSS;
     uint n_x = last.x - first.x + 1u;

@@ -33,6 +33,7 @@ layout(push_constant) uniform Push {
     uint tile_width;
     uint tile_height;
     float inv_threshold;
+    float least_cut;
 } push;
 READS(0, uvec2, entries)
 // Texels, which llvmpipe fetches for all invocations at once: a Placed is one texel, a Particle
@@ -89,7 +90,8 @@ uint project(uint i, uint r) {
     }
     float reach_in_sigma = push.cutoff;
     if (THRESHOLD != 0) {
-        float cut = min(0.5 * push.cutoff * push.cutoff, log(deepest * push.inv_threshold));
+        float cut = max(log(deepest * push.inv_threshold), push.least_cut);
+        cut = min(0.5 * push.cutoff * push.cutoff, cut);
         if (!(cut > 0.0)) {
             return 0u;
         }

@@ -66,7 +66,7 @@ impl Scene {
             pose,
             fov_y_rad,
             near: 0.5,
-            edge: Edge { radius: 3.0, tau: 0.0 },
+            edge: Edge::at(3.0),
             smallest: 0.0,
             shift: glam::DVec2::ZERO,
         };
@@ -238,7 +238,8 @@ fn random(seed: u64, n: usize) -> Scene {
     let mut scene = Scene::new(width, height);
     let tau = if seed.is_multiple_of(2) { f64::from(within(0.001, 0.2)) } else { 0.0 };
     let smallest = if seed.is_multiple_of(3) { f64::from(within(0.1, 2.0)) } else { 0.0 };
-    let edge = Edge { radius: f64::from(within(1.0, 5.0)), tau };
+    let least = if seed.is_multiple_of(4) { f64::from(within(0.5, 1.0)) } else { 0.0 };
+    let edge = Edge { tau, least, radius: f64::from(within(1.0, 5.0)) };
     let fov_y_rad = f64::from(within(0.3, 2.3));
     let near = f64::from(within(0.01, 0.5));
     scene.view = View { pose, edge, smallest, fov_y_rad, near, ..scene.view };

@@ -304,7 +304,7 @@ fn textures_of_every_size_and_their_mutations() {
         ("1.0, 64.0)", "1.0, 32.0)"),
         ("PERIOD_SIGMA * z_in_sigma;", "PERIOD_SIGMA * z_in_sigma * 1.001;"),
         ("(1u << place.y) - 1u", "(1u << place.y) - 2u"),
-        ("int(own << 16) >> 16", "int(own & 0xFFFFu)"),
+        ("ivec2(own << 16,", "ivec2(own << 15,"),
     ] {
         let wrong = Gpu::wrong_compiler("include/texture.glsl", from, to);
         let values = picture.draw(&mut gpu, Some(&wrong), TargetFormat::Rgba32f);

@@ -358,7 +358,7 @@ fn a_target_that_does_not_fit_is_refused() {
                 };
                 let view = BlobView {
                     camera: &camera,
-                    edge: Edge { radius: 3.0, tau: 0.0 },
+                    edge: Edge::at(3.0),
                     saturated: 0.0,
                     extents: None,
                 };

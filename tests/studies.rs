@@ -326,7 +326,7 @@ fn a_ledger_sums_up() {
             "{row}"
         );
     }
-    assert_eq!((&rows[1]["from"], &rows[1]["to"]), (&json!("tau 0.0005"), &json!("8 sigma")));
+    assert_eq!((&rows[1]["from"], &rows[1]["to"]), (&json!("3 sigma"), &json!("8 sigma")));
     assert_eq!(tiny.refused(&args), "out: exists; --force replaces it");
     let loud: Vec<&str> = args.iter().copied().filter(|arg| *arg != "-q").collect();
     let output = tiny.run(&[&loud[..], &["--force"]].concat());

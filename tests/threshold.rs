@@ -52,10 +52,11 @@ fn random(seed: u64, pool: &Arc<Pool>) -> Picture {
         picture = picture.blob(at, 10f64.powf(within(-2.5, 0.0)), 10f64.powf(within(-4.5, 0.5)));
     }
     let tau = 2f64.powf(within(-13.0, -2.0));
+    let least = if seed.is_multiple_of(5) { 0.0 } else { within(0.0, 1.0) };
     let view = View {
         width: 60,
         height: 45,
-        edge: Edge { radius: within(1.0, 5.0), tau },
+        edge: Edge { tau, least, radius: within(1.0, 5.0) },
         ..picture.view
     };
     if seed.is_multiple_of(2) {
@@ -210,7 +211,7 @@ fn faulty_shaders_exceed_the_bounds() {
             picture.at(0.4 * f64::from(k) - 2.2, 0.2 * f64::from(k % 4), 4.0 + 0.1 * f64::from(k));
         picture = picture.blob(at, 0.1 + 0.04 * f64::from(k), 0.5 * 0.5f64.powi(k % 6));
     }
-    picture.view.edge.tau = 1.0 / 40.0;
+    picture.view.edge = Edge { tau: 1.0 / 40.0, least: 1.0, ..picture.view.edge };
     let tiled = Way::Tiles(usual(&gpu));
     for (way, file, from, to) in [
         (
@@ -224,8 +225,12 @@ fn faulty_shaders_exceed_the_bounds() {
         (Way::Sprites, "sprites.frag", "? in_cut :", "? 1.02 * in_cut :"),
         (tiled, "tiles_splat.comp", "sqrt(2.0 * cut)", "sqrt(1.5 * cut)"),
         (tiled, "tiles_pairs.comp", "log2(splats[r].tau", "0.7 * log2(splats[r].tau"),
-        (tiled, "tiles.comp", "-log2(uintBits", "-0.98 * log2(uintBits"),
-        (tiled, "tiles.comp", "max(min_exponent, -log2", "min(min_exponent, -log2"),
+        (tiled, "tiles.comp", "max(log2(uintBits", "max(0.98 * log2(uintBits"),
+        (tiled, "tiles.comp", "max(min_exponent, -cut)", "min(min_exponent, -cut)"),
+        // A blob's least reach.
+        (Way::Sprites, "sprites.vert", "push.least_cut);", "0.9 * push.least_cut);"),
+        (tiled, "tiles.comp", "inv_threshold), push.least_cut", "inv_threshold), 0.0"),
+        (tiled, "tiles_splat.comp", "push.least_cut);", "0.5 * push.least_cut);"),
     ] {
         let (truths, bounds) = truth(&picture, way);
         let values = picture.draw_by(&mut gpu, None, FORMAT.0, way);

@@ -5,5 +5,6 @@ layout(push_constant) uniform Push {
     float cutoff;
     uint i_first_facet;
     float inv_threshold;
+    float least_cut;
     uint i_first;
 } push;

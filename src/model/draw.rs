@@ -2,7 +2,7 @@
 
 use super::count::Count;
 use super::cutoff::Cutoff;
-use super::edge::{EDGE, Edge, FARTHEST, Reach};
+use super::edge::{Edge, Reach};
 use super::named::named;
 use super::resolution::Resolution;
 use super::sort_bits::SortBits;
@@ -95,8 +95,9 @@ impl Draw {
     pub fn edge(&self) -> Edge {
         let tau = self.threshold.bound();
         match self.cutoff {
-            Reach::Sigmas(radius) => Edge { radius, tau },
-            Reach::Auto => Edge { radius: FARTHEST, tau: tau.max(EDGE) },
+            Reach::Auto if tau == 0.0 => Edge::AUTO,
+            Reach::Auto => Edge { tau, ..Edge::NONE },
+            Reach::Sigmas(radius) => Edge { tau, ..Edge::at(radius) },
         }
     }
 

@@ -23,6 +23,8 @@ record! {
         cutoff: f32,
         /// One over the optical depth at which a blob ends.
         inv_threshold: f32,
+        /// Least b²/(2 σ²) at which a blob ends.
+        least_cut: f32,
         /// Least σ over view depth, as a slope.
         smallest: f32,
         /// Number of particles.
@@ -175,6 +177,7 @@ impl CullView<'_> {
             pixel,
             cutoff: blobs.edge.radius as f32,
             inv_threshold: blobs.inv_threshold(),
+            least_cut: blobs.edge.nearest_cut() as f32,
             smallest: (smallest * f64::from(pixel[1])) as f32,
             n_particles,
             width,

@@ -28,6 +28,8 @@ record! {
         i_first_facet: u32,
         /// One over the optical depth at which a blob ends.
         inv_threshold: f32,
+        /// Least b²/(2 σ²) at which a blob ends.
+        least_cut: f32,
         /// First entry.
         i_first: u32,
     }
@@ -131,6 +133,7 @@ impl Sprites {
             cutoff: view.edge.radius as f32,
             i_first_facet,
             inv_threshold: view.inv_threshold(),
+            least_cut: view.edge.nearest_cut() as f32,
             i_first,
         };
         rec.draw(&self.pipeline, target, start, &buffers.by_binding(), &push, instances)

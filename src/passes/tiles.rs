@@ -18,7 +18,6 @@ use crate::gpu::{
 };
 use crate::layout::cull::KeptRecord;
 use crate::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
-use crate::model::edge::Edge;
 
 pub use division::{Division, RUN, TILES_ACROSS, invocations};
 pub use push::{ClearPush, PairsPush, Push, RangesPush, RoundsPush, SplatPush};
@@ -216,6 +215,7 @@ impl Tiles {
             tile_width: tile[0],
             tile_height: tile[1],
             inv_threshold: view.inv_threshold(),
+            least_cut: view.edge.nearest_cut() as f32,
         };
         if let RecordCount::Known(n) = n {
             rec.update(known, &KeptRecord::of(n, BLOCK));
@@ -284,8 +284,9 @@ impl Tiles {
             tile: [pixel[0] * tile[0] as f32, pixel[1] * tile[1] as f32],
             n_bins_x,
             i_round,
-            cut: cut(view.edge),
+            cut: in_powers_of_two(view.edge.farthest_cut()),
             inv_threshold: view.inv_threshold(),
+            least_cut: in_powers_of_two(view.edge.nearest_cut()),
         };
         let buffers = [reaches, before, blocks, round, entries, splats, self.kept(n)];
         let i_first = ROUND_WORDS * i_round;
@@ -319,9 +320,10 @@ impl Tiles {
             height,
             n_bins_x,
             i_round,
-            cut: cut(view.edge),
+            cut: in_powers_of_two(view.edge.farthest_cut()),
             saturated: view.saturated as f32,
             inv_threshold: view.inv_threshold(),
+            least_cut: in_powers_of_two(view.edge.nearest_cut()),
             y_right: view.camera.right[1],
             y_up: view.camera.up[1],
             y_forward: view.camera.forward[1],
@@ -343,8 +345,8 @@ impl Tiles {
     }
 }
 
-/// Returns b²/(2 σ²) at the cutoff in powers of two: at most 46, at 8 σ; the shader's power of two
-/// holds up to 125.
-fn cut(edge: Edge) -> f32 {
-    (edge.farthest_cut() * std::f64::consts::LOG2_E) as f32
+/// Returns b²/(2 σ²) of a cut in powers of two: at most 46, at 8 σ; the shader's power of two holds
+/// up to 125.
+fn in_powers_of_two(cut: f64) -> f32 {
+    (cut * std::f64::consts::LOG2_E) as f32
 }

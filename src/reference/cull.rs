@@ -90,7 +90,7 @@ mod tests {
         // 2 arctan ½.
         fov_y_rad: 0.927_295_218_001_612_2,
         near: 0.5,
-        edge: Edge { radius: 3.0, tau: 0.0 },
+        edge: Edge::at(3.0),
         smallest: 0.0,
         shift: glam::DVec2::ZERO,
     };

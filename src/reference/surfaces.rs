@@ -113,7 +113,7 @@ mod tests {
         pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
         fov_y_rad: std::f64::consts::FRAC_PI_2,
         near: 0.5,
-        edge: Edge { radius: 3.0, tau: 0.0 },
+        edge: Edge::at(3.0),
         smallest: 0.0,
         shift: glam::DVec2::ZERO,
     };

@@ -212,7 +212,7 @@ mod tests {
             },
             fov_y_rad: std::f64::consts::FRAC_PI_2,
             near: 0.5,
-            edge: Edge { radius: 3.0, tau: 0.0 },
+            edge: Edge::at(3.0),
             smallest: 0.0,
             shift: DVec2::ZERO,
         }

@@ -89,7 +89,7 @@ mod tests {
             pose,
             fov_y_rad,
             near: 0.5,
-            edge: Edge { radius: 3.0, tau: 0.1 },
+            edge: Edge { tau: 0.1, ..Edge::at(3.0) },
             smallest,
             shift,
         };

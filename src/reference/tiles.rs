@@ -152,7 +152,7 @@ mod tests {
             pose,
             fov_y_rad: 1.0,
             near: 0.5,
-            edge: Edge { radius: 3.0, tau: 0.0 },
+            edge: Edge::at(3.0),
             smallest: 0.0,
             shift: glam::DVec2::ZERO,
         };

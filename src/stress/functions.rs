@@ -66,12 +66,12 @@ pub const CASES: &[Case] = &[
     Case {
         name: "functions/logarithm",
         what: "ln x from 1e-30 to 1e30, and densely from 0.5 to 2",
-        bound: "3 ulp; 2^-21 where 1/2 < x < 2 (Vulkan)",
+        bound: "4 ulp; 2^-21 where 1/2 < x < 2: Vulkan's 3 ulp, and the product of log2 x and ln 2",
         check: |ctx, c| {
             let near_one = (0..N / 2).map(|i| 0.5 + 1.5 * i as f32 / (N / 2) as f32);
             let x: Vec<f32> = positive(1e-30, 1e30, N).into_iter().chain(near_one).collect();
             let bound = |x: f64, y: f64| {
-                if (0.5..=2.0).contains(&x) { (-21f64).exp2() } else { 3.0 * ulp(y) }
+                if (0.5..=2.0).contains(&x) { (-21f64).exp2() } else { 4.0 * ulp(y) }
             };
             compare(ctx, c, "log(x.x)", &x, f64::ln, bound)
         },
@@ -126,7 +126,7 @@ pub const CASES: &[Case] = &[
         check: |ctx, c| {
             let ends = vec![0.0, 0.5f32.next_down(), 0.5, 1.0, f32::MAX];
             let t = [positive(1e-30, 1e38, N), ends].concat();
-            compare(ctx, c, "one_minus_exp(x.x)", &t, |t| -(-t).exp_m1(), |_, y| 1e-6 * y)
+            compare(ctx, c, "one_minus_exp(x.x)", &t, |t| -(-t).exp_m1(), |_, y| 3.5e-7 * y)
         },
     },
     Case {

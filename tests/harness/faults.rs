@@ -29,8 +29,8 @@ pub const FAULTS: &[Fault] = &[
     (
         "1 - exp(-t) evaluated where it cancels",
         "include/functions.glsl",
-        "if (t < 0.5) {",
-        "if (t < 0.0) {",
+        "return (1.0 - scale) - scale * (f * p);",
+        "return 1.0 - (scale + scale * (f * p));",
         "functions/one-minus-exp",
     ),
     (
@@ -178,8 +178,8 @@ pub const FAULTS: &[Fault] = &[
     (
         "an epsilon added to an optical depth",
         "include/functions.glsl",
-        "t * (1.0 - t * (1.0 / 2.0)",
-        "(t + 1e-7) * (1.0 - t * (1.0 / 2.0)",
+        "-1.44269504089 * min(t, 87.0)",
+        "-1.44269504089 * min(t + 1e-7, 87.0)",
         "functions/one-minus-exp",
     ),
     (

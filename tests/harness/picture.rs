@@ -37,7 +37,7 @@ use sprite::{Ellipsoid, Sprite};
 pub const DEPTH: f64 = 16.0 * U;
 
 /// Error of one_minus_exp.
-const ONE_MINUS_EXP: f64 = 1e-6;
+const ONE_MINUS_EXP: f64 = 3.5e-7;
 
 pub const FORMATS: [(TargetFormat, FilmFormat); 3] = [
     (TargetFormat::Rgba8, FilmFormat::Rgba8),
@@ -81,7 +81,7 @@ impl Picture {
             pose,
             fov_y_rad: camera.fov_y_rad,
             near,
-            edge: Edge { radius: 3.0, tau: 0.0 },
+            edge: Edge::at(3.0),
             smallest: 0.0,
             shift: DVec2::ZERO,
         };

@@ -23,6 +23,9 @@ width = 24
 height = 16
 format = "rgba32f"
 
+[draw]
+cutoff = 3.0
+
 [camera]
 position = [0, 0, 9]
 target = [0, 0, 0]

@@ -39,7 +39,7 @@ fn view(width: u32, height: u32) -> View {
         pose,
         fov_y_rad: FRAC_PI_2,
         near: 0.1,
-        edge: Edge { radius: 3.0, tau: 0.0 },
+        edge: Edge::at(3.0),
         smallest: 0.0,
         shift: DVec2::ZERO,
     }

@@ -12,7 +12,7 @@ use crate::reference::picture::{FrameReference, ReferenceKind, n_reflections};
 
 /// Where blobs end in references that integrate without an end: they keep all but a thousandth of
 /// their optical depth within.
-const VOLUME_EDGE: Edge = Edge { radius: 4.0, tau: 0.0 };
+const VOLUME_EDGE: Edge = Edge::at(4.0);
 
 /// Counts that hold for every division of a picture into pieces.
 pub struct PieceAmounts {

@@ -103,7 +103,7 @@ fn vector(v: [f32; 3]) -> DVec3 {
 mod tests {
     use super::*;
 
-    const CUT: Edge = Edge { radius: 3.0, tau: 0.0 };
+    const CUT: Edge = Edge::at(3.0);
 
     fn camera() -> CameraRecord {
         CameraRecord {

@@ -24,6 +24,8 @@ record! {
         tile_height: u32,
         /// One over the optical depth at which a blob ends.
         inv_threshold: f32,
+        /// Least b²/(2 σ²) at which a blob ends.
+        least_cut: f32,
     }
 }
 
@@ -68,6 +70,8 @@ record! {
         cut: f32,
         /// One over the optical depth at which a blob ends.
         inv_threshold: f32,
+        /// Least b²/(2 σ²) at which a blob ends.
+        least_cut: f32,
     }
 }
 
@@ -106,6 +110,8 @@ record! {
         saturated: f32,
         /// One over the optical depth at which a blob ends.
         inv_threshold: f32,
+        /// Least b²/(2 σ²) at which a blob ends.
+        least_cut: f32,
         /// The scene's y along the camera's right.
         y_right: f32,
         /// The scene's y along the camera's up.

@@ -187,7 +187,7 @@ pub(super) const INTERPOLATED: f64 = 1e-5;
 /// cloud's place), and in its offset from a ray.
 const N_ROUNDINGS: f64 = 8.0;
 /// Error of 1 − e^{−τ}.
-const ONE_MINUS_EXP: f64 = 1e-6;
+const ONE_MINUS_EXP: f64 = 3.5e-7;
 /// Relative error of a texture's factor, e to the power of at most some 8: some 100 roundings of
 /// f32 in the place and the sum.
 const TEXTURED: f64 = 1e-4;

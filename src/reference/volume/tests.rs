@@ -24,7 +24,7 @@ fn view(n: u32) -> View {
         pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
         fov_y_rad: 0.9,
         near: 1e-3,
-        edge: Edge { radius: 9.0, tau: 0.0 },
+        edge: Edge::at(9.0),
         smallest: 0.0,
         shift: glam::DVec2::ZERO,
     }

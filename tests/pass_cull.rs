@@ -131,7 +131,15 @@ impl Scene {
         let entries = gpu.upload(&vec![UNTOUCHED; self.placed.len()]);
         let kept = gpu.upload(&[KeptRecord { sort: [9; 4], draw: [9; 4], splat: [9; 4] }]);
         let View { width, height, edge, smallest, .. } = self.view;
-        let blobs = BlobView { camera: &self.camera, edge, saturated: 0.0, extents: None };
+        let Edge { radius: cutoff, tau: threshold, least } = edge;
+        let blobs = BlobView {
+            camera: &self.camera,
+            cutoff,
+            threshold,
+            least,
+            saturated: 0.0,
+            extents: None,
+        };
         let view = CullView { blobs, size: [width, height], smallest };
         let order = Order { depths: self.depths(), sort_tile: TILE, splat_block: 256 };
         let buffers = CullBuffers {

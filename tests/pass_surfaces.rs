@@ -22,7 +22,6 @@ use nimbus::gpu::TargetFormat;
 use nimbus::gpu::{Barriers, BlendMode, Image, LoadOp, RecordCount, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
-use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
 use nimbus::passes::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
 use nimbus::passes::sprites::Sprites;
@@ -358,7 +357,9 @@ fn a_target_that_does_not_fit_is_refused() {
                 };
                 let view = BlobView {
                     camera: &camera,
-                    edge: Edge::at(3.0),
+                    cutoff: 3.0,
+                    threshold: 0.0,
+                    least: 0.0,
                     saturated: 0.0,
                     extents: None,
                 };

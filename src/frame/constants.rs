@@ -58,7 +58,9 @@ impl FrameConstants {
 
     /// Returns `camera`'s view of the blobs of groups with `extents`.
     pub fn view<'a>(&self, camera: &'a CameraRecord, extents: &'a [Extent]) -> BlobView<'a> {
-        let FrameConstants { edge, saturated, .. } = *self;
-        BlobView { camera, edge, saturated, extents: Some(extents) }
+        let FrameConstants {
+            edge: Edge { radius: cutoff, tau: threshold, least }, saturated, ..
+        } = *self;
+        BlobView { camera, cutoff, threshold, least, saturated, extents: Some(extents) }
     }
 }

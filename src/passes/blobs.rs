@@ -6,7 +6,6 @@ use glam::DVec3;
 use crate::gpu::RecordCount;
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
-use crate::model::edge::Edge;
 
 bindings! {
     /// The buffers that blobs are drawn from.
@@ -87,8 +86,12 @@ impl Extent {
 pub struct BlobView<'a> {
     /// The camera of the picture.
     pub camera: &'a CameraRecord,
-    /// Where blobs end.
-    pub edge: Edge,
+    /// Greatest distance from its centre at which a blob ends, σ.
+    pub cutoff: f64,
+    /// Optical depth below which a blob ends; 0 cuts nothing.
+    pub threshold: f64,
+    /// Least distance at which a blob ends, σ.
+    pub least: f64,
     /// Transmittance below which a pixel hides everything behind it.
     pub saturated: f64,
     /// Where the blobs' centres are, relative to the lighting origin; `None` where this is unknown.
@@ -98,7 +101,12 @@ pub struct BlobView<'a> {
 impl BlobView<'_> {
     /// Returns 1 / threshold; infinity, which cuts nothing, where f32 cannot hold the inverse.
     pub(super) fn inv_threshold(&self) -> f32 {
-        (1.0 / self.edge.tau) as f32
+        (1.0 / self.threshold) as f32
+    }
+
+    /// Returns the least b²/2σ² at which a blob ends.
+    pub(super) fn least_cut(&self) -> f64 {
+        0.5 * self.least * self.least
     }
 }
 

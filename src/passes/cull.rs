@@ -175,9 +175,9 @@ impl CullView<'_> {
         TestPush {
             camera: *blobs.camera,
             pixel,
-            cutoff: blobs.edge.radius as f32,
+            cutoff: blobs.cutoff as f32,
             inv_threshold: blobs.inv_threshold(),
-            least_cut: blobs.edge.nearest_cut() as f32,
+            least_cut: blobs.least_cut() as f32,
             smallest: (smallest * f64::from(pixel[1])) as f32,
             n_particles,
             width,

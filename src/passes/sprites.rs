@@ -130,10 +130,10 @@ impl Sprites {
         let push = Push {
             camera: *view.camera,
             pixel: view.camera.pixel_slopes(width, height),
-            cutoff: view.edge.radius as f32,
+            cutoff: view.cutoff as f32,
             i_first_facet,
             inv_threshold: view.inv_threshold(),
-            least_cut: view.edge.nearest_cut() as f32,
+            least_cut: view.least_cut() as f32,
             i_first,
         };
         rec.draw(&self.pipeline, target, start, &buffers.by_binding(), &push, instances)

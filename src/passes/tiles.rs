@@ -208,14 +208,14 @@ impl Tiles {
         let push = SplatPush {
             camera: *view.camera,
             pixel: self.pixel(view),
-            cutoff: view.edge.radius as f32,
+            cutoff: view.cutoff as f32,
             i_first_facet,
             width,
             height,
             tile_width: tile[0],
             tile_height: tile[1],
             inv_threshold: view.inv_threshold(),
-            least_cut: view.edge.nearest_cut() as f32,
+            least_cut: view.least_cut() as f32,
         };
         if let RecordCount::Known(n) = n {
             rec.update(known, &KeptRecord::of(n, BLOCK));
@@ -284,9 +284,9 @@ impl Tiles {
             tile: [pixel[0] * tile[0] as f32, pixel[1] * tile[1] as f32],
             n_bins_x,
             i_round,
-            cut: in_powers_of_two(view.edge.farthest_cut()),
+            cut: in_powers_of_two(0.5 * view.cutoff * view.cutoff),
             inv_threshold: view.inv_threshold(),
-            least_cut: in_powers_of_two(view.edge.nearest_cut()),
+            least_cut: in_powers_of_two(view.least_cut()),
         };
         let buffers = [reaches, before, blocks, round, entries, splats, self.kept(n)];
         let i_first = ROUND_WORDS * i_round;
@@ -320,10 +320,10 @@ impl Tiles {
             height,
             n_bins_x,
             i_round,
-            cut: in_powers_of_two(view.edge.farthest_cut()),
+            cut: in_powers_of_two(0.5 * view.cutoff * view.cutoff),
             saturated: view.saturated as f32,
             inv_threshold: view.inv_threshold(),
-            least_cut: in_powers_of_two(view.edge.nearest_cut()),
+            least_cut: in_powers_of_two(view.least_cut()),
             y_right: view.camera.right[1],
             y_up: view.camera.up[1],
             y_forward: view.camera.forward[1],

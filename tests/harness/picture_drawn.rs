@@ -9,6 +9,7 @@ use nimbus::gpu::{
     BlendMode, Buffer, Compiler, Image, LoadOp, MemoryUsage, RecordCount, Recorder, Target,
 };
 use nimbus::layout::frame::CameraRecord;
+use nimbus::model::edge::Edge;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
 use nimbus::passes::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
 use nimbus::passes::sprites::Sprites;
@@ -231,8 +232,15 @@ impl Picture {
         };
         let i_first_facet = uploaded.n_surface_facets;
         let n = BlobCount { n: RecordCount::Known(uploaded.n_entries), i_first_facet };
-        let edge = self.view.edge;
-        let view = |saturated: f64| BlobView { camera, edge, saturated, extents: None };
+        let Edge { radius: cutoff, tau: threshold, least } = self.view.edge;
+        let view = |saturated: f64| BlobView {
+            camera,
+            cutoff,
+            threshold,
+            least,
+            saturated,
+            extents: None,
+        };
         let start = if self.scenery.is_some() { LoadOp::Load } else { LoadOp::Clear };
         match made {
             Made::Sprites(sprites) => sprites.record(rec, &from, (target, start), &view(0.0), n),

@@ -4,7 +4,6 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::layout::frame::CameraRecord;
-use crate::model::edge::Edge;
 
 fn camera(tan_x: f32, tan_y: f32) -> CameraRecord {
     CameraRecord {
@@ -19,7 +18,14 @@ fn camera(tan_x: f32, tan_y: f32) -> CameraRecord {
 }
 
 fn view<'a>(camera: &'a CameraRecord, extents: &'a [Extent]) -> BlobView<'a> {
-    BlobView { camera, edge: Edge::NONE, saturated: 0.0, extents: Some(extents) }
+    BlobView {
+        camera,
+        cutoff: 8.0,
+        threshold: 0.0,
+        least: 0.0,
+        saturated: 0.0,
+        extents: Some(extents),
+    }
 }
 
 fn extent(center: DVec3, half: f64, sigma: f64, n_particles: u32) -> Extent {

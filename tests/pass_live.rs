@@ -148,11 +148,11 @@ fn bounds(cloud: &Cloud, group: &Group, p: &LiveParticle) -> ([Bounded; 3], Boun
     (relative, sigma, once(d.kappa()).times(diluted).times(faded).times(condensed))
 }
 
-/// functions.glsl: 1 − e^−t to a share of 1e-6, whose slope is e^−t ≤ 1.
+/// functions.glsl: 1 − e^−t to a share of 3.5e-7, whose slope is e^−t ≤ 1.
 fn one_minus_exp(t: Bounded) -> Bounded {
     let value = -(-t.value).exp_m1();
     let inherited = t.error * (-(t.value - t.error).max(0.0)).exp();
-    Bounded { value, error: inherited + 1e-6 * (value + inherited) }
+    Bounded { value, error: inherited + 3.5e-7 * (value + inherited) }
 }
 
 /// √u (cos, sin) 2πu': u · inversesqrt of 2 ulp, and functions.glsl's unit_at, each within 10 u.

@@ -37,7 +37,8 @@ fn faulty_arguments_are_refused_before_any_work() {
         ),
         (
             &["draw.cutoff=2,99"],
-            "--knob draw.cutoff=99: `draw.cutoff`: expected a number from 0.5 to 8, found 99.0",
+            "--knob draw.cutoff=99: `draw.cutoff`: expected a number from 0.5 to 8 or \"auto\", found \
+             integer 99",
         ),
         (&["draw.path=pen"], "--knob draw.path=pen: `draw.path`: unknown value `pen`; known here:"),
         (

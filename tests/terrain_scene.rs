@@ -141,8 +141,10 @@ fn every_path_draws_the_ground() {
         println!("{more:?}: {rmse:.1e}");
         assert!(rmse <= most, "{more:?}: {rmse:e}");
     }
-    // At half resolution the loss is no larger than without ground.
+    // At half resolution the loss is no larger than without ground, where blobs end at 3 σ: their
+    // edges lose more than ridges do.
     let loss = |more: &[&str]| {
+        let more = &[more, &["--set", "draw.cutoff=3.0"]].concat()[..];
         render(&dir, "full.exr", more);
         render(
             &dir,

@@ -67,8 +67,8 @@ float power_of_two(float x) {
 }
 
 // Returns 1 - e^-t for t >= 0 with a relative error below 3.5e-7 everywhere. e^-t is 2^n 2^f, n a
-// whole number and |f| <= 1/2, and 2^f is 1 + f p(f): where n is 0, the ones cancel on paper and not
-// in f32. p is within 1.1e-8 of (2^f - 1)/f (minimax, relative).
+// whole number and |f| <= 1/2, and 2^f is 1 + f p(f): where n is 0, the ones cancel on paper and
+// not in f32. p is within 1.1e-8 of (2^f - 1)/f (minimax, relative).
 float one_minus_exp(float t) {
     // Beyond 87, 2^n is below the normal numbers, and the result 1.
     float x = -1.44269504089 * min(t, 87.0);

@@ -10,7 +10,7 @@ pub enum Reach {
 }
 
 /// Optical depth at which blobs end by themselves: with it, the cut changes the pictures of the
-/// studied scenes by less than 10⁻³ (docs/explanation/studies.md).
+/// measured scenes by less than 10⁻³ (passes.md "edges").
 pub const EDGE: f64 = 5e-4;
 
 /// Distance within which no blob ends by itself, σ: however thin a blob is, e^{−9/2} of its depth

@@ -122,7 +122,7 @@ pub const CASES: &[Case] = &[
     Case {
         name: "functions/one-minus-exp",
         what: "1 - e^-t for t from 1e-30 to 1e38: the opacity of thin and thick blobs",
-        bound: "1e-6, relative",
+        bound: "3.5e-7, relative",
         check: |ctx, c| {
             let ends = vec![0.0, 0.5f32.next_down(), 0.5, 1.0, f32::MAX];
             let t = [positive(1e-30, 1e38, N), ends].concat();

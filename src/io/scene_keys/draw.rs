@@ -45,7 +45,7 @@ keys! { DRAW: fn draw(s) -> Draw { Draw;
     /// Greatest predicted error of an impostor.
     impostor_error: number(0.5, Bounds::Within(0.01, 100.0)), "px";
     /// Distance from its centre at which a particle ends. With "auto" it ends where its own optical
-    /// depth falls under 0.0005.
+    /// depth falls under 0.0005, and at 3 σ at the nearest.
     cutoff: reach(), "σ";
     /// Chunks that sprites are drawn in, near to far; after each, pixels that are opaque are left
     /// out. With 0 all sprites are drawn far to near.

@@ -130,8 +130,9 @@ fn workgroups_and_rounds_do_not_show() {
             "{max_tiles:?}, portable"
         );
     }
-    // A round hands on the state that a single round would have. The kernels of an only round and
-    // of several are two: a compiler may round their products and sums in other places.
+    // A round hands on the state that a single round would have. One kernel draws an only round and
+    // another one of several. A compiler may fuse other products and sums in each, so that both
+    // pictures are only within the bound of the truth.
     let (_, bounds) = picture.tiled_truth(format, tiled.saturated);
     let allowed: Vec<f64> = bounds.iter().map(|bound| 2.0 * bound).collect();
     assert_within("several rounds", &draw(&Tiled { max_pairs: Some(1), ..tiled }), &once, &allowed);

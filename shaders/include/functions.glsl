@@ -66,9 +66,9 @@ float power_of_two(float x) {
     return intBitsToFloat(floatBitsToInt(p) + (int(n) << 23));
 }
 
-// Returns 1 - e^-t for t >= 0 with a relative error below 3.5e-7 everywhere. e^-t is 2^n 2^f, n a
-// whole number and |f| <= 1/2, and 2^f is 1 + f p(f): where n is 0, the ones cancel on paper and
-// not in f32. p is within 1.1e-8 of (2^f - 1)/f (minimax, relative).
+// Returns 1 - e^-t for t >= 0 with a relative error below 3.5e-7. Here e^-t = 2^n (1 + f p(f)), n a
+// whole number and |f| <= 1/2. Where the result is small n is 0, and nothing cancels. p is within
+// 1.1e-8 of (2^f - 1)/f (minimax, relative).
 float one_minus_exp(float t) {
     // Beyond 87, 2^n is below the normal numbers, and the result 1.
     float x = -1.44269504089 * min(t, 87.0);

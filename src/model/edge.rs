@@ -5,7 +5,7 @@
 pub enum Reach {
     /// At this distance from the centre, σ.
     Sigmas(f64),
-    /// Where the blob's own optical depth falls under [`EDGE`].
+    /// Where the blob's own optical depth falls under [`EDGE`], and at [`NEAREST`] at the nearest.
     Auto,
 }
 

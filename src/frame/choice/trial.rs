@@ -74,7 +74,7 @@ pub struct Trial<'a> {
 
 /// Returns the part of `draw` that a picture is made for; other numbers are push constants.
 fn picture_key(draw: &Draw) -> Draw {
-    let threshold = Cutoff::At(if draw.edge().has_threshold() { 0.5 } else { 0.0 });
+    let threshold = Cutoff::At(if draw.edge().has_threshold() { 1.0 } else { 0.0 });
     Draw { threshold, smallest: Cutoff::NONE, cull: Cull::On, ..*draw }
 }
 

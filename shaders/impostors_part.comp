@@ -4,16 +4,17 @@
 #include "each.glsl"
 
 // Splits the sorted entries into far ones and near ones (passes.md "impostors").
-// In: entries (key, particle). Out: the entries twice, with NO_PARTICLE in place of the near ones
-// and of the far ones. Exact: it only copies.
+// In: entries (key, particle), placed particles. Out: the entries twice, with NO_PARTICLE in place
+// of the near ones and of the far ones. Error: one dot product decides what is far.
 
-// last_key: greatest key of a far entry. is_new: 1 tells far entries by their keys, 0 keeps the
-// last decision.
+// cut: least depth of a far particle along forward, relative to the lighting origin. is_new: 1
+// tells far particles by their depths, 0 keeps the last decision.
 layout(push_constant) uniform Push {
+    vec3 forward;
+    float cut;
     uint n_entries;
-    uint last_key;
     uint is_new;
-    uint unused;
+    uvec2 unused;
 } push;
 // (key, particle)
 READS(0, uvec2, entries)
@@ -21,11 +22,12 @@ READS(0, uvec2, entries)
 UPDATES(1, uint, members)
 WRITES(2, uvec2, far)
 WRITES(3, uvec2, near)
+READS(4, Placed, placed)
 
 void main() {
     FOR_EACH(k, push.n_entries) {
         uvec2 entry = entries[k];
-        bool is_far = entry.x <= push.last_key;
+        bool is_far = dot(push.forward, placed[entry.y].position) >= push.cut;
         if (push.is_new != 0) {
             members[entry.y] = uint(is_far);
         } else {

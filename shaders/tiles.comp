@@ -15,9 +15,9 @@
 // Composes splats near to far, a tile a workgroup, a run of pixels an invocation
 // (passes.md "tiles"). In: splats, sorted pairs (bin, splat), the ranges of the
 // bins. Out: the picture, premultiplied, over the surfaces where there are any. Law: as sprites,
-// but near to far: C += (1 - A) a L, A += (1 - A) a. A pixel that lets less through than
-// push.saturated ends. Bound: (1 - A) of the radiance behind a saturated pixel; power_of_two()'s
-// and opacity()'s errors.
+// but near to far (tile_thin.glsl), or by slices (tile_slices.glsl). A pixel that lets less through
+// than push.saturated ends. Bound: (1 - A) of the radiance behind a saturated pixel;
+// power_of_two()'s and opacity()'s errors.
 
 #ifndef INVOCATIONS
 #define INVOCATIONS 8
@@ -33,6 +33,11 @@
 // 1: a splat ends where its optical depth falls under a threshold.
 #ifndef THRESHOLD
 #define THRESHOLD 0
+#endif
+// 1: splats that overlap are composed by slices, and lie near to far by their centres' distances;
+// 0: one after the other.
+#ifndef SLICES
+#define SLICES 0
 #endif
 // 1: splats have textures.
 #ifndef TEXTURED
@@ -79,12 +84,14 @@ layout(push_constant) uniform Push {
     float y_right;
     float y_up;
     float y_forward;
+    // The near plane's distance over the thickness of a slice.
+    float near_in_slices;
 } push;
 TEXELS(0, splats)
 READS(1, uvec2, pairs)
 READS(2, Round, rounds)
 READS(3, uvec4, ranges)
-// Colour and opacity after the earlier rounds.
+// Colour and opacity after the earlier rounds; with slices, what is in the open ones, too.
 UPDATES(4, vec4, state)
 #define PICTURE 5
 #include "pixels.glsl"
@@ -100,24 +107,16 @@ TEXELS(8, splat_textures)
 
 #include "tile_splats.glsl"
 
-#if THIN
-// Returns 1 - e^-t for t in [0, 1/8]: t times the cubic through (1 - e^-t)/t at Chebyshev's points,
-// within 1.6e-8 of it.
-float opacity(float t) {
-    return t
-           * ((0.999999984752 - t * 0.499996093888)
-              + t * t * (0.166509869621 - t * 0.039641773912));
-}
-#else
-float opacity(float t) { return one_minus_exp(t); }
-#endif
-
 // The invocation's row of pixels while it is composed.
 float x_of[RUN];
 #if ELLIPSOIDS
 // |ray|^2 across the scene's y, and along it.
 float across[RUN];
 float along[RUN];
+#if SLICES
+// The ray along the scene's y.
+float upward[RUN];
+#endif
 #else
 float inv_norm[RUN];
 #endif
@@ -133,12 +132,23 @@ vec3 color[RUN];
 // rounding.
 float alpha[RUN];
 #if BEHIND
+// near/z of the surfaces.
 float depth_of[RUN];
 #endif
 
-void compose(Loaded splat, float y) {
-    // Centre's slopes, scale, tau; radiance, near/z.
-    vec4 place = uintBitsToFloat(splat.fours[0]), light = uintBitsToFloat(splat.fours[1]);
+
+float length_of_ray(uint j) {
+#if ELLIPSOIDS
+    return sqrt(across[j] + along[j]);
+#else
+    return inversesqrt(inv_norm[j]);
+#endif
+}
+
+// Finds the row's optical depths of a splat; 0 in the pixels where it has ended or does not show.
+void find_depths(Loaded splat, float y, bool shows[RUN], out float tau[RUN]) {
+    // Centre's slopes, scale, tau.
+    vec4 place = uintBitsToFloat(splat.fours[0]);
     vec2 s = place.xy;
     float dy = y - s.y;
 #if ELLIPSOIDS
@@ -157,7 +167,7 @@ void compose(Loaded splat, float y) {
 #endif
     // Step by step for all pixels, so that independent operations stand between a result and its
     // use.
-    float dx[RUN], e[RUN], deep[RUN], tau[RUN], passed[RUN];
+    float dx[RUN], e[RUN], deep[RUN];
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         dx[j] = x_of[j] - s.x;
 #if ELLIPSOIDS
@@ -171,14 +181,9 @@ void compose(Loaded splat, float y) {
 #endif
     }
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
-        // Each pixel decides by itself, so that it does not depend on which others are drawn.
-        passed[j] = 1.0 - alpha[j];
-        bool is_seen = e[j] >= lowest && !(passed[j] < saturated);
+        bool is_seen = e[j] >= lowest && shows[j];
 #if ELLIPSOIDS && THRESHOLD
         is_seen = is_seen && e[j] >= -max(log2(deep[j] * inv_threshold), push.least_cut);
-#endif
-#if BEHIND
-        is_seen = is_seen && light.w >= depth_of[j];
 #endif
 #if TEXTURED
         e[j] += 1.44269504089
@@ -192,13 +197,15 @@ void compose(Loaded splat, float y) {
         tau[j] =
             uintBitsToFloat(floatBitsToUint(deep[j] * power_of_two(e[j])) & (is_seen ? ~0u : 0u));
     }
-    [[unroll]] for (uint j = 0; j < RUN; ++j) { tau[j] = opacity(tau[j]); }
-    [[unroll]] for (uint j = 0; j < RUN; ++j) {
-        float here = passed[j] * tau[j];
-        alpha[j] += here;
-        color[j] += here * light.xyz;
-    }
 }
+
+#if SLICES
+#include "tile_slices.glsl"
+#else
+#include "tile_thin.glsl"
+// Fours of a pixel's state.
+const uint STATE_FOURS = 1;
+#endif
 
 // Composes the found splats from k on, one loaded by each invocation. Invocations without one load
 // `spare`, any splat, without depth and light.
@@ -212,23 +219,14 @@ void compose_some(uint k, uint n, uint spare, float y) {
     splat.lowest = max(min_exponent, -cut);
 #endif
     uint end = min(n - k, INVOCATIONS);
-#if ONE_SUBGROUP
-    // By twos: a loop writes its carried values again in each iteration.
-    uint m = 0;
-    do {
-        compose(of_invocation(splat, m), y);
-        compose(of_invocation(splat, m + 1), y);
-        m += 2;
-    } while (m < end);
-#else
+#if SLICES
+    find_shares(splat, t, k + t < n);
+#endif
+#if !ONE_SUBGROUP
     share_splat(splat, t);
-    uint m = 0;
-    // By twos, too: the number of iterations bounds the splats of a round (passes.md "tiles").
-    do {
-        compose(of_invocation(m), y);
-        compose(of_invocation(m + 1), y);
-        m += 2;
-    } while (m < end);
+#endif
+    compose_loaded(splat, end, y);
+#if !ONE_SUBGROUP
     barrier();
 #endif
 }
@@ -265,16 +263,19 @@ void draw_tile(uvec4 range, uint i_tile) {
         uint p = row + min(at.x + j, push.width - 1u);
         x_of[j] = x;
 #if ELLIPSOIDS
-        vec3 ray = vec3(x, y, 1.0), upward = vec3(push.y_right, push.y_up, push.y_forward);
-        float up = dot(upward, ray);
-        vec3 rest = ray - up * upward;
+        vec3 ray = vec3(x, y, 1.0), vertical = vec3(push.y_right, push.y_up, push.y_forward);
+        float up = dot(vertical, ray);
+        vec3 rest = ray - up * vertical;
         across[j] = dot(rest, rest);
         along[j] = up * up;
+#if SLICES
+        upward[j] = up;
+#endif
 #else
         inv_norm[j] = 1.0 / (1.0 + x * x + y * y);
 #endif
 #if ROUNDS
-        vec4 before = state[p];
+        vec4 before = state[STATE_FOURS * p];
         color[j] = before.xyz;
         alpha[j] = before.w;
 #else
@@ -283,6 +284,9 @@ void draw_tile(uvec4 range, uint i_tile) {
 #endif
 #if BEHIND
         depth_of[j] = depths_of(uvec4(depths[p])).x;
+#endif
+#if SLICES
+        start_slices(j, p);
 #endif
     }
     // These loops test at their ends, as do those within: llvmpipe runs one more empty iteration
@@ -312,9 +316,15 @@ void draw_tile(uvec4 range, uint i_tile) {
 #if ROUNDS
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         if (at.x + j < push.width && at.y < push.height) {
-            state[row + at.x + j] = vec4(color[j], alpha[j]);
+            state[STATE_FOURS * (row + at.x + j)] = vec4(color[j], alpha[j]);
+#if SLICES
+            keep_slices(j, row + at.x + j);
+#endif
         }
     }
+#endif
+#if SLICES
+    close_all();
 #endif
     [[unroll]] for (uint j = 0; j < RUN; j += TOGETHER) {
         if (at.x + j < push.width && at.y < push.height) {

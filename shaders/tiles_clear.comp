@@ -4,11 +4,11 @@
 #include "tiles.glsl"
 #include "each.glsl"
 
-// Clears the state of every pixel where one round is not enough (passes.md
-// "tiles"). Out: RGBA floats, all 0.
+// Clears the state of all pixels where one round is not enough (passes.md "tiles"). Out: fours of
+// floats, all 0.
 
 layout(push_constant) uniform Push {
-    uint n_pixels;
+    uint n_fours;
     uint unused;
 } push;
 READS(0, Round, rounds)
@@ -18,5 +18,5 @@ void main() {
     if (rounds[0].bins.w == 0) {
         return;
     }
-    FOR_EACH(i, push.n_pixels) { state[i] = vec4(0.0); }
+    FOR_EACH(i, push.n_fours) { state[i] = vec4(0.0); }
 }

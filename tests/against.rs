@@ -161,7 +161,7 @@ fn a_picture_is_the_sum_of_its_facets_shares() {
     for (file, n_pixels) in [("hello", 300), ("study-light", 300), ("static", 300), ("puff", 60)] {
         let path = format!("scenes/{file}.toml");
         let scene = load(path.as_ref(), &["lighting.grid=16".to_owned()], None).unwrap().scene;
-        let scene = &ReferenceKind::without_approximations(&scene);
+        let scene = &ReferenceKind::Thin.without_approximations(&scene);
         let pixels = Pixels::sample(scene.film.width, scene.film.height, n_pixels);
         let drawn = ReferenceKind::Thin.render(scene, 0.0, &pixels, &|_, _| ()).unwrap().rgba;
         let frame = FrameReference::new(scene, 0.0).unwrap();

@@ -31,9 +31,9 @@ fn view(set: &[&str]) -> ProbeRequest {
 /// Returns the picture that `Renderer::image` would return on an exact device.
 fn exact_picture(view: &ProbeRequest) -> Vec<f32> {
     let drawing =
-        if view.kind == ReferenceKind::Thin { BlobModel::Thin } else { BlobModel::Volume };
+        if view.kind == ReferenceKind::Thin { BlobModel::AsDrawn } else { BlobModel::Volume };
     let rgba = drawn_as_set(
-        &ReferenceKind::without_approximations(&view.exact_scene()),
+        &ReferenceKind::Thin.without_approximations(&view.exact_scene()),
         view.time_s,
         drawing,
         &|_, _| (),
@@ -127,8 +127,8 @@ fn without_a_budget_the_reference_has_a_few_pixels() {
 fn a_few_pixels_are_bitwise_those_of_the_whole_picture() {
     for set in [&["lighting.mode=first", "cloud.0.texture=\"2\""][..], &["lighting.mode=none"]] {
         let view = ProbeRequest { size: [61, 47], kind: ReferenceKind::Thin, ..view(set) };
-        let scene = ReferenceKind::without_approximations(&view.exact_scene());
-        let whole = drawn_as_set(&scene, 0.0, BlobModel::Thin, &|_, _| ()).unwrap().rgba;
+        let scene = ReferenceKind::Thin.without_approximations(&view.exact_scene());
+        let whole = drawn_as_set(&scene, 0.0, BlobModel::AsDrawn, &|_, _| ()).unwrap().rgba;
         for n in [1, 30, 200, usize::MAX] {
             let pixels = Pixels::sample(61, 47, n);
             let rows = AtomicUsize::new(0);
@@ -233,7 +233,7 @@ fn the_devices_picture_has_the_expected_error() {
         let probe = ErrorProbe::new(None, LONG).unwrap();
         probe.request(view.clone());
         // The scene of the reference leaves nothing out, so only the device's f32 and f16 differ.
-        let exact = ReferenceKind::without_approximations(&view.exact_scene());
+        let exact = ReferenceKind::Thin.without_approximations(&view.exact_scene());
         let pose = exact.camera.pose(0.0).unwrap();
         let size = view.size;
         let scene_of_window = Scene { camera: view.scene.camera.clone(), ..exact };

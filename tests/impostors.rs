@@ -173,8 +173,10 @@ fn the_f64_picture_agrees() {
         .expect("a shell that is used again");
     let scene = scene(&[]);
     let time_s = scene.time.at(200 + k as u32);
-    let truth =
-        drawn_as_set(&scene, time_s, BlobModel::Thin, &|_, _| {}).expect("a picture").rgba.concat();
+    let truth = drawn_as_set(&scene, time_s, BlobModel::AsDrawn, &|_, _| {})
+        .expect("a picture")
+        .rgba
+        .concat();
     let most = |a: &[f32]| {
         a.iter().zip(&truth).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max)
     };

@@ -17,7 +17,7 @@ use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::camera::Pose;
 use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::edge::Edge;
-use nimbus::passes::blobs::{BlobVariant, BlobView, Depths};
+use nimbus::passes::blobs::{BlobVariant, BlobView, DepthFrom, Depths};
 use nimbus::passes::cull::{Cull, CullBuffers, CullView, Order};
 use nimbus::passes::sort::{Count, NO_COUNT, Sort, TILE};
 use nimbus::reference::Blob;
@@ -68,6 +68,7 @@ impl Scene {
             near: 0.5,
             edge: Edge::at(3.0),
             smallest: 0.0,
+            slice: 0.0,
             shift: glam::DVec2::ZERO,
         };
         let group = DrawnRecord { shift: 0, end: u32::MAX, kappa_scale: 1.0, last_weight: 1.0 };
@@ -114,7 +115,7 @@ impl Scene {
     }
 
     fn depths(&self) -> Depths {
-        Depths { forward: self.camera.forward, radius: RADIUS, n_bits: self.n_bits }
+        Depths { from: DepthFrom::Plane(self.camera.forward), radius: RADIUS, n_bits: self.n_bits }
     }
 
     fn run_by(&self, gpu: &mut Gpu, compiler: Option<&Compiler>) -> Found {
@@ -138,6 +139,7 @@ impl Scene {
             threshold,
             least,
             saturated: 0.0,
+            slice: 0.0,
             extents: None,
         };
         let view = CullView { blobs, size: [width, height], smallest };

@@ -9,6 +9,7 @@ use nimbus::gpu::TargetFormat;
 use nimbus::gpu::{Buffer, Compiler, Image, MemoryUsage, Target};
 use nimbus::layout::facet::{LitRecord, RegionRecord};
 use nimbus::layout::frame::CameraRecord;
+use nimbus::layout::particle::PlacedRecord;
 use nimbus::model::impostor::{FarField, Shell, View};
 use nimbus::passes::impostors::{Impostors, LayerView, PartBuffers};
 use nimbus::passes::surfaces::Surfaces;
@@ -314,53 +315,65 @@ fn a_surface_shows_before_the_shell_and_under_it() {
 fn what_is_far_and_what_is_near() {
     let mut gpu = Gpu::new();
     let n = 5000u32;
-    // Sorted keys, many alike, each particle once.
-    let entries: Vec<[u32; 2]> = (0..n)
-        .map(|k| [k / 7 * 3 + u32::from(k > 4000) * 0x8000_0000, (k * 2741 + 5) % n])
+    // Keys that say nothing, each particle once.
+    let entries: Vec<[u32; 2]> = (0..n).map(|k| [k / 7 * 3, (k * 2741 + 5) % n]).collect();
+    // Sixteenths, many alike, so that the sums of products with the axis are exact.
+    let sixteenth = |i: u32| f64::from(hashed(i) % 129) / 16.0 - 4.0;
+    let places: Vec<DVec3> = (0..n)
+        .map(|i| DVec3::new(sixteenth(3 * i), sixteenth(3 * i + 1), sixteenth(3 * i + 2)))
+        .collect();
+    let axis = DVec3::new(0.5, -0.25, 0.75);
+    let depths: Vec<f64> = places.iter().map(|p| axis.dot(*p)).collect();
+    let placed: Vec<PlacedRecord> = places
+        .iter()
+        .map(|p| PlacedRecord { position: p.as_vec3().to_array(), sigma: 1.0 })
         .collect();
     let turned: Vec<[u32; 2]> = (0..n).map(|k| [k, (k * 1999 + 77) % n]).collect();
-    let run = |gpu: &mut Gpu, compiler: Option<&Compiler>, cut: u32| {
+    let run = |gpu: &mut Gpu, compiler: Option<&Compiler>, cut: f64| {
         let format = TargetFormat::Rgba16f;
         let pass = Impostors::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, false)
             .expect("the pass");
         let [first, second] = [&entries, &turned].map(|e| gpu.upload(e));
-        let members = gpu.upload(&vec![9u32; n as usize + 3]);
+        let (members, placed) = (gpu.upload(&vec![9u32; n as usize + 3]), gpu.upload(&placed));
         let [far, near] = [gpu.buffer::<[u32; 2]>(n as usize), gpu.buffer::<[u32; 2]>(n as usize)];
         let mut found = vec![];
         for (from, cut, n_drawn) in
             [(&first, Some(cut), n), (&second, None, n), (&second, None, n - 900)]
         {
-            let part = PartBuffers { entries: from, members: &members, far: &far, near: &near };
+            let (members, far, near, placed) = (&members, &far, &near, &placed);
+            let part = PartBuffers { entries: from, members, far, near, placed };
+            let cut = cut.map(|cut: f64| (axis.as_vec3().to_array(), cut as f32));
             gpu.run(|rec| pass.record_part(rec, part, n_drawn, cut));
             let count = n_drawn as usize;
             found.push((
-                gpu.download::<[u32; 2]>(&far, count),
-                gpu.download::<[u32; 2]>(&near, count),
+                gpu.download::<[u32; 2]>(far, count),
+                gpu.download::<[u32; 2]>(near, count),
             ));
         }
         (found, gpu.download::<u32>(&members, n as usize + 3))
     };
-    let wanted = |cut: u32| {
+    let wanted = |cut: f64| {
         let mut members = vec![9; n as usize + 3];
         let mut found = vec![];
         for (from, cut, n_drawn) in
             [(&entries, Some(cut), n), (&turned, None, n), (&turned, None, n - 900)]
         {
+            let cut = cut.map(|cut| (&depths[..], cut));
             let [far, near] = part(&from[..n_drawn as usize], &mut members, cut);
             found.push((far, near));
         }
         (found, members)
     };
-    for cut in [0, 3, 999, 0x8000_0000 + 1800, u32::MAX] {
+    for cut in [-10.0, -1.25, 0.0, 0.75, 10.0] {
         assert!(run(&mut gpu, None, cut) == wanted(cut), "{cut}");
     }
     for (from, to) in [
-        ("entry.x <= push.last_key", "entry.x < push.last_key"),
+        (".position) >= push.cut", ".position) > push.cut"),
         ("members[entry.y] != 0", "members[k] != 0"),
         ("is_far ? NO_PARTICLE : entry.y", "entry.y"),
         ("push.is_new != 0", "true"),
     ] {
         let compiler = Gpu::wrong_compiler("impostors_part.comp", from, to);
-        assert!(run(&mut gpu, Some(&compiler), 999) != wanted(999), "{from} as {to}");
+        assert!(run(&mut gpu, Some(&compiler), 0.75) != wanted(0.75), "{from} as {to}");
     }
 }

@@ -4,15 +4,15 @@
 mod bounded;
 mod harness;
 
-use bounded::{Bounded, Random, dot, exact3};
+use bounded::{Bounded, Random, U, dot, exact3};
 use glam::DVec3;
 use harness::Gpu;
 use nimbus::gpu::{Compiler, DeviceCount};
 use nimbus::layout::particle::{DrawnRecord, PlacedRecord};
 use nimbus::passes;
-use nimbus::passes::blobs::Depths;
+use nimbus::passes::blobs::{DepthFrom, Depths};
 use nimbus::passes::sort::{Count, Form, Sort, TILE};
-use nimbus::reference::sort::{depths, key32, order};
+use nimbus::reference::sort::{depths, distances, key16, key32, order};
 
 type Entry = [u32; 2];
 
@@ -183,7 +183,7 @@ fn keys(
     gpu: &mut Gpu,
     sort: &Sort,
     placed: &[PlacedRecord],
-    forward: [f32; 3],
+    depth_from: DepthFrom,
     radius: f64,
     n_bits: u32,
 ) -> Vec<u32> {
@@ -192,7 +192,7 @@ fn keys(
     let all = DrawnRecord { shift: 0, end: n as u32, ..DrawnRecord::default() };
     let (i_group, drawn) = (gpu.upload(&vec![0u32; n]), gpu.upload(&[all]));
     let buffers = [&from, &i_group, &drawn, &entries];
-    let depths = Depths { forward, radius, n_bits };
+    let depths = Depths { from: depth_from, radius, n_bits };
     gpu.run(|rec| sort.record_keys(rec, buffers, &depths, n as u32));
     let found: Vec<Entry> = gpu.download(&entries, n);
     assert!(found.iter().zip(0..).all(|(e, i)| e[1] == i), "every entry names its particle");
@@ -217,6 +217,45 @@ fn wrong_depth(keys: &[u32], depths: &[Bounded]) -> Option<usize> {
 }
 
 #[test]
+fn keys_of_distances_from_the_eye() {
+    let mut gpu = Gpu::new();
+    let sort = Sort::new(&gpu.device, &gpu.compiler, N_PLACED as u32).expect("sort");
+    let placed = placed();
+    let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    let positions: Vec<DVec3> = placed.iter().map(|p| vector(p.position)).collect();
+    for eye in [[0.0, 0.0, 0.0], [0.3, -0.2, 5.0], [700.0, -300.0, 40.0]] {
+        let from = DepthFrom::Eye(eye);
+        let found = keys(&mut gpu, &sort, &placed, from, RADIUS, 32);
+        let exact = distances(vector(eye), &positions);
+        // p (p - 2e)/(|p - e| + |e|): some roundings of the products, and of the quotient.
+        let bound = |p: DVec3, z: f64| {
+            let e = vector(eye);
+            let sum = ((p - e).length() + e.length()).max(1e-30);
+            let of_products = p.length() * (p - 2.0 * e).length() / sum;
+            8.0 * U * (of_products + z.abs())
+        };
+        for ((key, z), p) in found.iter().zip(&exact).zip(&positions) {
+            let off = (f64::from(depth_of(*key)) - z).abs();
+            assert!(off <= bound(*p, *z), "{eye:?} {p}: {off:e}");
+        }
+        let narrow = keys(&mut gpu, &sort, &placed, from, RADIUS, 16);
+        let step = 2.0 * RADIUS / 65536.0;
+        for ((key, z), p) in narrow.iter().zip(&exact).zip(&positions) {
+            let off = bound(*p, *z) + 1e-3 * step;
+            let [low, high] = [z - off, z + off].map(|z| key16(z, RADIUS));
+            assert!((high..=low).contains(key), "{eye:?} {p}: {key}, {high} to {low}");
+        }
+    }
+    let eye = [0.3, -0.2, 5.0];
+    let right = keys(&mut gpu, &sort, &placed, DepthFrom::Eye(eye), RADIUS, 32);
+    for (from, to) in [("p - 2.0 * push.from", "p - push.from"), (">= 0.0)", "> 1e9)")] {
+        let compiler = Gpu::wrong_compiler("include/depths.glsl", from, to);
+        let wrong = Sort::new(&gpu.device, &compiler, N_PLACED as u32).expect("sort");
+        assert!(keys(&mut gpu, &wrong, &placed, DepthFrom::Eye(eye), RADIUS, 32) != right, "{to}");
+    }
+}
+
+#[test]
 fn keys_of_32_bits_are_depths() {
     let mut gpu = Gpu::new();
     let sort = Sort::new(&gpu.device, &gpu.compiler, N_PLACED as u32).expect("sort");
@@ -228,7 +267,7 @@ fn keys_of_32_bits_are_depths() {
     }
     for forward in [Random(4).direction(), [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]] {
         let bounds = depth_bounds(&placed, forward);
-        let keys = keys(&mut gpu, &sort, &placed, forward, RADIUS, 32);
+        let keys = keys(&mut gpu, &sort, &placed, DepthFrom::Plane(forward), RADIUS, 32);
         assert_eq!(wrong_depth(&keys, &bounds), None, "{forward:?}");
         let exact = depths(DVec3::from(forward.map(f64::from)), &positions);
         // Far to near, but for depths closer than their bounds.
@@ -267,14 +306,14 @@ fn keys_of_16_bits_are_steps_of_depth() {
     for radius in [RADIUS, 5.0] {
         let forward = Random(5).direction();
         let bounds = depth_bounds(&placed, forward);
-        let found = keys(&mut gpu, &sort, &placed, forward, radius, 16);
+        let found = keys(&mut gpu, &sort, &placed, DepthFrom::Plane(forward), radius, 16);
         assert_eq!(wrong_step(&found, &bounds, radius), None, "{radius}");
         // The uncertainty is far less than a step.
         assert!(bounds.iter().all(|b| steps(*b, radius).error < 0.1));
         let ends = (found.contains(&0), found.contains(&65535));
         assert_eq!(ends, (radius == 5.0, radius == 5.0));
     }
-    let found = keys(&mut gpu, &sort, &placed[..1], [0.0, 0.0, 1.0], 0.0, 16);
+    let found = keys(&mut gpu, &sort, &placed[..1], DepthFrom::Plane([0.0, 0.0, 1.0]), 0.0, 16);
     assert_eq!(found, [0], "a scene without extent");
 }
 
@@ -284,10 +323,10 @@ fn wrong_keys_are_noticed() {
     let (placed, forward) = (placed(), Random(4).direction());
     let bounds = depth_bounds(&placed, forward);
     let sort = Sort::new(&gpu.device, &gpu.compiler, N_PLACED as u32).expect("sort");
-    let mut found = keys(&mut gpu, &sort, &placed, forward, RADIUS, 32);
+    let mut found = keys(&mut gpu, &sort, &placed, DepthFrom::Plane(forward), RADIUS, 32);
     found[77] ^= 1 << 4;
     assert_eq!(wrong_depth(&found, &bounds), Some(77));
-    let mut found = keys(&mut gpu, &sort, &placed, forward, RADIUS, 16);
+    let mut found = keys(&mut gpu, &sort, &placed, DepthFrom::Plane(forward), RADIUS, 16);
     found[78] += 1;
     assert_eq!(wrong_step(&found, &bounds, RADIUS), Some(78));
 
@@ -297,7 +336,7 @@ fn wrong_keys_are_noticed() {
         assert!(sources.replace("include/key.glsl", from, to));
         let compiler = Compiler::new(sources, None).expect("shaderc");
         let wrong = Sort::new(&gpu.device, &compiler, N_PLACED as u32).expect("sort");
-        let found = keys(&mut gpu, &wrong, &placed, forward, RADIUS, 32);
+        let found = keys(&mut gpu, &wrong, &placed, DepthFrom::Plane(forward), RADIUS, 32);
         assert!(wrong_depth(&found, &bounds).is_some(), "{from} as {to}");
     }
 }
@@ -309,7 +348,7 @@ fn entries_are_those_of_the_drawn_particles() {
     let mut gpu = Gpu::new();
     let sort = Sort::new(&gpu.device, &gpu.compiler, N_PLACED as u32).expect("sort");
     let (placed, forward) = (placed(), Random(6).direction());
-    let all = keys(&mut gpu, &sort, &placed, forward, RADIUS, 32);
+    let all = keys(&mut gpu, &sort, &placed, DepthFrom::Plane(forward), RADIUS, 32);
     let (sizes, counts) = ([5000u32, 0, 1, 7999, 3000, 4000], [4999u32, 0, 1, 0, 3000, 17]);
     let (mut i_first, mut n_drawn) = (0, 0);
     let (mut i_group, mut drawn, mut expected) = (vec![], vec![], vec![]);
@@ -331,7 +370,7 @@ fn entries_are_those_of_the_drawn_particles() {
         let entries = gpu.upload(&vec![[7u32, u32::MAX]; N_PLACED]);
         gpu.run(|rec| {
             let buffers = [&from, &groups, &parts, &entries];
-            let depths = Depths { forward, radius: RADIUS, n_bits: 32 };
+            let depths = Depths { from: DepthFrom::Plane(forward), radius: RADIUS, n_bits: 32 };
             sort.record_keys(rec, buffers, &depths, N_PLACED as u32)?;
             sort.record(rec, &entries, 32, Count::Known(n_sorted)).map(|_| ())
         });

@@ -361,6 +361,7 @@ fn a_target_that_does_not_fit_is_refused() {
                     threshold: 0.0,
                     least: 0.0,
                     saturated: 0.0,
+                    slice: 0.0,
                     extents: None,
                 };
                 let count = BlobCount { n: RecordCount::Known(0), i_first_facet: 0 };

@@ -15,6 +15,8 @@ mod rounds;
 mod scenery;
 #[path = "harness/sheets.rs"]
 mod sheets;
+#[path = "pass_tiles/slices.rs"]
+mod slices;
 #[path = "harness/tiled.rs"]
 mod tiled;
 
@@ -181,7 +183,7 @@ fn wrong_pictures_are_noticed() {
     for (file, from, to) in [
         ("tiles.comp", "min_exponent = -push.cut", "min_exponent = -0.9 * push.cut"),
         ("tiles.comp", "* inv_norm[j]", ""),
-        ("tiles.comp", "alpha[j] += here;", "alpha[j] += 0.999 * here;"),
+        ("include/tile_thin.glsl", "alpha[j] += here;", "alpha[j] += 0.999 * here;"),
         ("tiles.comp", "k + t < n ? splat.fours[0].w", "k + t <= n ? splat.fours[0].w"),
         (
             "include/tile_splats.glsl",

@@ -1,4 +1,4 @@
-// Returns the sort key of a view depth relative to the lighting origin; ascending keys run far to
+// Returns the sort key of a depth relative to that of the lighting origin; ascending keys run far to
 // near (passes.md "sort").
 uint key_of(float z, uint n_bits, float depth_high, float steps_per_depth) {
     if (n_bits == 16) {

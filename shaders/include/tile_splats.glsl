@@ -5,11 +5,22 @@
 // A splat as it lies in the buffers, by fours: a Splat, a SplatTexture where splats have textures,
 // and the conic of an ellipsoid.
 const uint N_FOURS = 2 + 3 * TEXTURED + ELLIPSOIDS;
+// Slices that are open at once (tile_slices.glsl).
+const uint OPEN = 4;
 struct Loaded {
     uvec4 fours[N_FOURS];
 #if OWN_EDGE
     // The exponent at which the splat ends.
     float lowest;
+#endif
+#if SLICES
+    // The boundary of slices nearest to its centre, counted from the eye.
+    int boundary;
+    // Shares of its optical depth within that boundary and the two before, near to far.
+    float within[OPEN - 1];
+    // Distance of its centre in those of the near plane, and that of the near plane in sigma.
+    float distance;
+    float near_in_sigmas;
 #endif
 };
 
@@ -34,6 +45,11 @@ shared uint votes[INVOCATIONS];
 shared uvec4 shared_splats[N_FOURS][INVOCATIONS];
 #if OWN_EDGE
 shared float shared_lowest[INVOCATIONS];
+#endif
+#if SLICES
+shared int shared_boundary[INVOCATIONS];
+shared float shared_within[OPEN - 1][INVOCATIONS];
+shared vec2 shared_sizes[INVOCATIONS];
 #endif
 
 uint append(uint n, bool hit, uint r) {
@@ -78,32 +94,59 @@ Loaded load_splat(int r) {
     return splat;
 }
 
-#if ONE_SUBGROUP
 // Returns the splat that invocation m has loaded.
 Loaded of_invocation(Loaded splat, uint m) {
+#if ONE_SUBGROUP
     [[unroll]] for (uint k = 0; k < N_FOURS; ++k) {
         splat.fours[k] = subgroupShuffle(splat.fours[k], m);
     }
 #if OWN_EDGE
     splat.lowest = subgroupShuffle(splat.lowest, m);
 #endif
+#if SLICES
+    splat.boundary = subgroupShuffle(splat.boundary, m);
+    [[unroll]] for (uint k = 0; k < OPEN - 1u; ++k) {
+        splat.within[k] = subgroupShuffle(splat.within[k], m);
+    }
+    splat.distance = subgroupShuffle(splat.distance, m);
+    splat.near_in_sigmas = subgroupShuffle(splat.near_in_sigmas, m);
+#endif
+#else
+    [[unroll]] for (uint k = 0; k < N_FOURS; ++k) { splat.fours[k] = shared_splats[k][m]; }
+#if OWN_EDGE
+    splat.lowest = shared_lowest[m];
+#endif
+#if SLICES
+    splat.boundary = shared_boundary[m];
+    [[unroll]] for (uint k = 0; k < OPEN - 1u; ++k) { splat.within[k] = shared_within[k][m]; }
+    splat.distance = shared_sizes[m].x;
+    splat.near_in_sigmas = shared_sizes[m].y;
+#endif
+#endif
     return splat;
 }
+
+#if SLICES
+int boundary_of(Loaded splat, uint m) {
+#if ONE_SUBGROUP
+    return subgroupShuffle(splat.boundary, m);
 #else
+    return shared_boundary[m];
+#endif
+}
+#endif
+
+#if !ONE_SUBGROUP
 void share_splat(Loaded splat, uint t) {
     [[unroll]] for (uint k = 0; k < N_FOURS; ++k) { shared_splats[k][t] = splat.fours[k]; }
 #if OWN_EDGE
     shared_lowest[t] = splat.lowest;
 #endif
-    barrier();
-}
-
-Loaded of_invocation(uint m) {
-    Loaded splat;
-    [[unroll]] for (uint k = 0; k < N_FOURS; ++k) { splat.fours[k] = shared_splats[k][m]; }
-#if OWN_EDGE
-    splat.lowest = shared_lowest[m];
+#if SLICES
+    shared_boundary[t] = splat.boundary;
+    [[unroll]] for (uint k = 0; k < OPEN - 1u; ++k) { shared_within[k][t] = splat.within[k]; }
+    shared_sizes[t] = vec2(splat.distance, splat.near_in_sigmas);
 #endif
-    return splat;
+    barrier();
 }
 #endif

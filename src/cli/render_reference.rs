@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::io::console::say;
 use crate::io::image::{self, image_hash};
 use crate::io::layers::{self, CHANNELS};
-use crate::model::scene::Scene;
+use crate::model::scene::{Draw, Scene};
 use crate::reference::picture::{
     self, BlobModel, DrawnPicture, Pixels, ReferenceKind, ReferenceRequest, check_memory,
     drawn_as_set, layers_as_set,
@@ -36,7 +36,7 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
         print_sizes(scene, None);
     }
     let drawing = match kind {
-        ReferenceKind::Thin => Some(BlobModel::Thin),
+        ReferenceKind::Thin | ReferenceKind::Slices => Some(BlobModel::AsDrawn),
         ReferenceKind::Volume => Some(BlobModel::Volume),
         _ => None,
     };
@@ -44,7 +44,7 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
         return with_layers(args, scene, time_s);
     }
     let Computed { rgba, keys } = match drawing.filter(|_| args.samples == 1) {
-        Some(drawing) => at_centers(args, drawing, scene, time_s)?,
+        Some(drawing) => at_centers(args, drawing, &composed_by(kind, scene), time_s)?,
         None => sampled(args, kind, scene, time_s)?,
     };
     let rgba = picture::to_f32(&rgba);
@@ -53,6 +53,12 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
     image::write(&args.output, &film, film.width, film.height, &rgba)?;
     let hash = image_hash(&rgba);
     tell(args, (kind, scene, time_s), (hash, n_bad), keys)
+}
+
+/// Returns `scene` with its own drawing settings, but overlapping blobs composed as in `kind`.
+fn composed_by(kind: ReferenceKind, scene: &Scene) -> Scene {
+    let Draw { path, overlap, .. } = kind.without_approximations(scene).draw;
+    Scene { draw: Draw { path, overlap, ..scene.draw }, ..scene.clone() }
 }
 
 /// Draws the layers of the reference "thin" and writes them.
@@ -115,7 +121,7 @@ fn at_centers(
              {brightest:.3e}"
         );
     }
-    let share = (drawing == BlobModel::Thin).then(|| omitted.share());
+    let share = (drawing == BlobModel::AsDrawn).then(|| omitted.share());
     if let Some(share) = share.filter(|_| args.options.verbose && scene.draw.threshold.is_active())
     {
         let n = omitted.n_layers;

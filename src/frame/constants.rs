@@ -1,11 +1,12 @@
 //! The numbers of a scene that passes take as arguments. They are constant over a run.
 
 use super::features::{saturation_bound, target_format};
+use super::packet::Packet;
 use crate::gpu::TargetFormat;
 use crate::layout::frame::CameraRecord;
 use crate::model::edge::Edge;
-use crate::model::scene::Scene;
-use crate::passes::blobs::{BlobView, Extent};
+use crate::model::scene::{Overlap, Scene};
+use crate::passes::blobs::BlobView;
 use crate::passes::transmit::MarchParams;
 
 /// Counts of records, and parameters of the passes.
@@ -18,6 +19,8 @@ pub(super) struct FrameConstants {
     pub march: MarchParams,
     pub texture_seed: u32,
     pub edge: Edge,
+    /// Blobs are composed by slices.
+    pub slices: bool,
     /// σ below which a blob is left out, in pixels of the film.
     pub smallest: f64,
     pub saturated: f64,
@@ -44,6 +47,7 @@ impl FrameConstants {
             },
             texture_seed: scene.draw.texture_seed,
             edge: scene.draw.edge(),
+            slices: scene.draw.overlap == Overlap::Slices,
             smallest: scene.draw.smallest.bound(),
             saturated: saturation_bound(scene.film.format),
             format: target_format(scene.film.format),
@@ -56,11 +60,13 @@ impl FrameConstants {
         u64::from(self.size[0]) * u64::from(self.size[1]) * self.format.bytes_per_pixel()
     }
 
-    /// Returns `camera`'s view of the blobs of groups with `extents`.
-    pub fn view<'a>(&self, camera: &'a CameraRecord, extents: &'a [Extent]) -> BlobView<'a> {
+    /// Returns `camera`'s view of the blobs of a frame.
+    pub fn view<'a>(&self, camera: &'a CameraRecord, packet: &'a Packet) -> BlobView<'a> {
         let FrameConstants {
             edge: Edge { radius: cutoff, tau: threshold, least }, saturated, ..
         } = *self;
-        BlobView { camera, cutoff, threshold, least, saturated, extents: Some(extents) }
+        let slice = if self.slices { packet.slice } else { 0.0 };
+        let extents = Some(&packet.extents[..]);
+        BlobView { camera, cutoff, threshold, least, saturated, slice, extents }
     }
 }

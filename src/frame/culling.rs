@@ -9,7 +9,7 @@ use crate::gpu::{BufferSpec, Compiler, Device, buffers};
 use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
 use crate::model::scene::Scene;
-use crate::passes::blobs::Depths;
+use crate::passes::blobs::{DepthFrom, Depths};
 use crate::passes::cull::{self, Cull, CullView};
 
 buffers! {
@@ -62,11 +62,16 @@ pub(super) fn cull_view<'a>(
     // The bound is in pixels of the film, of which a slope has another number.
     let pixels = f64::from(size[1]) * f64::from(packet.camera.tan_y)
         / (f64::from(c.size[1]) * f64::from(camera.tan_y));
-    CullView { blobs: c.view(camera, &packet.extents), size, smallest: c.smallest * pixels }
+    CullView { blobs: c.view(camera, packet), size, smallest: c.smallest * pixels }
 }
 
 /// Returns the depths that sort keys are made of.
-pub(super) fn key_depths(packet: &Packet) -> Depths {
+pub(super) fn key_depths(packet: &Packet, c: &FrameConstants) -> Depths {
     let Packet { radius, sort_bits: n_bits, .. } = *packet;
-    Depths { forward: packet.camera.forward, radius, n_bits }
+    // Slices are shells about the eye.
+    let from = match c.slices {
+        true => DepthFrom::Eye(packet.camera.eye),
+        false => DepthFrom::Plane(packet.camera.forward),
+    };
+    Depths { from, radius, n_bits }
 }

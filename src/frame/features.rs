@@ -6,7 +6,9 @@ use crate::model::cloud::{Cloud, CloudSource, Group, SQRT_TAU};
 use crate::model::disc::Disc;
 use crate::model::film::FilmFormat;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Cull, DrawPath, Gather, Impostors, LightingMode, Scene, Simulate};
+use crate::model::scene::{
+    Cull, DrawPath, Gather, Impostors, LightingMode, Overlap, Scene, Simulate,
+};
 use crate::passes::blobs::BlobVariant;
 use crate::passes::tiles::THIN;
 
@@ -43,6 +45,8 @@ pub struct SceneFeatures {
     pub culls: bool,
     /// The pass that draws blobs.
     pub path: DrawPath,
+    /// Blobs are composed by slices.
+    pub is_sliced: bool,
     /// Blobs are drawn into a smaller picture.
     pub is_low_res: bool,
 }
@@ -83,6 +87,7 @@ impl SceneFeatures {
             has_impostors: has_impostors(scene),
             culls: culls(scene),
             path: scene.draw.path,
+            is_sliced: scene.draw.overlap == Overlap::Slices,
             is_low_res: scene.draw.resolution != Resolution::Full,
         }
     }

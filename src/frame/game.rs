@@ -25,6 +25,7 @@ use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::gust::Mode;
 use crate::model::gust_lanes::{LANES, Lanes, Waves};
 use crate::model::material::{Brdf, Material};
+use crate::model::overlap::slice_length;
 use crate::model::scene::Scene;
 use crate::passes::blobs::Extent;
 
@@ -179,6 +180,7 @@ impl Game {
             heaviest,
             radius: setting.radius,
             sort_bits: self.sort_bits(&grown, setting.radius),
+            slice: slice_length(self.scene.draw.slice, &grown, setting.radius),
             extents,
             game_ms: ms(begin, Instant::now()),
         })

@@ -72,8 +72,8 @@ pub struct CachedLayer {
     pub shell: Shell,
     /// The camera of its picture.
     pub camera: CameraRecord,
-    /// The last sort key of its particles.
-    pub last_key: u32,
+    /// Least depth of its particles when it was drawn, relative to the lighting origin.
+    pub cut: f32,
     /// Least depth of its particles in the current view.
     pub depth: f64,
     /// Least and greatest slopes of the view at which it shows anything.
@@ -228,9 +228,7 @@ impl ImpostorCache {
             |of: fn(&Extent) -> f64| beyond.iter().map(|(e, _)| of(e)).fold(0.0, f64::max);
         let (sigma, radius) = (greatest(|e| e.sigma_max), greatest(Extent::radius));
         let lengths = now.eye.abs().element_sum() + packet.radius;
-        let (last_key, quantum) =
-            last_key(cut + now.eye.dot(now.forward), packet.radius, packet.sort_bits)?;
-        let nearest = cut - quantum - ROUNDING * lengths;
+        let nearest = cut - ROUNDING * lengths;
         let farthest =
             beyond.iter().map(|(_, d)| d[1]).fold(nearest, f64::max) + ROUNDING * lengths;
         let least = beyond.iter().map(|(e, d)| e.sigma_mean / d[1]).fold(f64::INFINITY, f64::min);
@@ -251,7 +249,7 @@ impl ImpostorCache {
         let layer = CachedLayer {
             shell: Shell { view: view_of(&camera), far },
             camera,
-            last_key,
+            cut: (cut + now.eye.dot(now.forward)) as f32,
             depth: nearest,
             bounds: [-now.tangents, now.tangents],
         };
@@ -354,21 +352,6 @@ fn cuts(extents: &[Extent], costs: &[f64], view: &View) -> Vec<f64> {
     let all = extents.iter().map(|e| depths(e, view)[0]).fold(f64::INFINITY, f64::min);
     cuts.push(all);
     cuts
-}
-
-/// Returns the last sort key of depths of at least `z`, relative to the lighting origin. The second
-/// number is how much less a depth of that key may be. `None` if no depth has a key.
-fn last_key(z: f64, radius: f64, sort_bits: u32) -> Option<(u32, f64)> {
-    if sort_bits == 32 {
-        let z = z as f32;
-        let bits = z.to_bits();
-        let map = if bits & 0x8000_0000 != 0 { !bits } else { bits | 0x8000_0000 };
-        return (!z.is_nan()).then_some((!map, 0.0));
-    }
-    let quantum = 2.0 * radius / 65536.0;
-    let key = ((radius - z) / quantum).floor();
-    // The comparison is false for NaN.
-    if matches!(key, k if k >= 0.0) { Some((key.min(65535.0) as u32, quantum)) } else { None }
 }
 
 /// Returns whether a surface or terrain is neither nearer nor farther than all of a range of

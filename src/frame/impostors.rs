@@ -123,9 +123,10 @@ impl Impostors {
             LayerUse::Reused { layer, .. } => (layer, false),
         };
         let LayerBuffers { texels, members, far, near } = &self.buffers;
-        let part = PartBuffers { entries: buffers.entries, members, far, near };
-        let last_key = is_new.then_some(layer.last_key);
-        self.pass.record_part(rec, part, packet.n_drawn, last_key)?;
+        let BlobBuffers { entries, placed, .. } = *buffers;
+        let part = PartBuffers { entries, members, far, near, placed };
+        let cut = is_new.then_some((layer.camera.forward, layer.cut));
+        self.pass.record_part(rec, part, packet.n_drawn, cut)?;
         if is_new {
             let (camera, saturated) = (&layer.camera, saturation_bound(FORMAT));
             let view = BlobView { camera, saturated, ..*view };

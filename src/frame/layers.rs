@@ -122,7 +122,7 @@ impl Renderer {
             None => RecordCount::Known(packet.n_drawn),
         };
         let count = BlobCount { n, i_first_facet: c.n_solid_facets };
-        let view = c.view(&packet.camera, &packet.extents);
+        let view = c.view(&packet.camera, packet);
         host.run(|rec| {
             let target = Target { color: &mut color, depth: picture.full.depth() };
             sprites.record(rec, &b.of_blobs(), (target, LoadOp::ClearColor), &view, count)?;

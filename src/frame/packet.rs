@@ -55,6 +55,8 @@ pub struct Packet {
     pub radius: f64,
     /// Bits of a sort key: 16 or 32.
     pub sort_bits: u32,
+    /// Thickness of a slice, where blobs are composed by slices.
+    pub slice: f64,
     /// Extent of each group.
     pub extents: Vec<Extent>,
 }

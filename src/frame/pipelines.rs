@@ -5,7 +5,7 @@ use super::stage::GpuContext;
 use crate::error::{Error, Result};
 use crate::gpu::PipelineReport;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Draw, DrawPath, Impostors, Scene};
+use crate::model::scene::{Draw, DrawPath, Impostors, Overlap, Scene};
 
 /// Makes every pipeline that the scene may need, for each value that its "auto" knobs can take, and
 /// returns the reports on them, each variant once. The device must have been opened for reports.
@@ -40,8 +40,16 @@ pub fn pipelines(context: &GpuContext, scene: &Scene) -> Result<Vec<PipelineRepo
 fn draws(draw: Draw) -> Vec<Draw> {
     let exact = draw.exact();
     let mut all = vec![exact];
-    if draw.path == DrawPath::Auto {
+    if draw.path == DrawPath::Auto && exact.path != DrawPath::Tiles {
         all.push(Draw { path: DrawPath::Tiles, ..exact });
+    }
+    if draw.overlap == Overlap::Auto && draw.path != DrawPath::Sprites {
+        let tiles = Draw { path: DrawPath::Tiles, ..exact };
+        for other in [Overlap::Thin, Overlap::Slices].map(|overlap| Draw { overlap, ..tiles }) {
+            if !all.contains(&other) {
+                all.push(other);
+            }
+        }
     }
     if draw.resolution == Resolution::Auto {
         let smaller = [Resolution::Half, Resolution::Quarter];
@@ -71,6 +79,9 @@ mod tests {
             }
         }
         assert!(found.iter().any(|d| d.impostors == Impostors::On));
+        for overlap in [Overlap::Thin, Overlap::Slices] {
+            assert!(found.iter().any(|d| d.overlap == overlap && d.path == DrawPath::Tiles));
+        }
         assert!(found.iter().all(|d| d.exact() == *d));
         assert_eq!(draws(auto.exact()).len(), 1);
     }

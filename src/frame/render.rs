@@ -251,7 +251,7 @@ impl FramePasses {
         let FramePasses { culling, sort, texture, picture, buffers: b, constants: c, .. } = self;
         let SceneBuffers { placed, particles, i_group, drawn, entries, kept, .. } = &*b;
         let (blob_camera, blob_size) = picture.blob_camera(&packet.camera, c);
-        let depths = key_depths(packet);
+        let depths = key_depths(packet, c);
         pass(rec, plan, Pass::Cull, |rec| {
             let Some(culling) = culling else { return Ok(()) };
             let buffers = CullBuffers { placed, particles, i_group, drawn, entries, kept };
@@ -290,7 +290,7 @@ impl FramePasses {
             RecordCount::Known(packet.n_drawn)
         };
         let count = BlobCount { n, i_first_facet: c.n_solid_facets };
-        let (view, all) = (c.view(camera, &packet.extents), b.of_blobs());
+        let (view, all) = (c.view(camera, packet), b.of_blobs());
         pass(rec, plan, Pass::Impostors, |rec| {
             match (&mut picture.impostors, picture.full.target(i)) {
                 (Some(impostors), Some(target)) => {
@@ -305,7 +305,7 @@ impl FramePasses {
         for draws in [Pass::Sprites, Pass::Tiles] {
             pass(rec, plan, draws, |rec| match &mut picture.low_res {
                 Some(low_res) => {
-                    let view = c.view(&blob_camera, &packet.extents);
+                    let view = c.view(&blob_camera, packet);
                     low_res.target.record_blobs(rec, 0, false, &blobs, &view, count)
                 }
                 None => picture.full.record_blobs(rec, i, has_layer, &blobs, &view, count),

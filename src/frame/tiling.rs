@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{
     Buffer, Compiler, Device, MemoryUsage, RecordCount, Recorder, Target, TargetFormat,
 };
-use crate::model::scene::Scene;
+use crate::model::scene::{Overlap, Scene};
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};
 use crate::passes::sort::{Count, Sort, TILE};
 use crate::passes::tiles::{Division, Tiles, Variant, invocations};
@@ -71,6 +71,7 @@ impl Tiling {
             format,
             has_under,
             tau_max: tau_max(scene),
+            slices: scene.draw.overlap == Overlap::Slices,
             portable: false,
             max_pairs: None,
             max_tiles: None,

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::animated::AnimatedParticles;
-use super::boxes::{BoxLaw, CloudBox, max_radius, mean_radius};
+use super::boxes::{BoxLaw, CloudBox, max_radius, mean_radius, mean_radius_by_area};
 use super::disc::Disc;
 pub use super::group::{Group, max_blob_mass, runs};
 use super::growth::Growth;
@@ -143,6 +143,7 @@ impl Cloud {
             sigma_max: 0.0,
             sigma_y_max: 0.0,
             sigma_mean: 0.0,
+            sigma_by_area: 0.0,
             aspects: [1.0; 3],
             kappa_max: 0.0,
             mass_max: 0.0,
@@ -163,6 +164,9 @@ impl Cloud {
                         sigma_max,
                         sigma_y_max: sigma_max,
                         sigma_mean: mean_radius(law.form, b.radius_max)
+                            * law.radius_scale
+                            * SIGMA_PER_RADIUS,
+                        sigma_by_area: mean_radius_by_area(law.form, b.radius_max)
                             * law.radius_scale
                             * SIGMA_PER_RADIUS,
                         kappa_max: kappa,
@@ -192,10 +196,12 @@ pub fn box_kappa(b: &CloudBox, law: &BoxLaw) -> f64 {
 fn list_group(list: &[Particle], at_rest: Group) -> Group {
     let low = list.iter().map(|p| p.position).reduce(DVec3::min).unwrap_or(DVec3::ZERO);
     let high = list.iter().map(|p| p.position).reduce(DVec3::max).unwrap_or(DVec3::ZERO);
+    let sum = |power: i32| -> f64 { list.iter().map(|p| p.sigma.powi(power)).sum() };
     Group {
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
         sigma_y_max: list.iter().map(|p| p.sigma * p.aspect).fold(0.0, f64::max),
-        sigma_mean: list.iter().map(|p| p.sigma).sum::<f64>() / list.len().max(1) as f64,
+        sigma_mean: sum(1) / list.len().max(1) as f64,
+        sigma_by_area: if sum(2) > 0.0 { sum(3) / sum(2) } else { 0.0 },
         aspects: aspects(list),
         kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
         mass_max: list.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).fold(0.0, f64::max),
@@ -221,6 +227,7 @@ fn disc_group(disc: &Disc, wind: DVec3, at_rest: Group) -> Group {
         sigma_max: disc.sigma_max(),
         sigma_y_max: disc.sigma_max(),
         sigma_mean: disc.sigma_mean(),
+        sigma_by_area: disc.sigma_mean(),
         kappa_max: disc.kappa(),
         mass_max: disc.mass_max(),
         ..at_rest.between(low, high)
@@ -232,6 +239,7 @@ fn animated_group(m: &AnimatedParticles, at_rest: Group) -> Group {
         sigma_max: m.sigma_max,
         sigma_y_max: m.sigma_y_max,
         sigma_mean: m.sigma_mean,
+        sigma_by_area: m.sigma_mean,
         aspects: [MIN_ASPECT, m.aspect_mean, 1.0 / MIN_ASPECT],
         kappa_max: m.kappa_max,
         mass_max: m.mass_max,

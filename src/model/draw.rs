@@ -4,6 +4,7 @@ use super::count::Count;
 use super::cutoff::Cutoff;
 use super::edge::{Edge, Reach};
 use super::named::named;
+use super::overlap::Overlap;
 use super::resolution::Resolution;
 use super::sort_bits::SortBits;
 
@@ -76,6 +77,10 @@ pub struct Draw {
     pub cutoff: Reach,
     /// Optical depth below which blobs end.
     pub threshold: Cutoff,
+    /// How overlapping blobs are composed.
+    pub overlap: Overlap,
+    /// Thickness of a slice, mean σ.
+    pub slice: f64,
     /// Whether particles that no pixel shows are left out.
     pub cull: Cull,
     /// Width in pixels of σ below which particles are left out. It needs culling.
@@ -104,8 +109,19 @@ impl Draw {
     /// Returns the settings with every "auto" replaced by the choice that changes nothing.
     pub fn exact(self) -> Draw {
         let least = |l: Cutoff| Cutoff::At(l.bound());
+        let path = match (self.path, self.overlap) {
+            (DrawPath::Auto, Overlap::Slices) => DrawPath::Tiles,
+            (DrawPath::Auto, _) => DrawPath::Sprites,
+            (path, _) => path,
+        };
+        let overlap = match (self.overlap, path) {
+            (Overlap::Auto, DrawPath::Tiles) => Overlap::Slices,
+            (Overlap::Auto, _) => Overlap::Thin,
+            (overlap, _) => overlap,
+        };
         Draw {
-            path: if self.path == DrawPath::Auto { DrawPath::Sprites } else { self.path },
+            path,
+            overlap,
             chunks: if self.chunks == Chunks::Auto { Chunks::Of(0) } else { self.chunks },
             cull: if self.cull == Cull::Auto { Cull::On } else { self.cull },
             threshold: least(self.threshold),

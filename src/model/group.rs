@@ -28,6 +28,8 @@ pub struct Group {
     pub sigma_y_max: f64,
     /// Mean σ along x and z.
     pub sigma_mean: f64,
+    /// The same, weighted by the areas that particles cover: Σσ³/Σσ².
+    pub sigma_by_area: f64,
     /// Least, mean and greatest aspect: σ along y over σ along x and z.
     pub aspects: [f64; 3],
     /// Greatest peak extinction.
@@ -73,6 +75,7 @@ impl Group {
             sigma_max: scale * self.sigma_max,
             sigma_y_max: scale * self.sigma_y_max,
             sigma_mean: scale * self.sigma_mean,
+            sigma_by_area: scale * self.sigma_by_area,
             mass_max: scale.powi(3) * self.mass_max,
             ..*self
         }

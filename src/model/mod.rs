@@ -28,6 +28,7 @@ mod lighting;
 pub mod material;
 pub mod moisture;
 mod named;
+pub mod overlap;
 pub mod pairings;
 mod particle;
 pub mod philox;

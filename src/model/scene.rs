@@ -15,6 +15,7 @@ use super::light::Light;
 pub use super::lighting::{Gather, Lighting, LightingMode, MAX_PAIR_LEVELS, Pairs};
 use super::material::Material;
 use super::named::named;
+pub use super::overlap::Overlap;
 use super::resolution::LowResLayout;
 use super::surface::Surface;
 use super::terrain::Terrain;

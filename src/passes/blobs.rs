@@ -94,6 +94,8 @@ pub struct BlobView<'a> {
     pub least: f64,
     /// Transmittance below which a pixel hides everything behind it.
     pub saturated: f64,
+    /// Thickness of a slice; 0 where blobs are composed one after the other.
+    pub slice: f64,
     /// Where the blobs' centres are, relative to the lighting origin; `None` where this is unknown.
     pub extents: Option<&'a [Extent]>,
 }
@@ -102,6 +104,12 @@ impl BlobView<'_> {
     /// Returns 1 / threshold; infinity, which cuts nothing, where f32 cannot hold the inverse.
     pub(super) fn inv_threshold(&self) -> f32 {
         (1.0 / self.threshold) as f32
+    }
+
+    /// Returns the near plane's distance over the thickness of a slice; 0 without slices.
+    pub(super) fn near_in_slices(&self) -> f32 {
+        let near = f64::from(self.camera.near);
+        if self.slice > 0.0 { (near / self.slice) as f32 } else { 0.0 }
     }
 
     /// Returns the least b²/2σ² at which a blob ends.
@@ -122,25 +130,36 @@ pub struct BlobCount<'a> {
 record! {
     /// Push constants of `sort_key.comp` and `cull_write.comp`.
     pub struct KeyPush {
-        /// The camera's forward axis.
-        forward: [f32; 3],
+        /// The camera's forward axis, or the eye.
+        from: [f32; 3],
         /// Number of particles.
         n_particles: u32,
-        /// Bound of |view depth|.
+        /// Bound of |depth|.
         depth_high: f32,
         /// Steps of a 16-bit key per length.
         steps_per_depth: f32,
         /// Bits of a key: 16 or 32.
         n_bits: u32,
+        /// Distance of the eye from the lighting origin; negative where depths are view depths.
+        eye_distance: f32,
     }
+}
+
+/// What the depth of a blob is, relative to that of the lighting origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DepthFrom {
+    /// The view depth, along the camera's forward axis.
+    Plane([f32; 3]),
+    /// The distance from the eye.
+    Eye([f32; 3]),
 }
 
 /// The depths that sort keys are made of.
 #[derive(Debug, Clone, Copy)]
 pub struct Depths {
-    /// The camera's forward axis.
-    pub forward: [f32; 3],
-    /// Bound of |view depth|; the range of 16-bit keys.
+    /// The depth of a blob.
+    pub from: DepthFrom,
+    /// Bound of |depth|; the range of 16-bit keys.
     pub radius: f64,
     /// Bits of a key: 16 or 32.
     pub n_bits: u32,
@@ -149,9 +168,14 @@ pub struct Depths {
 impl Depths {
     /// Returns the push constants that make keys of `n_particles`.
     pub(super) fn push(&self, n_particles: u32) -> KeyPush {
-        let Depths { forward, radius, n_bits } = *self;
+        let Depths { from, radius, n_bits } = *self;
         // A scene without extent has one depth: any finite factor gives one key.
         let steps_per_depth = if radius > 0.0 { (65536.0 / (2.0 * radius)) as f32 } else { 0.0 };
-        KeyPush { forward, n_particles, depth_high: radius as f32, steps_per_depth, n_bits }
+        let (from, eye_distance) = match from {
+            DepthFrom::Plane(forward) => (forward, -1.0),
+            DepthFrom::Eye(eye) => (eye, DVec3::from(eye.map(f64::from)).length() as f32),
+        };
+        let depth_high = radius as f32;
+        KeyPush { from, n_particles, depth_high, steps_per_depth, n_bits, eye_distance }
     }
 }

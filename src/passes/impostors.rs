@@ -19,14 +19,16 @@ use crate::layout::record;
 record! {
     /// Push constants of `impostors_part.comp`.
     pub struct PartPush {
+        /// The camera's forward axis.
+        forward: [f32; 3],
+        /// Least depth of a far particle, relative to the lighting origin.
+        cut: f32,
         /// Number of entries.
         n_entries: u32,
-        /// Greatest key of a far entry.
-        last_key: u32,
-        /// 1: entries are parted by their keys; 0: by the last decision.
+        /// 1: entries are parted by their depths; 0: by the last decision.
         is_new: u32,
         /// Padding.
-        unused: u32,
+        unused: [u32; 2],
     }
 }
 
@@ -89,6 +91,8 @@ bindings! {
         far,
         /// Output, `[u32; 2]`: the other entries.
         near,
+        /// `PlacedRecord` by particle.
+        placed,
     }
 }
 
@@ -112,8 +116,8 @@ impl Impostors {
 
     /// Parts the first `n_entries` entries into those of the layer and the others.
     ///
-    /// With `last_key`, the particles up to that sort key become the new members of the layer;
-    /// without, the members stay.
+    /// With `cut`, an axis and a depth, particles of at least that depth along the axis, relative to
+    /// the lighting origin, become the new members of the layer; without, the members stay.
     ///
     /// # Errors
     /// Fails if a buffer does not fit the shader's binding.
@@ -122,18 +126,15 @@ impl Impostors {
         rec: &mut Recorder<'_>,
         buffers: PartBuffers<'_>,
         n_entries: u32,
-        last_key: Option<u32>,
+        cut: Option<([f32; 3], f32)>,
     ) -> Result<()> {
-        if last_key.is_some() {
+        if cut.is_some() {
             // A particle that is not drawn is not a member.
             rec.fill(buffers.members, 0);
         }
-        let push = PartPush {
-            n_entries,
-            last_key: last_key.unwrap_or(0),
-            is_new: u32::from(last_key.is_some()),
-            unused: 0,
-        };
+        let (forward, depth) = cut.unwrap_or_default();
+        let is_new = u32::from(cut.is_some());
+        let push = PartPush { forward, cut: depth, n_entries, is_new, unused: [0; 2] };
         rec.dispatch(&self.part, &buffers.by_binding(), &push, n_entries)
     }
 

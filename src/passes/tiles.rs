@@ -22,7 +22,8 @@ use crate::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 pub use division::{Division, RUN, TILES_ACROSS, invocations};
 pub use push::{ClearPush, PairsPush, Push, RangesPush, RoundsPush, SplatPush};
 pub use rounds::BLOCK;
-use rounds::Rounds;
+pub use rounds::MAX_SLICES;
+use rounds::{Form, Rounds};
 
 /// The greatest optical depth of a blob that the kernels for thin scenes handle.
 pub const THIN: f64 = 0.125;
@@ -41,6 +42,8 @@ pub struct Variant {
     pub has_under: bool,
     /// Bound of a blob's optical depth.
     pub tau_max: f64,
+    /// Overlapping blobs are composed by slices. Views have a slice then.
+    pub slices: bool,
     /// Subgroup operations are not used.
     pub portable: bool,
     /// Bound of the pairs held at once; by default as many as suit the device.
@@ -69,7 +72,8 @@ buffers! {
         entries: Buffer => [u32; 2], rounds.capacity, "tiles.entries";
         ranges: Buffer => [u32; 4], division.n_tiles(), "tiles.ranges";
         /// State of pixels between rounds.
-        state: Buffer => [u32; 4], one_unless(rounds.n > 1, division.n_pixels()), "tiles.state";
+        state: Buffer => [u32; 4], one_unless(rounds.n > 1, n_state(&division, variant.slices)),
+            "tiles.state";
         /// The picture beneath the blobs, words of pixels.
         under: Buffer => u32,
             one_unless(variant.has_under, division.n_pixels()) * pixel_words(variant.format),
@@ -80,6 +84,11 @@ buffers! {
 
 fn one_unless(is_used: bool, n: u64) -> u64 {
     if is_used { n } else { 1 }
+}
+
+/// Returns the number of fours of the state of all pixels.
+fn n_state(division: &Division, slices: bool) -> u64 {
+    rounds::state_fours(slices) * division.n_pixels()
 }
 
 fn pixel_words(format: TargetFormat) -> u64 {
@@ -100,6 +109,7 @@ pub struct Tiles {
     division: Division,
     n_compose_bindings: usize,
     rounds_spec: Rounds,
+    slices: bool,
     max_groups: u32,
     max_tiles: u32,
     scratch: Scratch,
@@ -123,10 +133,11 @@ impl Tiles {
         n_max: u32,
         variant: &Variant,
     ) -> Result<Tiles> {
-        let Variant { blobs, format, has_under, tau_max, portable, .. } = *variant;
+        let Variant { blobs, format, has_under, tau_max, slices, portable, .. } = *variant;
         let limits = device.limits();
         let is_one_subgroup = !portable && limits.is_one_subgroup(division.invocations);
-        let rounds = Rounds::new(n_max, &division, limits, (variant.max_pairs, is_one_subgroup))?;
+        let form = Form { is_one_subgroup, slices };
+        let rounds = Rounds::new(n_max, &division, limits, variant.max_pairs, form)?;
         let constants = blobs.constants();
         let pixel_words = pixel_words(format) as u32;
         let together = 4 / pixel_words;
@@ -138,6 +149,7 @@ impl Tiles {
             ("TEXTURED", u32::from(blobs.textured)),
             ("ELLIPSOIDS", u32::from(blobs.ellipsoids)),
             ("THRESHOLD", u32::from(blobs.threshold)),
+            ("SLICES", u32::from(slices)),
             ("PIXEL_WORDS", pixel_words),
             ("TOGETHER", if division.width.is_multiple_of(together) { together } else { 1 }),
             ("WORDS_64", u32::from(limits.has_int64)),
@@ -166,6 +178,7 @@ impl Tiles {
                 _ => 6,
             },
             rounds_spec: rounds,
+            slices,
             max_groups: limits.max_workgroups_x,
             max_tiles: variant.max_tiles.unwrap_or(default_max_tiles(device)),
             scratch: Scratch::new(device, n_max.into(), division, rounds, *variant)?,
@@ -239,8 +252,9 @@ impl Tiles {
         if self.rounds_spec.n == 1 {
             return Ok(());
         }
-        let push = ClearPush { n_pixels: self.division.n_pixels() as u32, unused: 0 };
-        rec.dispatch(&self.clear, &[round, &self.scratch.state], &push, push.n_pixels)
+        let n_fours = n_state(&self.division, self.slices) as u32;
+        let push = ClearPush { n_fours, unused: 0 };
+        rec.dispatch(&self.clear, &[round, &self.scratch.state], &push, n_fours)
     }
 
     /// Starts `picture` with the colors of `under`, or with zeros; its depth hides blobs.
@@ -327,6 +341,7 @@ impl Tiles {
             y_right: view.camera.right[1],
             y_up: view.camera.up[1],
             y_forward: view.camera.forward[1],
+            near_in_slices: view.near_in_slices(),
         };
         let buffers =
             [splats, sorted, round, ranges, state, picture, under, depths, sheets, pool, conics];

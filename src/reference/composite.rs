@@ -17,6 +17,10 @@ pub struct Rounding {
     pub step: f64,
     /// Relative error of each α.
     pub alpha: f64,
+    /// Relative error of each τ.
+    pub tau: f64,
+    /// Difference of depths within which two blobs may come in either order.
+    pub order: f64,
     /// Relative error of b. Half the error of b²/2σ², as a share of its value at the cut, or of 1
     /// if that is less. Nearer to the cut a sprite may end or not.
     pub edge: f64,
@@ -53,7 +57,7 @@ impl Rounding {
             FilmFormat::Rgba16f => (unit, 2f64.powi(-14), 0.0),
             FilmFormat::Rgba32f => (unit, 2f64.powi(-126), 0.0),
         };
-        Rounding { unit, least_normal, step, alpha, edge, depth: 0.0 }
+        Rounding { unit, least_normal, step, alpha, tau: alpha, order: 0.0, edge, depth: 0.0 }
     }
 
     /// Returns the distance from the cut beyond which rounding cannot move b²/2σ² across it.
@@ -62,8 +66,16 @@ impl Rounding {
     }
 
     /// Exact arithmetic.
-    pub const NONE: Rounding =
-        Rounding { unit: 0.0, least_normal: 0.0, step: 0.0, alpha: 0.0, edge: 0.0, depth: 0.0 };
+    pub const NONE: Rounding = Rounding {
+        unit: 0.0,
+        least_normal: 0.0,
+        step: 0.0,
+        alpha: 0.0,
+        tau: 0.0,
+        order: 0.0,
+        edge: 0.0,
+        depth: 0.0,
+    };
 
     /// Returns what the target holds of an opaque colour.
     pub fn stored(&self, behind: OpaquePixel) -> OpaquePixel {

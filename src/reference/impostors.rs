@@ -104,11 +104,17 @@ pub fn place_of(
 
 /// Divides the sorted entries [key, particle] into far and near ones; in each list an invalid
 /// particle stands in the place of the others. `members` holds 1 for every
-/// particle in the impostor. With `cut`, the last key of the impostor, it is computed first.
-pub fn part(entries: &[[u32; 2]], members: &mut [u32], cut: Option<u32>) -> [Vec<[u32; 2]>; 2] {
-    if let Some(cut) = cut {
+/// particle in the impostor. With `cut`, the particles' depths and the least of the impostor's, it
+/// is computed first.
+pub fn part(
+    entries: &[[u32; 2]],
+    members: &mut [u32],
+    cut: Option<(&[f64], f64)>,
+) -> [Vec<[u32; 2]>; 2] {
+    if let Some((depths, cut)) = cut {
         members.fill(0);
-        entries.iter().filter(|e| e[0] <= cut).for_each(|e| members[e[1] as usize] = 1);
+        let far = entries.iter().map(|e| e[1] as usize).filter(|&i| depths[i] >= cut);
+        far.for_each(|i| members[i] = 1);
     }
     let of = |far: bool| {
         let keep =
@@ -139,10 +145,10 @@ mod tests {
     }
 
     #[test]
-    fn far_particles_are_a_prefix_and_stay_members() {
+    fn far_particles_are_those_beyond_the_cut_and_stay_members() {
         let entries = [[3, 2], [5, 0], [5, 3], [9, 1]];
         let mut members = [7; 4];
-        let [far, near] = part(&entries, &mut members, Some(5));
+        let [far, near] = part(&entries, &mut members, Some((&[8.0, 4.0, 9.0, 7.0], 7.0)));
         assert_eq!(members, [1, 0, 1, 1]);
         assert_eq!(far, [[3, 2], [5, 0], [5, 3], [9, u32::MAX]]);
         assert_eq!(near, [[3, u32::MAX], [5, u32::MAX], [5, u32::MAX], [9, 1]]);

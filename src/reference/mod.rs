@@ -28,6 +28,7 @@ pub mod picture;
 pub mod place;
 pub mod present;
 pub mod rounding;
+mod slices;
 pub mod sort;
 pub mod sprite_sums;
 pub mod sprites;

@@ -1,5 +1,5 @@
-//! Sort keys by view depth and their stable order, passes.md "sort". Ascending keys run far to
-//! near.
+//! Sort keys by view depth, or by distance from the eye, and their stable order, passes.md "sort".
+//! Ascending keys run far to near.
 
 use glam::DVec3;
 
@@ -7,6 +7,11 @@ use glam::DVec3;
 /// without turning.
 pub fn depths(forward: DVec3, positions: &[DVec3]) -> Vec<f64> {
     positions.iter().map(|p| forward.dot(*p)).collect()
+}
+
+/// Returns the distances from the eye relative to that of O: |placed − eye| − |eye|.
+pub fn distances(eye: DVec3, positions: &[DVec3]) -> Vec<f64> {
+    positions.iter().map(|p| (*p - eye).length() - eye.length()).collect()
 }
 
 /// Returns m, which maps f32 to u32 monotonically: −0 just below +0, NaN beyond the infinity of its

@@ -87,7 +87,16 @@ pub fn sums_at(
         rounding.depth * (place.length() + (place - view.pose.position).length())
     };
     let over = |pixel: &mut SpriteSums, j: usize, layer: &Layer| pixel.add(layer, off(j), rounding);
-    composed(view, raster, opaque, (sprites, rounding), SpriteSums::of, over, &|_| ())
+    composed(
+        view,
+        raster,
+        opaque,
+        (sprites, rounding),
+        SpriteSums::of,
+        over,
+        |_, sums| sums,
+        &|_| (),
+    )
 }
 
 #[cfg(test)]

@@ -9,6 +9,8 @@ use glam::{DVec2, DVec3};
 use super::Blob;
 use super::composite::{Layered, OpaquePixel, Rounding};
 use super::parallel::parallel_map;
+use super::slices;
+use super::tiles::Composed;
 use super::view::View;
 
 /// A factor on τ of blob `j`, given the difference of the ray's slopes from its centre's.
@@ -104,11 +106,23 @@ fn layered(
     rounding: &Rounding,
     on_row: &(dyn Fn(usize) + Sync),
 ) -> Vec<Layered> {
+    if view.slice > 0.0 {
+        let brightest = sprites.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
+        // Half a step of the target below 1 hides what is behind.
+        let saturated = 0.5 * rounding.unit.max(0.5 * rounding.step);
+        let pixels = slices::composed_at(view, raster, opaque, sprites, rounding, on_row);
+        let over = |(pixel, behind): (&Composed, &OpaquePixel)| {
+            let (value, bound) = pixel.over(behind, rounding, saturated, brightest);
+            Layered { value, bound }
+        };
+        return pixels.iter().zip(opaque).map(over).collect();
+    }
     let over = |pixel: &mut Layered, j: usize, layer: &Layer| {
         pixel.over(layer.alpha, layer.off, sprites.radiance[j], rounding);
     };
     let start = |behind: &OpaquePixel| Layered::from(behind);
-    composed(view, raster, opaque, (sprites, rounding), start, over, on_row)
+    let whole = |_: usize, pixel: Layered| pixel;
+    composed(view, raster, opaque, (sprites, rounding), start, over, whole, on_row)
 }
 
 /// The shares of a pixel.
@@ -128,12 +142,16 @@ pub fn shares_at(
     opaque: &[OpaquePixel],
     sprites: &Sprites<'_>,
 ) -> Vec<Shares> {
+    if view.slice > 0.0 {
+        return slices::shares_at(view, raster, opaque, sprites);
+    }
     let start = |_: &OpaquePixel| Shares { blobs: Vec::new(), behind: 1.0 };
     let over = |pixel: &mut Shares, j: usize, layer: &Layer| {
         pixel.blobs.push((j as u32, layer.alpha));
     };
     let exact = (sprites, &Rounding::NONE);
-    let mut pixels = composed(view, raster, opaque, exact, start, over, &|_| ());
+    let whole = |_: usize, pixel: Shares| pixel;
+    let mut pixels = composed(view, raster, opaque, exact, start, over, whole, &|_| ());
     for pixel in &mut pixels {
         for (_, alpha) in pixel.blobs.iter_mut().rev() {
             let share = *alpha * pixel.behind;
@@ -145,16 +163,18 @@ pub fn shares_at(
 }
 
 /// Composes the layers of every pixel of `raster` far to near: `start` makes a pixel of what is
-/// behind, `over` lays a blob's layer over it.
-pub(super) fn composed<P: Send + Clone>(
+/// behind, `over` lays a blob's layer over it, `finish` takes the whole one and its number.
+#[expect(clippy::too_many_arguments, reason = "three of them are the parts of one fold")]
+pub(super) fn composed<P: Clone, T: Send + Clone>(
     view: &View,
     raster: &Raster<'_>,
     opaque: &[OpaquePixel],
     (sprites, rounding): (&Sprites<'_>, &Rounding),
     start: impl Fn(&OpaquePixel) -> P + Sync + Send,
     over: impl Fn(&mut P, usize, &Layer) + Sync + Send,
+    finish: impl Fn(usize, P) -> T + Sync + Send,
     on_row: &(dyn Fn(usize) + Sync),
-) -> Vec<P> {
+) -> Vec<T> {
     let footprint = |&j: &u32| Some((j as usize, sprites.footprint(view, j as usize, rounding)?));
     let footprints: Vec<(usize, Footprint)> = sprites.order.iter().filter_map(footprint).collect();
     let Raster { first: [left, top], cell, at, .. } = *raster;
@@ -182,7 +202,7 @@ pub(super) fn composed<P: Send + Clone>(
             }
         }
         on_row(n_rows);
-        pixels
+        here.zip(pixels).map(|(k, pixel)| finish(k, pixel)).collect::<Vec<T>>()
     });
     rows.concat()
 }
@@ -206,6 +226,7 @@ pub(super) struct Seen {
 }
 
 /// A blob's layer in one pixel.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Layer {
     /// Opacity that is drawn: 0 where only rounding could draw the blob.
     pub alpha: f64,

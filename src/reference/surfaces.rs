@@ -115,6 +115,7 @@ mod tests {
         near: 0.5,
         edge: Edge::at(3.0),
         smallest: 0.0,
+        slice: 0.0,
         shift: glam::DVec2::ZERO,
     };
 

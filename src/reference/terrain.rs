@@ -214,6 +214,7 @@ mod tests {
             near: 0.5,
             edge: Edge::at(3.0),
             smallest: 0.0,
+            slice: 0.0,
             shift: DVec2::ZERO,
         }
     }

@@ -6,6 +6,7 @@
 use glam::DVec3;
 
 use super::composite::{OpaquePixel, Rounding};
+use super::slices;
 use super::sprites::{Bounded, Seen, Sprites};
 use super::view::View;
 
@@ -13,6 +14,7 @@ use super::view::View;
 pub(super) const U: f64 = 1.0 / 16_777_216.0;
 
 /// A pixel while it is composed: exact values, and bounds on the device's differences.
+#[derive(Debug, Clone)]
 pub(super) struct Composed {
     /// Composed colour.
     pub color: DVec3,
@@ -29,8 +31,12 @@ pub(super) struct Composed {
 pub(super) type AddLayer = fn(&mut Composed, f64, f64, DVec3);
 
 impl Composed {
+    /// Nothing composed yet.
+    pub(super) const NOTHING: Composed =
+        Composed { color: DVec3::ZERO, passed: 1.0, off_color: DVec3::ZERO, off_passed: 0.0 };
+
     /// Adds a layer of opacity `alpha`, which the device has within `off`.
-    fn under(&mut self, alpha: f64, off: f64, radiance: DVec3) {
+    pub(super) fn under(&mut self, alpha: f64, off: f64, radiance: DVec3) {
         let (passed, here) = (self.passed, self.passed * alpha);
         // T = 1 - A is rounded; (T + dT)(a + da) - T a, rounded once.
         let off_one_minus = U * (passed + self.off_passed);
@@ -51,7 +57,7 @@ impl Composed {
     }
 
     /// Returns the pixel over its background, and its bound. `most` is the brightest radiance.
-    fn over(
+    pub(super) fn over(
         &self,
         under: &OpaquePixel,
         r: &Rounding,
@@ -117,8 +123,12 @@ pub(super) fn render_by(of: &Composition<'_>, behind: &[OpaquePixel], layer: Add
 
 fn compose(of: &Composition<'_>, ray: DVec3, under: &OpaquePixel, layer: AddLayer) -> Composed {
     let Composition { view, sprites, rounding, .. } = of;
-    let mut pixel =
-        Composed { color: DVec3::ZERO, passed: 1.0, off_color: DVec3::ZERO, off_passed: 0.0 };
+    let mut pixel = Composed::NOTHING;
+    let opaque = (under.depth, under.depth_bound);
+    let is_sliced = view.slice > 0.0;
+    // Slices themselves end before what is opaque.
+    let hides = if is_sliced { (f64::INFINITY, 0.0) } else { opaque };
+    let mut layers = Vec::new();
     for &j in sprites.order.iter().rev() {
         let j = j as usize;
         let Some(seen) =
@@ -126,12 +136,16 @@ fn compose(of: &Composition<'_>, ray: DVec3, under: &OpaquePixel, layer: AddLaye
         else {
             continue;
         };
-        let opaque = (under.depth, under.depth_bound);
-        if let Some(found) = seen.layer(view, sprites, j, ray, opaque, rounding) {
-            layer(&mut pixel, found.alpha, found.off, sprites.radiance[j]);
+        match seen.layer(view, sprites, j, ray, hides, rounding) {
+            Some(found) if is_sliced => layers.push((j, found)),
+            Some(found) => layer(&mut pixel, found.alpha, found.off, sprites.radiance[j]),
+            None => {}
         }
     }
-    pixel
+    match is_sliced {
+        true => slices::pixel(view, sprites, &layers, ray, opaque, rounding),
+        false => pixel,
+    }
 }
 
 #[cfg(test)]
@@ -154,6 +168,7 @@ mod tests {
             near: 0.5,
             edge: Edge::at(3.0),
             smallest: 0.0,
+            slice: 0.0,
             shift: glam::DVec2::ZERO,
         };
         let at = |x: f64, z: f64, tau: f64| Blob {

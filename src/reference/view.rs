@@ -24,6 +24,8 @@ pub struct View {
     pub edge: Edge,
     /// Width in pixels of σ below which blobs are left out; 0 leaves out none.
     pub smallest: f64,
+    /// Thickness of a slice; 0 where blobs are composed one after the other.
+    pub slice: f64,
     /// Offset of the rays from the pixels' centres, to the right and down, pixels within ±½.
     pub shift: DVec2,
 }
@@ -39,6 +41,7 @@ impl View {
         near: 0.5,
         edge: Edge::at(3.0),
         smallest: 0.0,
+        slice: 0.0,
         shift: DVec2::ZERO,
     };
 }

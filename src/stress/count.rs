@@ -90,6 +90,7 @@ fn record(n: u32, drawn: &DrawnCount) -> (u32, f64, f64) {
         sigma_max: 1.0,
         sigma_y_max: 1.0,
         sigma_mean: 1.0,
+        sigma_by_area: 1.0,
         kappa_max: 1.0,
         mass_max: 1.0,
         gust_reach: 0.0,

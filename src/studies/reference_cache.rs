@@ -106,7 +106,7 @@ pub(super) fn hash_of(
 
 /// Returns `scene` with every setting that this kind of reference ignores at a fixed value.
 fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
-    let scene = ReferenceKind::without_approximations(scene);
+    let scene = against.without_approximations(scene);
     let Lighting { mode, grid, step, forward, facets_per_cloud, .. } = scene.lighting;
     let by_model = matches!(against, ReferenceKind::Model | ReferenceKind::Reflections(_));
     let (grid, step, facets_per_cloud) =

@@ -20,7 +20,7 @@ use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
 use nimbus::reference::composite::{OpaquePixel, Rounding};
-use nimbus::reference::sort::{depths, key32, order};
+use nimbus::reference::sort::{depths, distances, key32, order};
 use nimbus::reference::sprites::{Sprites, render_over};
 use nimbus::reference::texture::{Pool, SplatTexture, Textured};
 use nimbus::reference::view::View;
@@ -83,6 +83,7 @@ impl Picture {
             near,
             edge: Edge::at(3.0),
             smallest: 0.0,
+            slice: 0.0,
             shift: DVec2::ZERO,
         };
         Picture {
@@ -115,6 +116,12 @@ impl Picture {
             color,
             kappa,
         });
+        self
+    }
+
+    /// Composes overlapping blobs by slices of this thickness.
+    pub fn sliced(mut self, slice: f64) -> Picture {
+        self.view.slice = slice;
         self
     }
 
@@ -179,7 +186,12 @@ impl Picture {
             return order.clone();
         }
         let positions: Vec<DVec3> = self.placed.iter().map(|p| double(p.position)).collect();
-        let keys = depths(self.view.pose.forward, &positions).into_iter().map(|z| key32(z as f32));
+        let pose = &self.view.pose;
+        let depths = match self.view.slice > 0.0 {
+            true => distances(pose.position, &positions),
+            false => depths(pose.forward, &positions),
+        };
+        let keys = depths.into_iter().map(|z| key32(z as f32));
         let order = order(&keys.collect::<Vec<_>>());
         order.into_iter().filter(|i| self.weight(*i as usize) > 0.0).collect()
     }
@@ -263,7 +275,7 @@ impl Picture {
     /// Returns the largest error of the shaders' α and edges over all pixels of all blobs, by
     /// running bounds.
     pub fn rounding(&self, format: FilmFormat) -> Rounding {
-        let (off_alpha, edge) = self.worst(false);
+        let [off_alpha, edge, _] = self.worst(false);
         let mut rounding = Rounding::of(format, off_alpha, edge);
         // Besides the store into the target there are four f32 roundings: L1 + L2, α·L, (1 − α)·C
         // and their sum.
@@ -272,9 +284,10 @@ impl Picture {
         rounding
     }
 
-    /// Returns the relative error of an opacity and of a sprite's edge, in tiles or as sprites.
-    pub fn worst(&self, tiled: bool) -> (f64, f64) {
-        let (mut off_alpha, mut edge) = (ONE_MINUS_EXP, 8.0 * U);
+    /// Returns the relative error of an opacity, of a sprite's edge and of an optical depth, in
+    /// tiles or as sprites.
+    pub fn worst(&self, tiled: bool) -> [f64; 3] {
+        let (mut off_alpha, mut edge, mut off_tau) = (ONE_MINUS_EXP, 8.0 * U, 8.0 * U);
         for ((blob, placed), sheet) in self.blobs().iter().zip(&self.placed).zip(self.sheets()) {
             let c = blob.position - self.view.pose.position;
             if !(c.dot(self.view.pose.forward) >= self.view.near
@@ -326,10 +339,11 @@ impl Picture {
                     // d(1 − e^{−t})/dt = e^{−t}.
                     let off = (-(t.value - t.error)).exp() * t.error + ONE_MINUS_EXP * true_alpha;
                     off_alpha = off_alpha.max(off / true_alpha);
+                    off_tau = off_tau.max(t.error / t.value);
                 }
             }
         }
-        (off_alpha, edge)
+        [off_alpha, edge, off_tau]
     }
 
     /// Returns the error of the shaders' ln(τ₀/threshold), or of their log2.

@@ -239,6 +239,7 @@ impl Picture {
             threshold,
             least,
             saturated,
+            slice: self.view.slice,
             extents: None,
         };
         let start = if self.scenery.is_some() { LoadOp::Load } else { LoadOp::Clear };
@@ -271,6 +272,7 @@ impl Picture {
             has_under: self.scenery.is_some(),
             // One rounding above the blobs' own numbers in f32.
             tau_max: tau_max * (1.0 + 8.0 * U),
+            slices: self.view.slice > 0.0,
             portable: tiled.portable,
             max_pairs: tiled.max_pairs,
             max_tiles: tiled.max_tiles,

@@ -42,9 +42,9 @@ impl Picture {
         saturated: f64,
         by_tiles: bool,
     ) -> (Vec<f64>, Vec<f64>) {
-        let (off_alpha, edge) = self.worst(by_tiles);
-        let rounding =
-            Rounding { depth: crate::picture::DEPTH, ..Rounding::of(format, off_alpha, edge) };
+        let [off_alpha, edge, tau] = self.worst(by_tiles);
+        let depth = crate::picture::DEPTH;
+        let rounding = Rounding { depth, tau, ..Rounding::of(format, off_alpha, edge) };
         let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());
         let behind: Vec<OpaquePixel> = match &self.scenery {
             None => vec![OpaquePixel::EMPTY; self.view.width as usize * self.view.height as usize],

@@ -41,6 +41,7 @@ fn view(width: u32, height: u32) -> View {
         near: 0.1,
         edge: Edge::at(3.0),
         smallest: 0.0,
+        slice: 0.0,
         shift: DVec2::ZERO,
     }
 }

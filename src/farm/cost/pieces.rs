@@ -30,9 +30,10 @@ impl PieceAmounts {
     pub fn new(work: &ReferenceWork, loaded: &LoadedScene) -> Result<PieceAmounts> {
         let (scene, of) = (work.scene(loaded), work.reference()?);
         let truth = FrameReference::unlit(&scene, scene.time.at(work.frame))?;
-        let edge = if of == ReferenceKind::Thin { scene.draw.edge() } else { VOLUME_EDGE };
+        let is_drawn = matches!(of, ReferenceKind::Thin | ReferenceKind::Slices);
+        let edge = if is_drawn { scene.draw.edge() } else { VOLUME_EDGE };
         // The light of the other references uses no grid.
-        let has_grid = matches!(of, ReferenceKind::Thin | ReferenceKind::Volume);
+        let has_grid = is_drawn || of == ReferenceKind::Volume;
         let visits = if has_grid { CellVisits::new(&scene, &truth) } else { CellVisits::default() };
         let layers = Layers::new(&scene, &truth, edge);
         Ok(PieceAmounts { scene, of, layers, visits })

@@ -3,7 +3,7 @@
 use super::rule::Candidate;
 use crate::model::cutoff::Cutoff;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors};
+use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, Overlap};
 
 /// The effect of a knob's values besides the time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +15,9 @@ pub enum Changes {
     Nothing,
     /// The picture, within `draw.error`.
     Picture,
+    /// The picture, within `draw.error` of the first value's, which becomes the exact one: it is
+    /// nearer to the model than all before.
+    Model,
 }
 
 /// A knob that can be "auto".
@@ -39,15 +42,28 @@ const THRESHOLDS: [f64; 4] = [0.0, 1e-5, 1e-4, 1e-3];
 /// Pixels.
 const SMALLEST: [f64; 4] = [0.0, 0.25, 0.5, 1.0];
 
-pub const KNOBS: [Knob; 6] = [
+pub const KNOBS: [Knob; 7] = [
     Knob {
         key: "path",
         changes: Changes::Rounding,
         is_auto: |draw| draw.path == DrawPath::Auto,
-        values: |draw| {
-            [DrawPath::Sprites, DrawPath::Tiles].map(|path| Draw { path, ..*draw }).to_vec()
+        values: |draw| match draw.overlap {
+            Overlap::Slices => vec![*draw],
+            _ => [DrawPath::Sprites, DrawPath::Tiles].map(|path| Draw { path, ..*draw }).to_vec(),
         },
         name: |draw| toml_name(&DrawPath::NAMES, draw.path),
+    },
+    Knob {
+        key: "overlap",
+        changes: Changes::Model,
+        is_auto: |draw| draw.overlap == Overlap::Auto,
+        values: |draw| match draw.path {
+            DrawPath::Tiles => {
+                [Overlap::Slices, Overlap::Thin].map(|overlap| Draw { overlap, ..*draw }).to_vec()
+            }
+            _ => vec![*draw],
+        },
+        name: |draw| toml_name(&Overlap::NAMES, draw.overlap),
     },
     Knob {
         key: "chunks",
@@ -105,7 +121,9 @@ impl Knob {
             (_, None) => false,
             (Changes::Rounding, Some(_)) => true,
             (Changes::Nothing, Some(rmse)) => rmse <= error,
-            (Changes::Picture, Some(rmse)) => rmse <= error && (error > 0.0 || candidate.is_first),
+            (Changes::Picture | Changes::Model, Some(rmse)) => {
+                rmse <= error && (error > 0.0 || candidate.is_first)
+            }
         }
     }
 
@@ -141,6 +159,8 @@ pub mod tests {
         chunks: Chunks::Auto,
         cutoff: Reach::Sigmas(3.0),
         threshold: Cutoff::Auto,
+        overlap: Overlap::Auto,
+        slice: 1.25,
         cull: Cull::Auto,
         smallest: Cutoff::Auto,
         sort_bits: SortBits::Wide,

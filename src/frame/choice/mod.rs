@@ -52,6 +52,9 @@ impl Renderer {
             if values.len() < 2 {
                 continue;
             }
+            if knob.changes == Changes::Model {
+                exact = None;
+            }
             let (candidates, mut pictures) = trial.run(self, knob, &values, &mut exact)?;
             let taken = rule::fastest(&candidates, |c| knob.allows(c, scene.draw.error));
             if knob.changes == Changes::Rounding {
@@ -59,7 +62,8 @@ impl Renderer {
             }
             draw = values[taken];
             trial.take(self, draw)?;
-            let error = (knob.changes == Changes::Picture).then_some(scene.draw.error);
+            let changes_picture = matches!(knob.changes, Changes::Picture | Changes::Model);
+            let error = changes_picture.then_some(scene.draw.error);
             choices.push(Choice { key: knob.key, taken, candidates, error });
         }
         self.reset();

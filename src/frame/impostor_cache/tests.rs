@@ -45,6 +45,7 @@ fn packet(x: f64, z: f64) -> Packet {
         heaviest: 1.0,
         radius: 12.0,
         sort_bits: 32,
+        slice: 1.0,
         extents: (0..20).map(extent).collect(),
     }
 }
@@ -159,28 +160,4 @@ fn a_surface_among_distant_blobs_forbids_a_layer() {
             assert!(is_whole(&layer) || layer.shell.far.nearest > 11.0);
         }
     }
-}
-
-#[test]
-fn sort_keys_separate_near_and_far_where_depths_do() {
-    // The sort's key of a depth.
-    let key = |z: f32| {
-        let bits = z.to_bits();
-        !(if bits & 0x8000_0000 != 0 { !bits } else { bits | 0x8000_0000 })
-    };
-    for cut in [-3.7, -1e-30, 0.0, 0.5, 11.25] {
-        let (last, quantum) = last_key(cut, 12.0, 32).expect("a key");
-        assert_eq!(quantum, 0.0);
-        for z in [-20.0, cut - 1e-3, cut, cut + 1e-3, 20.0] {
-            assert_eq!(key(z as f32) <= last, z as f32 >= cut as f32, "{cut} {z}");
-        }
-        let (last, quantum) = last_key(cut, 12.0, 16).expect("a key");
-        for z in [-11.9, cut - 2.0 * quantum, cut - 1e-9, cut, cut + 2.0 * quantum, 11.9] {
-            let key = ((12.0 - z) * (65536.0 / 24.0)).clamp(0.0, 65535.0) as u32;
-            // Every depth beyond the cut is far, and no depth more than a quantum before it.
-            assert!(key <= last || z < cut, "{cut} {z}");
-            assert!(key > last || z >= cut - quantum, "{cut} {z}");
-        }
-    }
-    assert!(last_key(12.5, 12.0, 16).is_none() && last_key(f64::NAN, 12.0, 32).is_none());
 }

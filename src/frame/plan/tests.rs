@@ -26,6 +26,7 @@ const FEATURES: SceneFeatures = SceneFeatures {
     culls: false,
     path: DrawPath::Sprites,
     is_low_res: false,
+    is_sliced: false,
 };
 const KEPT: SceneFeatures = SceneFeatures { has_second: true, tensors: Tensors::Kept, ..FEATURES };
 /// The features of a scene that needs every pass.
@@ -66,6 +67,7 @@ fn packet() -> Packet {
         heaviest: 1.0,
         radius: 1.0,
         sort_bits: 32,
+        slice: 1.0,
         extents: vec![],
     }
 }

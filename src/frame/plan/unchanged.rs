@@ -103,7 +103,10 @@ impl Unchanged {
                 // The density of particles does not order them.
                 let range = |d: &DrawnRecord| (d.shift, d.end);
                 a.drawn.iter().map(range).eq(b.drawn.iter().map(range))
-                    && a.camera.forward == b.camera.forward
+                    && match features.is_sliced {
+                        true => a.camera.eye == b.camera.eye,
+                        false => a.camera.forward == b.camera.forward,
+                    }
                     && (a.radius, a.sort_bits) == (b.radius, b.sort_bits)
             });
         // Whether a particle can show depends on all of the camera, and on its density.

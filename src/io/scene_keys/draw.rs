@@ -9,7 +9,7 @@ use crate::model::count::Count;
 use crate::model::cutoff::Cutoff;
 use crate::model::edge::{FARTHEST, Reach};
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, MAX_CHUNKS};
+use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, MAX_CHUNKS, Overlap};
 use crate::model::sort_bits::SortBits;
 
 fn cutoff(bounds: Bounds) -> Spec<Cutoff> {
@@ -52,6 +52,12 @@ keys! { DRAW: fn draw(s) -> Draw { Draw;
     chunks: chunks();
     /// Optical depth below which a particle ends.
     threshold: cutoff(Bounds::From(0.0, 1.0));
+    /// How particles that overlap are composed: one after the other, as if each were thin; by
+    /// slices, of which each particle has its own share, on the path "tiles"; or whichever is faster
+    /// at the first frame within `error` of the slices.
+    overlap: choice("thin", &Overlap::NAMES);
+    /// Thickness of a slice, in mean σ of the particles.
+    slice: number(1.25, Bounds::Within(0.1, 10.0)), "σ";
     /// Whether particles that show in no pixel are left out before the sort. No pixel changes.
     cull: choice("on", &Cull::NAMES);
     /// With `cull`, σ on the screen below which a particle is left out.
@@ -96,6 +102,11 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
             let what = "expected 0 where draw.path is \"tiles\", the default: only \"sprites\" are \
                         drawn in chunks";
             return Err(s.fault("chunks", what));
+        }
+        if draw.path == DrawPath::Sprites && draw.overlap == Overlap::Slices {
+            let what = "expected \"thin\" where draw.path is \"sprites\": only \"tiles\", the \
+                        default, are composed by slices";
+            return Err(s.fault("overlap", what));
         }
         let has_smallest = draw.smallest != Cutoff::NONE;
         if has_smallest && draw.cull == Cull::Off {

@@ -48,8 +48,8 @@ record! {
 record! {
     /// Push constants of `tiles_clear.comp`.
     pub struct ClearPush {
-        /// Pixels of the picture.
-        n_pixels: u32,
+        /// Fours of the state.
+        n_fours: u32,
         /// Padding.
         unused: u32,
     }
@@ -118,5 +118,7 @@ record! {
         y_up: f32,
         /// The scene's y along the camera's forward.
         y_forward: f32,
+        /// The near plane's distance over the thickness of a slice; 0 without slices.
+        near_in_slices: f32,
     }
 }

@@ -9,12 +9,18 @@ use crate::passes::blobs::{BlobView, Extent};
 
 /// Splats of a block; the shaders' BLOCK.
 pub const BLOCK: u32 = 256;
-/// Iterations of a tile's loops for each block, if its invocations are one subgroup: one for each
-/// splat is more than the 0.8 that they take.
-const ITERATIONS_PER_BLOCK: u32 = BLOCK;
-/// The same without subgroup operations, where an invocation also counts what the others have
-/// found: up to 1.6 for each splat.
-const ITERATIONS_PER_BLOCK_PORTABLE: u32 = 2 * BLOCK;
+/// Iterations of a tile's loops for each splat, if its invocations are one subgroup: more than the
+/// 0.8 that they take.
+const ITERATIONS_OF_SPLAT: u32 = 1;
+/// Further ones without subgroup operations, where an invocation also counts what the others have
+/// found: 0.8.
+const ITERATIONS_OF_COUNT: u32 = 1;
+/// Further ones with slices, where splats are taken one by one, with two turns for each eight: 0.75.
+const ITERATIONS_OF_SHARES: u32 = 1;
+/// The most slices between the nearest and the farthest centre of a frame's blobs.
+pub const MAX_SLICES: u32 = 1024;
+/// Iterations of a tile's loops for each slice: one closes it, one begins its splats.
+const ITERATIONS_OF_SLICE: u32 = 2;
 /// The most blocks of a frame: workgroups along x that every device has.
 const MAX_BLOCKS_OF_FRAME: u32 = 65_535;
 /// The most pairs held at once on any device: 512 MiB, and as much for the sort.
@@ -23,8 +29,34 @@ const MAX_PAIRS: u64 = 1 << 26;
 const PAIRS_PER_ITERATION: u64 = SORT_TILE / 4;
 /// Entries of a tile of the sort.
 const SORT_TILE: u64 = 1024;
-/// Bytes of a pixel that a round hands to the next: four floats.
-const STATE_BYTES: u64 = 16;
+
+/// Returns the fours of floats of a pixel that a round hands to the next.
+pub(super) fn state_fours(slices: bool) -> u64 {
+    if slices { 6 } else { 1 }
+}
+
+/// How tiles are composed, as far as the loops of a round depend on it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Form {
+    /// A tile's invocations use subgroup operations.
+    pub is_one_subgroup: bool,
+    /// Overlapping blobs are composed by slices.
+    pub slices: bool,
+}
+
+impl Form {
+    /// Returns the most blocks whose splats a tile may take all of, if its loops may have
+    /// `iterations`.
+    fn most_blocks(self, iterations: u32) -> u32 {
+        let without_subgroup = if self.is_one_subgroup { 0 } else { ITERATIONS_OF_COUNT };
+        let (of_shares, of_slices) = match self.slices {
+            true => (ITERATIONS_OF_SHARES, ITERATIONS_OF_SLICE * MAX_SLICES),
+            false => (0, 0),
+        };
+        let of_splat = ITERATIONS_OF_SPLAT + without_subgroup + of_shares;
+        (iterations.saturating_sub(of_slices) / (of_splat * BLOCK)).clamp(1, MAX_BLOCKS_OF_FRAME)
+    }
+}
 
 /// The rounds in which a picture is composed.
 #[derive(Debug, Clone, Copy)]
@@ -41,12 +73,12 @@ pub(super) struct Rounds {
 
 impl Rounds {
     /// Returns the rounds of `n_max` splats; `max_pairs` may lower the pairs held at once.
-    /// `is_one_subgroup`: a tile's invocations use subgroup operations.
     pub fn new(
         n_max: u32,
         division: &Division,
         limits: &Limits,
-        (max_pairs, is_one_subgroup): (Option<u64>, bool),
+        max_pairs: Option<u64>,
+        form: Form,
     ) -> Result<Rounds> {
         let n_blocks = n_max.div_ceil(BLOCK);
         if n_blocks > MAX_BLOCKS_OF_FRAME {
@@ -56,7 +88,8 @@ impl Rounds {
                  expected \"sprites\""
             )));
         }
-        let has_state_room = STATE_BYTES * division.n_pixels() <= limits.max_storage_buffer_bytes;
+        let state_bytes = 16 * state_fours(form.slices);
+        let has_state_room = state_bytes * division.n_pixels() <= limits.max_storage_buffer_bytes;
         let all = u64::from(n_max) * u64::from(division.n_bins);
         let a_block = u64::from(BLOCK) * u64::from(division.n_bins);
         let room = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes / 16) / 8;
@@ -65,11 +98,7 @@ impl Rounds {
         let iterations = limits.max_loop_iterations;
         let by_loops = PAIRS_PER_ITERATION.saturating_mul(u64::from(iterations) + 1);
         let max_pairs = max_pairs.unwrap_or(MAX_PAIRS.min(by_loops));
-        let a_block_takes = match is_one_subgroup {
-            true => ITERATIONS_PER_BLOCK,
-            false => ITERATIONS_PER_BLOCK_PORTABLE,
-        };
-        let most_blocks = (iterations / a_block_takes).clamp(1, MAX_BLOCKS_OF_FRAME);
+        let most_blocks = form.most_blocks(iterations);
         let capacity = least.min(all).min(room).min(max_pairs).max(2 * a_block);
         // Every round but the last has less room left than a block may need, or all blocks.
         let n_by_pairs = all.div_ceil(capacity - a_block) as u32;
@@ -77,7 +106,8 @@ impl Rounds {
         if n > 1 && !has_state_room {
             return Err(Error::limit(format!(
                 "draw.path = \"tiles\", the default: a picture of {}×{} is drawn in rounds where \
-                 the scene has {n_max} particles, and 16 bytes a pixel between them are more than \
+                 the scene has {n_max} particles, and {state_bytes} bytes a pixel between them are \
+                 more than \
                  this device's {} (maxStorageBufferRange); expected draw.path = \"sprites\"",
                 division.width, division.height, limits.max_storage_buffer_bytes
             )));

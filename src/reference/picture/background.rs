@@ -5,7 +5,8 @@ use glam::{DVec2, DVec3};
 use super::frame::FrameReference;
 use super::local_scene;
 use super::pixels::{Pixels, Tile};
-use crate::model::scene::{LightingMode, Scene};
+use crate::model::overlap::slice_length;
+use crate::model::scene::{LightingMode, Overlap, Scene};
 use crate::model::surface::Surface;
 use crate::model::terrain::Terrain;
 use crate::reference::composite::OpaquePixel;
@@ -16,6 +17,13 @@ use crate::reference::{surfaces, terrain};
 pub fn view(scene: &Scene, frame: &FrameReference) -> View {
     let mut pose = frame.state.pose;
     pose.position -= frame.state.light_origin;
+    let slice = match scene.draw.overlap {
+        Overlap::Slices => {
+            let groups = scene.grown(&frame.groups, frame.state.time_s);
+            slice_length(scene.draw.slice, &groups, frame.state.radius)
+        }
+        Overlap::Thin | Overlap::Auto => 0.0,
+    };
     View {
         width: scene.film.width,
         height: scene.film.height,
@@ -24,6 +32,7 @@ pub fn view(scene: &Scene, frame: &FrameReference) -> View {
         near: scene.camera.near,
         edge: scene.draw.edge(),
         smallest: scene.draw.smallest.bound(),
+        slice,
         shift: DVec2::ZERO,
     }
 }

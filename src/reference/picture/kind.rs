@@ -6,16 +6,18 @@ use std::str::FromStr;
 use crate::model::cutoff::Cutoff;
 use crate::model::edge::{FARTHEST, Reach};
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Scene};
+use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Overlap, Scene};
 use crate::model::sort_bits::SortBits;
 
-/// A reference picture, as `--against thin|volume|model|reflections=K` names it. Each kind drops
+/// A reference picture, as `--against thin|slices|volume|model|reflections=K` names it. Each kind drops
 /// an approximation that the kind before it still shares with the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReferenceKind {
     /// The scene's lighting method in f64 with areas integrated, drawn as sorted thin sprites
     /// without cutoff.
     Thin,
+    /// The same light; the same blobs composed by slices of `draw.slice`.
+    Slices,
     /// The same light; the integral over the overlapping blobs.
     Volume,
     /// The model's own light without density grid or grouped facets, the integral over the
@@ -38,11 +40,12 @@ impl FromStr for ReferenceKind {
         };
         match text {
             "thin" => Ok(ReferenceKind::Thin),
+            "slices" => Ok(ReferenceKind::Slices),
             "volume" => Ok(ReferenceKind::Volume),
             "model" => Ok(ReferenceKind::Model),
             _ => reflections().ok_or_else(|| {
                 format!(
-                    "expected thin, volume, model or reflections=K with K from 1 to \
+                    "expected thin, slices, volume, model or reflections=K with K from 1 to \
                      {MAX_REFLECTIONS}, found \"{text}\""
                 )
             }),
@@ -54,6 +57,7 @@ impl fmt::Display for ReferenceKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             ReferenceKind::Thin => f.write_str("thin"),
+            ReferenceKind::Slices => f.write_str("slices"),
             ReferenceKind::Volume => f.write_str("volume"),
             ReferenceKind::Model => f.write_str("model"),
             ReferenceKind::Reflections(k) => write!(f, "reflections={k}"),
@@ -62,11 +66,24 @@ impl fmt::Display for ReferenceKind {
 }
 
 impl ReferenceKind {
-    /// Returns `scene` with every approximation of its drawing switched off: all particles, full
-    /// size, sprites out to 8 σ.
-    pub fn without_approximations(scene: &Scene) -> Scene {
+    /// Returns the kind that composes overlapping blobs as `scene`, in which nothing is "auto".
+    pub fn drawn_by(scene: &Scene) -> ReferenceKind {
+        match scene.draw.overlap {
+            Overlap::Slices => ReferenceKind::Slices,
+            Overlap::Thin | Overlap::Auto => ReferenceKind::Thin,
+        }
+    }
+
+    /// Returns `scene` with every approximation of its drawing switched off, but for this kind's
+    /// way of composing overlapping blobs: all particles, full size, out to 8 σ.
+    pub fn without_approximations(self, scene: &Scene) -> Scene {
+        let (path, overlap) = match self {
+            ReferenceKind::Slices => (DrawPath::Tiles, Overlap::Slices),
+            _ => (DrawPath::Sprites, Overlap::Thin),
+        };
         let draw = Draw {
-            path: DrawPath::Sprites,
+            path,
+            overlap,
             impostors: Impostors::Off,
             resolution: Resolution::Full,
             chunks: Chunks::Of(0),
@@ -91,6 +108,7 @@ impl ReferenceKind {
     pub fn accuracy_text(self, scene: &Scene, n_samples: u32) -> String {
         let mut parts = vec![match self {
             ReferenceKind::Thin => "sprites composed in f64: rounding",
+            ReferenceKind::Slices => "slices composed in f64: rounding",
             _ => "the volume's quadrature: its error estimate",
         }];
         let k = self.n_reflections(scene);
@@ -121,7 +139,7 @@ mod tests {
 
     #[test]
     fn names_parse_and_print_alike_and_others_are_refused() {
-        for text in ["thin", "volume", "model", "reflections=1", "reflections=64"] {
+        for text in ["thin", "slices", "volume", "model", "reflections=1", "reflections=64"] {
             assert_eq!(text.parse::<ReferenceKind>().unwrap().to_string(), text);
         }
         for text in [

@@ -36,12 +36,12 @@ pub struct PictureLayers {
 /// # Errors
 /// The references cannot draw the scene, or the frame cannot be computed.
 pub fn layers_as_set(scene: &Scene, time_s: f64, on_progress: OnProgress) -> Result<PictureLayers> {
-    check_scene(scene, time_s, BlobModel::Thin)?;
+    check_scene(scene, time_s, BlobModel::AsDrawn)?;
     let on_facet = |n| on_progress(RenderStage::Lighting, n);
     let frame = FrameReference::with_progress(scene, time_s, &on_facet)?;
     let pixels = Pixels::all(scene.film.width, scene.film.height);
     let picture = |frame: &FrameReference| {
-        let (model, sample) = (BlobModel::Thin, PixelSample::CENTER);
+        let (model, sample) = (BlobModel::AsDrawn, PixelSample::CENTER);
         render_lit_scene(scene, frame, model, &pixels, sample, on_progress).rgba
     };
     let beauty = picture(&frame);

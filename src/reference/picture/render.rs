@@ -46,7 +46,7 @@ impl ReferenceKind {
     ) -> Result<Reference> {
         let begin = Instant::now();
         self.check(scene, time_s)?;
-        let scene = &ReferenceKind::without_approximations(scene);
+        let scene = &self.without_approximations(scene);
         let drawing_since = OnceLock::new();
         let on_progress: OnProgress = &|stage, n| {
             if stage == RenderStage::Drawing {

@@ -34,7 +34,10 @@ impl ReferenceKind {
 
     /// Returns how this reference composes blobs.
     fn blob_model(self) -> BlobModel {
-        if self == ReferenceKind::Thin { BlobModel::Thin } else { BlobModel::Volume }
+        match self {
+            ReferenceKind::Thin | ReferenceKind::Slices => BlobModel::AsDrawn,
+            _ => BlobModel::Volume,
+        }
     }
 }
 

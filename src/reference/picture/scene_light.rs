@@ -18,8 +18,8 @@ use crate::reference::volume::{Pixel, Volume};
 /// How overlapping blobs are composed (model.md §9).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BlobModel {
-    /// Sorted thin sprites, as nimbus draws them.
-    Thin,
+    /// As `draw.overlap` says: as sorted thin sprites, or by slices.
+    AsDrawn,
     /// The integral over the overlapping blobs.
     Volume,
 }
@@ -77,10 +77,10 @@ pub fn render_lit_scene(
     let view = View { shift: sample.shift, ..view(scene, frame) };
     let opaque = opaque_pixels(scene, frame, &view, pixels);
     let radiance = frame.particle_radiance(scene);
-    if model == BlobModel::Thin {
+    if model == BlobModel::AsDrawn {
         let error = light_error + ROUNDING * brightest(&radiance);
         return RenderedPixels {
-            rgba: thin(scene, frame, &view, (&opaque, &radiance), pixels, on_progress),
+            rgba: drawn(scene, frame, &view, (&opaque, &radiance), pixels, on_progress),
             errors: vec![ErrorEstimate::from_quadrature(error); pixels.at.len()],
         };
     }
@@ -94,8 +94,9 @@ pub(super) fn brightest(radiance: &[DVec3]) -> f64 {
     radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max)
 }
 
-/// Draws thin sprites of the given radiance at `pixels` over the opaque ones.
-fn thin(
+/// Draws blobs of the given radiance at `pixels` over the opaque ones, as the scene's drawing
+/// settings say.
+fn drawn(
     scene: &Scene,
     frame: &FrameReference,
     view: &View,

@@ -161,7 +161,8 @@ pub fn drawn_by_settings(
     let view = View { shift, ..view(scene, frame) };
     let (mut opaque, behind) = solid_shares(scene, frame, &view, pixels);
     let (blobs, _) = drawn_blobs(scene, frame);
-    let rounding = rounding(scene, &view, &blobs);
+    let order = 2.0 * frame.state.radius / 65536.0;
+    let rounding = Rounding { order, ..rounding(scene, &view, &blobs) };
     for (pixel, shares) in opaque.iter_mut().zip(behind) {
         let alpha = pixel.color[3];
         pixel.color = PixelShares { of: shares, alpha }.color(radiance);

@@ -7,7 +7,7 @@ use super::pixels::Pixels;
 use crate::model::cloud::Group;
 use crate::model::count::MIN_DRAWN;
 use crate::model::frame_state::FrameState;
-use crate::model::scene::Scene;
+use crate::model::scene::{Overlap, Scene};
 use crate::reference::sprites::{Factor, Raster};
 use crate::reference::texture::{Pool, SplatTexture, Textured};
 use crate::reference::view::View;
@@ -50,32 +50,41 @@ pub(super) fn with_textures<T>(
 }
 
 /// Returns the blobs with κ scaled by the count law, and the order that the drawn ones are drawn
-/// in: far to near by exact view depth, ties by index.
+/// in: far to near by exact depth, ties by index.
 pub(super) fn drawn_blobs(scene: &Scene, frame: &FrameReference) -> (Vec<Blob>, Vec<u32>) {
     let weights = weights(scene, frame);
     let weighed = |(b, w): (&Blob, &f64)| Blob { kappa: b.kappa * w, ..*b };
     let blobs: Vec<Blob> = frame.blobs.iter().zip(&weights).map(weighed).collect();
-    let positions: Vec<DVec3> = blobs.iter().map(|b| b.position).collect();
-    let depths = sort::depths(frame.state.pose.forward, &positions);
+    let depths = depths(scene, frame, &blobs);
     let mut order: Vec<u32> =
         (0..blobs.len() as u32).filter(|&i| weights[i as usize] > 0.0).collect();
     order.sort_by(|&i, &j| depths[j as usize].total_cmp(&depths[i as usize]));
     (blobs, order)
 }
 
+/// Returns the depths that blobs are sorted by.
+fn depths(scene: &Scene, frame: &FrameReference, blobs: &[Blob]) -> Vec<f64> {
+    let positions: Vec<DVec3> = blobs.iter().map(|b| b.position).collect();
+    let FrameState { pose, light_origin, .. } = frame.state;
+    match scene.draw.overlap {
+        Overlap::Slices => sort::distances(pose.position - light_origin, &positions),
+        Overlap::Thin | Overlap::Auto => sort::depths(pose.forward, &positions),
+    }
+}
+
 /// Returns the order in which a device draws `blobs`, those of [`drawn_blobs`], by the keys that
 /// `draw.sort_bits` asks for.
 pub(super) fn set_order(scene: &Scene, frame: &FrameReference, blobs: &[Blob]) -> Vec<u32> {
     let (_, exact) = drawn_blobs(scene, frame);
-    let FrameState { pose, radius, time_s, .. } = frame.state;
+    let FrameState { radius, time_s, .. } = frame.state;
     let sigmas = place::sigma_means(&frame.groups, &scene.clouds, time_s);
     let sigmas = sigmas.iter().zip(blobs).map(|(sigma, blob)| sigma * blob.aspect.min(1.0));
     let sigma = sigmas.fold(f64::INFINITY, f64::min);
     if scene.draw.sort_bits.of(radius, sigma) > 16 {
         return exact;
     }
-    let mut order = exact;
-    let key = |i: &u32| sort::key16(pose.forward.dot(blobs[*i as usize].position), radius);
+    let (mut order, depths) = (exact, depths(scene, frame, blobs));
+    let key = |i: &u32| sort::key16(depths[*i as usize], radius);
     order.sort_unstable_by_key(|i| (key(i), *i));
     order
 }

@@ -26,6 +26,7 @@ fn view(n: u32) -> View {
         near: 1e-3,
         edge: Edge::at(9.0),
         smallest: 0.0,
+        slice: 0.0,
         shift: glam::DVec2::ZERO,
     }
 }

@@ -56,7 +56,7 @@ pub fn check(device: &DevicePicture, plan: &CheckPlan<'_>) -> Result<Check> {
     let begin = Instant::now();
     let film = device.scene.film;
     let pixels = checked_pixels(film.width, film.height);
-    let exact = &ReferenceKind::without_approximations(&device.scene);
+    let exact = &ReferenceKind::drawn_by(&device.scene).without_approximations(&device.scene);
     if let Err(error) = ReferenceKind::Thin.check(&device.scene, device.time_s) {
         let frame = FrameReference::unlit(exact, device.time_s)?;
         let found = Drawing::new(device, exact, &frame, &pixels).compare(None);

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::frame::GpuContext;
 use crate::measure::figure::Figure;
 use crate::measure::stats::median;
-use crate::model::scene::{LightingMode, Scene};
+use crate::model::scene::{LightingMode, Overlap, Scene};
 use crate::reference::picture::{
     BlobModel, FrameReference, ModelDrawing, OnProgress, PixelSample, Pixels, ReferenceKind,
     RenderStage, RenderedPixels, expected_time, n_reflections, render_lit_scene, render_model,
@@ -132,7 +132,7 @@ impl LedgerStudy<'_> {
         scene: &Scene,
         listener: OnProgress,
     ) -> Result<()> {
-        let scene = &ReferenceKind::without_approximations(scene);
+        let scene = &ReferenceKind::drawn_by(scene).without_approximations(scene);
         let light = &|n| listener(RenderStage::Lighting, n);
         let exact = FrameReference::with_progress(scene, self.frames.time_s, light)?;
         let is_lit = scene.lighting.mode != LightingMode::None;
@@ -147,9 +147,12 @@ impl LedgerStudy<'_> {
         let draw = |light: &FrameReference, drawing: BlobModel| {
             render_lit_scene(scene, light, drawing, self.pixels, PixelSample::CENTER, listener)
         };
-        self.add(Link::new("drawing", "f32", "f64"), draw(&by_device, BlobModel::Thin));
+        self.add(Link::new("drawing", "f32", "f64"), draw(&by_device, BlobModel::AsDrawn));
         if scene.n_particles() > 0 && !self.is_stopped() {
-            let link = Link::new("thin sprites", "sprites", "volume");
+            let link = match scene.draw.overlap {
+                Overlap::Slices => Link::new("slices", "slices", "volume"),
+                _ => Link::new("thin sprites", "sprites", "volume"),
+            };
             self.add(link, draw(&by_device, BlobModel::Volume));
         }
         if !is_lit || self.is_stopped() {
@@ -210,7 +213,7 @@ impl LedgerStudy<'_> {
         /// Most pictures in the light of the device or of its reference: one for each of the links
         /// "drawing", "thin sprites", "first reflection" and "second reflection".
         const N_OTHERS: f64 = 4.0;
-        let scene = &ReferenceKind::without_approximations(self.scene);
+        let scene = &ReferenceKind::drawn_by(self.scene).without_approximations(self.scene);
         let (mut sum, mut drawing_s) = (0.0, 0.0);
         for (_, how) in self.models(scene) {
             let time = expected_time(how.n_reflections, scene, self.frames.time_s, self.pixels)?;

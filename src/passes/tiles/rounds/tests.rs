@@ -17,6 +17,8 @@ fn camera(tan_x: f32, tan_y: f32) -> CameraRecord {
     }
 }
 
+const THIN: Form = Form { is_one_subgroup: true, slices: false };
+
 fn view<'a>(camera: &'a CameraRecord, extents: &'a [Extent]) -> BlobView<'a> {
     BlobView {
         camera,
@@ -24,6 +26,7 @@ fn view<'a>(camera: &'a CameraRecord, extents: &'a [Extent]) -> BlobView<'a> {
         threshold: 0.0,
         least: 0.0,
         saturated: 0.0,
+        slice: 0.0,
         extents: Some(extents),
     }
 }
@@ -90,7 +93,7 @@ fn far_blobs_need_few_rounds_and_unknown_ones_all() {
     let division = Division::new(3840, 2160, 32).expect("few bins");
     let camera = camera(0.7, 0.4);
     for n in [50_000, 1_000_000, 4_000_000] {
-        let rounds = Rounds::new(n, &division, &limits, (None, true)).expect("it fits");
+        let rounds = Rounds::new(n, &division, &limits, None, THIN).expect("it fits");
         let far = [extent(DVec3::NEG_Z * 18.0, 4.0, 0.06, n)];
         assert!(rounds.of_frame(&division, &view(&camera, &far)) <= 1 + n / 2_000_000, "{n}");
         let unknown = BlobView { extents: None, ..view(&camera, &[]) };
@@ -103,7 +106,25 @@ fn far_blobs_need_few_rounds_and_unknown_ones_all() {
     }
     // llvmpipe's loops bound the blocks of a round.
     let llvmpipe = Limits { max_loop_iterations: 65_535, ..limits };
-    let rounds = Rounds::new(1_000_000, &division, &llvmpipe, (None, true)).expect("it fits");
+    let rounds = Rounds::new(1_000_000, &division, &llvmpipe, None, THIN).expect("it fits");
     let far = [extent(DVec3::NEG_Z * 18.0, 4.0, 0.06, 1_000_000)];
     assert_eq!(rounds.of_frame(&division, &view(&camera, &far)), 16);
+}
+
+#[test]
+fn loops_with_slices_end_before_a_device_ends_them() {
+    // What a tile may turn for all splats of a round and the slices among them.
+    for (form, of_splat, of_slice) in [
+        (THIN, 1, 0),
+        (Form { slices: true, ..THIN }, 2, 2),
+        (Form { is_one_subgroup: false, slices: false }, 2, 0),
+        (Form { is_one_subgroup: false, slices: true }, 3, 2),
+    ] {
+        for iterations in [10_000, 65_535, 10_000_000] {
+            let n = form.most_blocks(iterations);
+            let turns = n * BLOCK * of_splat + MAX_SLICES * of_slice;
+            assert!(turns <= iterations && turns + of_splat * BLOCK > iterations, "{form:?} {n}");
+        }
+    }
+    assert_eq!(Form { slices: true, ..THIN }.most_blocks(1000), 1);
 }

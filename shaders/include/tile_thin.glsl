@@ -1,0 +1,48 @@
+// Composition near to far of splats that are thin: C += (1 - A) a L, A += (1 - A) a, a the opacity
+// of the whole splat, at its centre (passes.md "tiles"). Needs the row of tiles.comp.
+
+#if THIN
+// Returns 1 - e^-t for t in [0, 1/8]: t times the cubic through (1 - e^-t)/t at Chebyshev's points,
+// within 1.6e-8 of it.
+float opacity(float t) {
+    return t
+           * ((0.999999984752 - t * 0.499996093888)
+              + t * t * (0.166509869621 - t * 0.039641773912));
+}
+#else
+float opacity(float t) { return one_minus_exp(t); }
+#endif
+
+void compose(Loaded splat, float y) {
+    // Radiance, near/z.
+    vec4 light = uintBitsToFloat(splat.fours[1]);
+    float tau[RUN], passed[RUN];
+    bool shows[RUN];
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        // Each pixel decides by itself, so that it does not depend on which others are drawn.
+        passed[j] = 1.0 - alpha[j];
+        shows[j] = !(passed[j] < saturated);
+#if BEHIND
+        shows[j] = shows[j] && light.w >= depth_of[j];
+#endif
+    }
+    find_depths(splat, y, shows, tau);
+    [[unroll]] for (uint j = 0; j < RUN; ++j) { tau[j] = opacity(tau[j]); }
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        float here = passed[j] * tau[j];
+        alpha[j] += here;
+        color[j] += here * light.xyz;
+    }
+}
+
+// Composes the `end` first splats that the invocations have loaded.
+void compose_loaded(Loaded splat, uint end, float y) {
+    // By twos: a loop writes its carried values again in each iteration, and the number of
+    // iterations bounds the splats of a round (passes.md "tiles").
+    uint m = 0;
+    do {
+        compose(of_invocation(splat, m), y);
+        compose(of_invocation(splat, m + 1), y);
+        m += 2;
+    } while (m < end);
+}

@@ -83,7 +83,7 @@ fn good(name: &str, id: &str) -> &'static [&'static str] {
         (_, "jobs" | "tries" | "nodes") => &["1", "2"],
         (_, "reflections") => &["2", "3"],
         (_, "pixels") => &["16", "all"],
-        (_, "against" | "reference") => &["thin", "volume", "model", "reflections=2"],
+        (_, "against" | "reference") => &["thin", "slices", "volume", "model", "reflections=2"],
         (_, "knob" | "sweep") => &["draw.cutoff=2,3", "lighting.grid=8,9"],
         (_, "told") => &["--rounds", "--grid"],
         (_, "a" | "b" | "runs") => &["run", "a.png", "a.exr", "study"],

@@ -61,11 +61,12 @@ pub enum Command {
     /// Draw one frame to a PNG or EXR file
     ///
     /// With --reference the frame is drawn in f64 on the processor, without a Vulkan device and
-    /// without shaders (docs/explanation/model.md §9). There are four references, each without an
+    /// without shaders (docs/explanation/model.md §9). There are five references, each without an
     /// approximation of the one before it.
     ///
     /// "thin" draws the same sprites as the device, sorted by exact depth; it differs from the
-    /// device by arithmetic alone. "volume" integrates light through the overlapping blobs, to
+    /// device by arithmetic alone. "slices" does so with overlapping blobs composed by slices
+    /// (draw.overlap). "volume" integrates light through the overlapping blobs, to
     /// about a millionth of the brightest. "model" also computes the light on the blobs by the
     /// model itself, and the light on surfaces pixel by pixel. "reflections=K" computes K
     /// reflections. --samples takes the mean over each pixel's area, and more random paths, instead
@@ -122,8 +123,9 @@ pub enum Command {
     /// 95 % intervals.
     ///
     /// References (--against), each without an approximation of the one before it: "thin", the
-    /// sprites in f64, uncut, in the scene's own light; "volume", the integral over the overlapping
-    /// blobs in that light; "model", in light without density grid, facet groups, basis and pairs;
+    /// sprites in f64, uncut, in the scene's own light; "slices", the same blobs by slices;
+    /// "volume", the integral over the overlapping blobs in that light; "model", in light without
+    /// density grid, facet groups, basis and pairs;
     /// "reflections=K", with K reflections, those beyond the second by random paths. For knobs of
     /// lighting use one of the last two.
     ///

@@ -116,8 +116,8 @@ impl Impostors {
 
     /// Parts the first `n_entries` entries into those of the layer and the others.
     ///
-    /// With `cut`, an axis and a depth, particles of at least that depth along the axis, relative to
-    /// the lighting origin, become the new members of the layer; without, the members stay.
+    /// With `cut`, an axis and a depth relative to the lighting origin, particles of at least that
+    /// depth along the axis become the new members of the layer; without, the members stay.
     ///
     /// # Errors
     /// Fails if a buffer does not fit the shader's binding.

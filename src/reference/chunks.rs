@@ -5,9 +5,10 @@
 
 use glam::DVec3;
 
+use super::composed::{Composed, U};
 use super::composite::OpaquePixel;
 use super::sprites::Bounded;
-use super::tiles::{Composed, Composition, U, render_by};
+use super::tiles::{Composition, render_by};
 
 /// Blends a layer: C ← C + (1 − A) α L, A ← A + (1 − A) α. The device stores A, so the error of the
 /// transmittance is a share of 1, not of itself.

@@ -7,8 +7,10 @@
 
 pub mod area;
 pub mod blob;
+mod blob_layers;
 pub mod bounded;
 pub mod chunks;
+mod composed;
 pub mod composite;
 pub mod contract;
 pub mod count;

@@ -9,9 +9,9 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use glam::DVec3;
 
+use super::blob_layers::{Layer, Raster, Shares, Sprites, composed};
+use super::composed::{Composed, U};
 use super::composite::{OpaquePixel, Rounding};
-use super::sprites::{Layer, Raster, Shares, Sprites, composed};
-use super::tiles::{Composed, U};
 use super::view::View;
 
 /// Boundaries of slices that part a blob, before and at the one nearest to its centre.

@@ -3,9 +3,9 @@
 //!
 //! In: blobs and eye relative to O. Out: a record for each pixel. No sum depends on the order.
 
+use super::blob_layers::{Layer, Raster, Sprites, composed};
+use super::composed::U;
 use super::composite::{OpaquePixel, Rounding};
-use super::sprites::{Layer, Raster, Sprites, composed};
-use super::tiles::U;
 use super::view::View;
 
 /// Roundings of f32 from a view depth to near/z, and back.

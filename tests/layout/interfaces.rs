@@ -71,7 +71,7 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, "8 4"),
     ("impostors.frag", impostors::Push::FIELDS, "T"),
     ("impostors.vert", impostors::Push::FIELDS, ""),
-    ("impostors_part.comp", impostors::PartPush::FIELDS, "8 4 8 8"),
+    ("impostors_part.comp", impostors::PartPush::FIELDS, "8 4 8 8 Placed"),
     ("live.comp", live::Push::FIELDS, "Disc Particle"),
     ("morton_key.comp", morton::KeyPush::FIELDS, "Facet RegionBounds 8"),
     ("morton_order.comp", morton::OrderPush::FIELDS, "8 4"),

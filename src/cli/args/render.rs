@@ -35,7 +35,7 @@ pub struct RenderArgs {
     /// Time in seconds, in place of a frame number
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub time: Option<f64>,
-    /// Draw a reference in f64 instead of the device's picture: thin, volume, model, or
+    /// Draw a reference in f64 instead of the device's picture: thin, slices, volume, model, or
     /// reflections=K
     #[arg(long, value_name = "WHICH")]
     #[arg(conflicts_with_all = ["device", "shaders", "validation", "guard", "max_submit_ms"])]

@@ -137,6 +137,13 @@ fn each_change_runs_what_depends_on_it_and_no_more() {
     };
     assert_eq!(after(&|p| p.camera.eye[0] = 1.0), ["sprites"]);
     assert_eq!(after(&|p| p.camera.forward = [1.0, 0.0, 0.0]), ["sort", "sprites"]);
+    // Slices are shells about the eye.
+    let sliced = SceneFeatures { path: DrawPath::Tiles, is_sliced: true, ..FEATURES };
+    let [mut moved, mut turned] = [packet(), packet()];
+    moved.camera.eye[0] = 1.0;
+    turned.camera.forward = [1.0, 0.0, 0.0];
+    assert_eq!(running(&sliced, Some(&last), &moved), ["sort", "tiles"]);
+    assert_eq!(running(&sliced, Some(&last), &turned), ["tiles"]);
     assert_eq!(after(&|p| p.drawn[0].end = 5), ["sort", "sprites"]);
     assert_eq!(after(&|p| p.lights[0].energy[1] = 2.0), ["first", "sprites"]);
     assert_eq!(after(&|p| p.regions[0].kd[1] = 0.5), ["first", "sprites"]);

@@ -53,8 +53,8 @@ keys! { DRAW: fn draw(s) -> Draw { Draw;
     /// Optical depth below which a particle ends.
     threshold: cutoff(Bounds::From(0.0, 1.0));
     /// How particles that overlap are composed: one after the other, as if each were thin; by
-    /// slices, of which each particle has its own share, on the path "tiles"; or whichever is faster
-    /// at the first frame within `error` of the slices.
+    /// slices, of which each particle has its own share, on the path "tiles"; or whichever is
+    /// faster at the first frame within `error` of the slices.
     overlap: choice("thin", &Overlap::NAMES);
     /// Thickness of a slice, in mean σ of the particles.
     slice: number(1.25, Bounds::Within(0.1, 10.0)), "σ";

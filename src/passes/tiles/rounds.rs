@@ -15,7 +15,8 @@ const ITERATIONS_OF_SPLAT: u32 = 1;
 /// Further ones without subgroup operations, where an invocation also counts what the others have
 /// found: 0.8.
 const ITERATIONS_OF_COUNT: u32 = 1;
-/// Further ones with slices, where splats are taken one by one, with two turns for each eight: 0.75.
+/// Further ones with slices, where splats are taken one by one, with two turns for each eight:
+/// 0.75.
 const ITERATIONS_OF_SHARES: u32 = 1;
 /// The most slices between the nearest and the farthest centre of a frame's blobs.
 pub const MAX_SLICES: u32 = 1024;

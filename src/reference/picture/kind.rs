@@ -9,8 +9,8 @@ use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Overlap, Scene};
 use crate::model::sort_bits::SortBits;
 
-/// A reference picture, as `--against thin|slices|volume|model|reflections=K` names it. Each kind drops
-/// an approximation that the kind before it still shares with the device.
+/// A reference picture, as `--against thin|slices|volume|model|reflections=K` names it. Each kind
+/// drops an approximation that the kind before it still shares with the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReferenceKind {
     /// The scene's lighting method in f64 with areas integrated, drawn as sorted thin sprites

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::model::scene::{LightingMode, Scene};
+use crate::model::scene::{DrawPath, LightingMode, Overlap, Scene};
 use crate::timing::sweep::Axis;
 
 /// A scene key, the values worth comparing, and the scenes that it can change.
@@ -21,6 +21,8 @@ const KNOBS: &[Knob] = &[
         values: &["0.0", "0.001", "0.01", "0.03"],
         applies: has_particles,
     },
+    Knob { key: "draw.overlap", values: &["thin", "slices"], applies: draws_tiles },
+    Knob { key: "draw.slice", values: &["0.75", "1.25", "2.0"], applies: draws_slices },
     Knob { key: "draw.sort_bits", values: &["16", "32"], applies: has_particles },
     Knob { key: "draw.count", values: &["all", "distance"], applies: has_particles },
     Knob { key: "film.format", values: &["rgba8", "rgba16f", "rgba32f"], applies: |_| true },
@@ -55,6 +57,14 @@ pub fn default_axes(scene: &Scene) -> Vec<Axis> {
         values: knob.values.iter().map(|value| (*value).to_owned()).collect(),
     };
     KNOBS.iter().filter(|knob| (knob.applies)(scene)).map(axis).collect()
+}
+
+fn draws_tiles(scene: &Scene) -> bool {
+    has_particles(scene) && scene.draw.path == DrawPath::Tiles
+}
+
+fn draws_slices(scene: &Scene) -> bool {
+    draws_tiles(scene) && scene.draw.overlap == Overlap::Slices
 }
 
 fn has_particles(scene: &Scene) -> bool {

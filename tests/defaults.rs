@@ -75,6 +75,18 @@ fn no_cheaper_value_is_nearer_to_the_reference() {
 }
 
 #[test]
+fn of_slices_neither() {
+    // Thicker slices are fewer, and thin sprites need none. The integral over the volume tells.
+    for scene in ["scenes/study-cloud.toml", "scenes/study-both.toml"] {
+        let knobs = ["draw.slice=1.75,2.5", "draw.overlap=thin"];
+        let slices = ["--set", "draw.overlap=slices", "--size", "160x120"];
+        let found = errors(&[&[scene, "--against", "volume"], &slices[..]].concat(), &knobs);
+        assert_eq!(found.len(), n_rows(&knobs));
+        assert_eq!(as_near(&found), Vec::<String>::new(), "{scene}: {found:?}");
+    }
+}
+
+#[test]
 fn of_light_in_a_cloud_neither() {
     let found =
         errors(&["scenes/study-cloud.toml", "--against", "model", "--size", "200x150"], &LIGHT);

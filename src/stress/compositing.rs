@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::case::{Case, Comparison};
 use super::context::{DeviceFrame, StressContext};
 use super::scenes::{
-    HEIGHT, MIDDLE, PATHS, SPRITES, TILES, UNLIT, WIDTH, blob, blob_cluster, render_blobs,
+    HEIGHT, MIDDLE, PATHS, SLICES, SPRITES, TILES, UNLIT, WIDTH, blob, blob_cluster, render_blobs,
 };
 use crate::error::Result;
 use crate::model::cloud::Particle;
@@ -27,6 +27,12 @@ pub const CASES: &[Case] = &[
         what: "100 000 layers of opacity 1e-5 in tiles: 1 - (1 - a)^n",
         bound: "u of the value a layer, and 4 u",
         check: |ctx, c| thin(ctx, c, TILES),
+    },
+    Case {
+        name: "compositing/thin-slices",
+        what: "100 000 layers of opacity 1e-5 by slices: 1 - (1 - a)^n",
+        bound: "u of the value a layer, and 32 u",
+        check: |ctx, c| thin(ctx, c, SLICES),
     },
     Case {
         name: "compositing/thin-chunks",
@@ -111,6 +117,13 @@ pub const CASES: &[Case] = &[
             Ok(())
         },
     },
+    Case {
+        name: "compositing/slices",
+        what: "800 blobs by slices and one after the other: the same opacity, and a colour between \
+            the blobs'",
+        bound: "2^-22 a layer, and (2e-6 + 64 u) tau of all",
+        check: slices,
+    },
 ];
 
 /// Returns how far two evaluations of one pixel with `n` layers may be apart. The effect of the
@@ -141,15 +154,39 @@ fn thin(ctx: &mut StressContext, c: &mut Comparison, path: &str) -> Result<()> {
         // Blending rounds every layer by 2 u of what is written, of which (1 - a) remains: at most
         // 2 u/a of it, and as much again by second orders. Tiles: A + (1 - A) a, whose sum is
         // rounded by u; 1 - A and the product by 2 u of the summand, in total of A.
-        let bound = if path == TILES {
-            (U_F32 * n + 4.0 * U_F32) * truth
-        } else {
-            (2.0 * U_F32 * n).min(4.0 * U_F32 / a) * truth
+        // Slices: the sum of n depths is rounded as often. Shares, opacities and the colour's
+        // quotient err by some 20 u in the layer alone and in all of them.
+        let bound = match path {
+            TILES => (U_F32 * n + 4.0 * U_F32) * truth,
+            SLICES => (U_F32 * n + 32.0 * U_F32) * truth,
+            _ => (2.0 * U_F32 * n).min(4.0 * U_F32 / a) * truth,
         };
         c.add(all.channel(i, 3), truth, bound, format_args!("alpha, opacity {a:e} each"));
         for k in 0..3 {
             let at = format_args!("channel {k}, opacity {a:e} each");
             c.add(all.channel(i, k), color[k] * truth, bound, at);
+        }
+    }
+    Ok(())
+}
+
+fn slices(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    const N: u32 = 800;
+    let particles = blob_cluster(N);
+    let colors = || particles.iter().map(|p| p.color);
+    let least = colors().fold(DVec3::INFINITY, DVec3::min);
+    let most = colors().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let [a, b] =
+        [TILES, SLICES].map(|way| draw(ctx, &format!("{way}\ncutoff = 8"), particles.clone()));
+    let (a, b) = (a?, b?);
+    for i in 0..WIDTH * HEIGHT {
+        let alpha = b.channel(i, 3);
+        let bound = two_pictures_bound(a.channel(i, 3), N);
+        c.add(a.channel(i, 3), alpha, bound, format_args!("pixel {i}, opacity"));
+        for k in 0..3 {
+            let value = b.channel(i, k);
+            let allowed = value.clamp(least[k] * alpha, most[k] * alpha);
+            c.add(value, allowed, bound, format_args!("pixel {i}, channel {k}"));
         }
     }
     Ok(())

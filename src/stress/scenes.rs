@@ -39,6 +39,8 @@ pub const LIT: &str = "\
 pub const SPRITES: &str = "path = 'sprites'";
 /// Keys of `[draw]` that select the tile path.
 pub const TILES: &str = "path = 'tiles'";
+/// Keys of `[draw]` that compose by slices.
+pub const SLICES: &str = "path = 'tiles'\noverlap = 'slices'";
 /// Both drawing paths.
 pub const PATHS: [&str; 2] = [SPRITES, TILES];
 

@@ -126,10 +126,31 @@ pub const FAULTS: &[Fault] = &[
     ),
     (
         "colours accumulated in f16",
-        "tiles.comp",
+        "include/tile_thin.glsl",
         "color[j] += here * light.xyz;",
         "color[j] += here * light.xyz; color[j].xy = unpackHalf2x16(packHalf2x16(color[j].xy));",
         "compositing/paths",
+    ),
+    (
+        "no depth behind the last boundary",
+        "include/tile_slices.glsl",
+        "splat.within[m] : 1.0",
+        "splat.within[m] : splat.within[2]",
+        "compositing/slices",
+    ),
+    (
+        "a colour over twice the depth of its slice",
+        "include/tile_slices.glsl",
+        "here[j] / max(t[j], 1e-30)",
+        "here[j] / max(2.0 * t[j], 1e-30)",
+        "compositing/slices",
+    ),
+    (
+        "a slice closed as if it were thin",
+        "include/tile_slices.glsl",
+        "is_on ? one_minus_exp(t[j])",
+        "is_on ? t[j]",
+        "compositing/thin-slices",
     ),
     (
         "optical depth used as opacity",

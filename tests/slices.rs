@@ -121,6 +121,37 @@ fn auto_takes_thin_sprites_only_where_they_are_near_enough() {
     assert_eq!(chosen("study-cloud", &["draw.path=\"auto\"", SLICES]).1, Overlap::Slices);
 }
 
+/// Without a knob, a study varies those that can change slices, and no other.
+#[test]
+fn studies_and_ledgers_know_slices() {
+    let small = ["scenes/hello.toml", "--size", "60x45", "--set", SLICES, "--pixels", "256"];
+    let quick = ["--against", "slices", "--rounds", "1", "--frames", "1", "--csv", "-q"];
+    let output = run(&[&["error"], &small[..], &quick[..]].concat());
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(text.contains("draw.slice=2.0") && text.contains("draw.overlap=thin"), "{text}");
+    assert!(!text.contains("draw.path"), "{text}");
+    let output = run(&[&["ledger"], &small[..], &["--json", "-q"]].concat());
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("\"slices\"") && !text.contains("thin sprites"), "{text}");
+}
+
+/// Depths and radiances at their greatest: sums of products stay finite.
+#[test]
+fn the_deepest_and_brightest_blobs_stay_finite() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let row = "0,0,-1e8,2.4e7,1e15,1e15,1e15,1e15\n";
+    let list = format!("x,y,z,radius,kappa,r,g,b\n{}", row.repeat(40));
+    std::fs::write(dir.path().join("list.csv"), list).expect("a list");
+    let scene = "[film]\nwidth = 32\nheight = 24\nformat = 'rgba32f'\n[camera]\nposition = [0.0, \
+        0.0, 12.0]\n[lighting]\nmode = 'none'\n[draw]\noverlap = 'slices'\n[[cloud]]\nfrom = \
+        'particles'\nfile = 'list.csv'\n";
+    std::fs::write(dir.path().join("s.toml"), scene).expect("a scene");
+    let output = run(&["render", &path(&dir, "s.toml"), "-o", &path(&dir, "a.exr")]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && !text.contains("not finite"), "{text}");
+}
+
 #[test]
 fn slices_of_other_paths_and_thicknesses_are_refused() {
     for (settings, expected) in [

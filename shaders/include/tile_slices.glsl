@@ -128,6 +128,8 @@ void compose(Loaded splat, float y) {
     bool shows[RUN];
     [[unroll]] for (uint j = 0; j < RUN; ++j) { shows[j] = true; }
     find_depths(splat, y, shows, tau);
+    // Nothing shows through so much, and sums with radiances of 1e15 stay finite.
+    [[unroll]] for (uint j = 0; j < RUN; ++j) { tau[j] = min(tau[j], 1e15); }
 #if ELLIPSOIDS || BEHIND
     // Distance and size along the ray, where they differ from pixel to pixel.
     float distance = splat.distance, in_sigmas = splat.near_in_sigmas;
@@ -165,6 +167,8 @@ void compose(Loaded splat, float y) {
                 within = min(all, splat.within[m]);
 #endif
             }
+            // A division that is not monotone would make a share negative.
+            within = max(within, before);
             open[m][j] += tau[j] * (within - before) * vec4(radiance, 1.0);
             before = within;
         }
@@ -172,7 +176,8 @@ void compose(Loaded splat, float y) {
 #else
     float before = 0.0;
     [[unroll]] for (uint m = 0; m < OPEN; ++m) {
-        float within = m + 1u < OPEN ? splat.within[m] : 1.0;
+        // A division that is not monotone would make a share negative.
+        float within = max(m + 1u < OPEN ? splat.within[m] : 1.0, before);
         vec4 share = (within - before) * vec4(radiance, 1.0);
         before = within;
         [[unroll]] for (uint j = 0; j < RUN; ++j) { open[m][j] += tau[j] * share; }

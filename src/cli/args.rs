@@ -65,12 +65,11 @@ pub enum Command {
     /// approximation of the one before it.
     ///
     /// "thin" draws the same sprites as the device, sorted by exact depth; it differs from the
-    /// device by arithmetic alone. "slices" does so with overlapping blobs composed by slices
-    /// (draw.overlap). "volume" integrates light through the overlapping blobs, to
-    /// about a millionth of the brightest. "model" also computes the light on the blobs by the
-    /// model itself, and the light on surfaces pixel by pixel. "reflections=K" computes K
-    /// reflections. --samples takes the mean over each pixel's area, and more random paths, instead
-    /// of the value at its centre.
+    /// device by arithmetic alone. "slices" draws the same blobs composed by slices (draw.overlap).
+    /// "volume" integrates light through the overlapping blobs, to about a millionth of the
+    /// brightest. "model" also computes the light on the blobs by the model itself, and the light
+    /// on surfaces pixel by pixel. "reflections=K" computes K reflections. --samples takes the mean
+    /// over each pixel's area, and more random paths, instead of the value at its centre.
     Render(RenderArgs),
     /// Time a scene in the serial and the parallel loop
     ///

@@ -195,7 +195,7 @@ fn reference(
     let folder = reference_cache::default_folder();
     let listener = &|work, n| shown.advance(work, n);
     reference_cache::reference(args.against, scene, time_s, pixels, folder.as_deref(), listener)
-        .map_err(|error| with_texture_hint(error, ", or --against thin"))
+        .map_err(|error| with_texture_hint(error, ", or --against thin or slices"))
 }
 
 /// Returns the time that decides.

@@ -5,10 +5,14 @@ use crate::error::{Error, Result};
 use crate::gpu::{
     Buffer, Compiler, Device, MemoryUsage, RecordCount, Recorder, Target, TargetFormat,
 };
+use crate::model::overlap::MAX_SLICES;
 use crate::model::scene::{Overlap, Scene};
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};
 use crate::passes::sort::{Count, Sort, TILE};
-use crate::passes::tiles::{Division, Tiles, Variant, invocations};
+use crate::passes::tiles::{self, Division, Tiles, Variant, invocations};
+
+/// The pass bounds its loops by the slices of a scene.
+const _: () = assert!(MAX_SLICES + 2.0 <= tiles::MAX_SLICES as f64);
 
 /// The tile passes and their pictures.
 pub struct Tiling {

@@ -28,7 +28,8 @@ pub struct Group {
     pub sigma_y_max: f64,
     /// Mean σ along x and z.
     pub sigma_mean: f64,
-    /// The same, weighted by the areas that particles cover: Σσ³/Σσ².
+    /// The same, weighted by the areas that particles cover: Σσ³/Σσ². Of discs and animated
+    /// particles it is the plain mean.
     pub sigma_by_area: f64,
     /// Least, mean and greatest aspect: σ along y over σ along x and z.
     pub aspects: [f64; 3],

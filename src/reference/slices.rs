@@ -23,6 +23,9 @@ const STEEPEST: f64 = 0.4;
 /// Roundings of f32 in the distance of a boundary from a centre, as a share of the centre's, and in
 /// σ: beside those of the blob's place.
 const N_ROUNDINGS: f64 = 8.0;
+/// Greatest optical depth of a blob in a pixel: nothing shows through, and sums of depths times
+/// radiances stay finite in f32.
+const DEEPEST: f64 = 1e15;
 /// Relative error of the device's 1 − e^{−t}.
 const OPACITY: f64 = 3.5e-7;
 
@@ -180,16 +183,17 @@ impl Ray<'_> {
         let nearest = place_in_slices.round();
         let mut found: Vec<(i64, f64, f64)> = Vec::new();
         let shares = at(nearest as i64);
+        let whole = layer.tau.min(DEEPEST);
         for (m, share) in shares.iter().enumerate() {
-            let tau = layer.tau * share;
-            let off = r.tau * tau + layer.tau * (off_share + off_hidden);
+            let tau = whole * share;
+            let off = r.tau * tau + whole * (off_share + off_hidden);
             found.push((nearest as i64 + m as i64, tau, off));
         }
         // Another boundary may be as near.
         let other = nearest + (place_in_slices - nearest).signum();
         if 0.5 - (place_in_slices - nearest).abs() <= (place + r.order) / slice {
             for (m, share) in at(other as i64).iter().enumerate() {
-                let (i_slice, tau) = (other as i64 + m as i64, layer.tau * share);
+                let (i_slice, tau) = (other as i64 + m as i64, whole * share);
                 match found.iter_mut().find(|(i, ..)| *i == i_slice) {
                     Some((_, here, off)) => *off += (tau - *here).abs(),
                     None => found.push((i_slice, 0.0, tau)),

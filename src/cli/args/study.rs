@@ -128,7 +128,7 @@ pub struct ErrorArgs {
 pub struct LedgerArgs {
     /// Scene file
     pub scene: PathBuf,
-    /// Draw every cloud without its texture, which the references but thin do not have
+    /// Draw every cloud without its texture, which the references but thin and slices do not have
     #[arg(long)]
     pub plain: bool,
     /// Most pixels that pictures are compared at, spread over them; or "all"

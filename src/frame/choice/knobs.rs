@@ -147,6 +147,7 @@ pub fn toml_name<T: PartialEq>(names: &[(&str, T)], value: T) -> String {
 pub mod tests {
     use super::*;
     use crate::model::edge::Reach;
+    use crate::model::overlap::SLICE;
     use crate::model::sort_bits::SortBits;
 
     /// A `draw` in which every knob of the table is "auto".
@@ -160,7 +161,7 @@ pub mod tests {
         cutoff: Reach::Sigmas(3.0),
         threshold: Cutoff::Auto,
         overlap: Overlap::Auto,
-        slice: 1.25,
+        slice: SLICE,
         cull: Cull::Auto,
         smallest: Cutoff::Auto,
         sort_bits: SortBits::Wide,

@@ -8,6 +8,7 @@ use crate::io::document::section::Section;
 use crate::model::count::Count;
 use crate::model::cutoff::Cutoff;
 use crate::model::edge::{FARTHEST, Reach};
+use crate::model::overlap::SLICE;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, MAX_CHUNKS, Overlap};
 use crate::model::sort_bits::SortBits;
@@ -53,11 +54,11 @@ keys! { DRAW: fn draw(s) -> Draw { Draw;
     /// Optical depth below which a particle ends.
     threshold: cutoff(Bounds::From(0.0, 1.0));
     /// How particles that overlap are composed: one after the other, as if each were thin; by
-    /// slices, of which each particle has its own share, on the path "tiles"; or whichever is
-    /// faster at the first frame within `error` of the slices.
+    /// slices, of which each particle has its own share, on the path "tiles"; or, on that path,
+    /// whichever is faster at the first frame within `error` of the slices.
     overlap: choice("thin", &Overlap::NAMES);
     /// Thickness of a slice, in mean σ of the particles.
-    slice: number(1.25, Bounds::Within(0.1, 10.0)), "σ";
+    slice: number(SLICE, Bounds::Within(0.1, 10.0)), "σ";
     /// Whether particles that show in no pixel are left out before the sort. No pixel changes.
     cull: choice("on", &Cull::NAMES);
     /// With `cull`, σ on the screen below which a particle is left out.

@@ -18,7 +18,8 @@ const ITERATIONS_OF_COUNT: u32 = 1;
 /// Further ones with slices, where splats are taken one by one, with two turns for each eight:
 /// 0.75.
 const ITERATIONS_OF_SHARES: u32 = 1;
-/// The most slices between the nearest and the farthest centre of a frame's blobs.
+/// The most slices between the nearest and the farthest centre of a frame's blobs: those of a
+/// scene, and some for what rounds.
 pub const MAX_SLICES: u32 = 1024;
 /// Iterations of a tile's loops for each slice: one closes it, one begins its splats.
 const ITERATIONS_OF_SLICE: u32 = 2;
@@ -31,7 +32,7 @@ const PAIRS_PER_ITERATION: u64 = SORT_TILE / 4;
 /// Entries of a tile of the sort.
 const SORT_TILE: u64 = 1024;
 
-/// Returns the fours of floats of a pixel that a round hands to the next.
+/// Returns the fours of floats of a pixel that a round hands to the next; the shaders' STATE_FOURS.
 pub(super) fn state_fours(slices: bool) -> u64 {
     if slices { 6 } else { 1 }
 }
@@ -46,6 +47,11 @@ pub(super) struct Form {
 }
 
 impl Form {
+    /// Returns `text`, what else a user must change where blobs are composed by slices.
+    fn remedy_of_slices(self, text: &str) -> &str {
+        if self.slices { text } else { "" }
+    }
+
     /// Returns the most blocks whose splats a tile may take all of, if its loops may have
     /// `iterations`.
     fn most_blocks(self, iterations: u32) -> u32 {
@@ -86,7 +92,8 @@ impl Rounds {
             let most = u64::from(MAX_BLOCKS_OF_FRAME) * u64::from(BLOCK);
             return Err(Error::limit(format!(
                 "draw.path = \"tiles\" draws {most} particles at most, the scene has {n_max}; \
-                 expected \"sprites\""
+                 expected \"sprites\"{}",
+                form.remedy_of_slices(" and draw.overlap = \"thin\"")
             )));
         }
         let state_bytes = 16 * state_fours(form.slices);
@@ -109,8 +116,11 @@ impl Rounds {
                 "draw.path = \"tiles\", the default: a picture of {}×{} is drawn in rounds where \
                  the scene has {n_max} particles, and {state_bytes} bytes a pixel between them are \
                  more than \
-                 this device's {} (maxStorageBufferRange); expected draw.path = \"sprites\"",
-                division.width, division.height, limits.max_storage_buffer_bytes
+                 this device's {} (maxStorageBufferRange); expected {}draw.path = \"sprites\"",
+                division.width,
+                division.height,
+                limits.max_storage_buffer_bytes,
+                form.remedy_of_slices("draw.overlap = \"thin\", or with it ")
             )));
         }
         Ok(Rounds { n_blocks, capacity, n, most_blocks })

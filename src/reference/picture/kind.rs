@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use crate::model::cutoff::Cutoff;
 use crate::model::edge::{FARTHEST, Reach};
+use crate::model::overlap::SLICE;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Overlap, Scene};
 use crate::model::sort_bits::SortBits;
@@ -77,13 +78,14 @@ impl ReferenceKind {
     /// Returns `scene` with every approximation of its drawing switched off, but for this kind's
     /// way of composing overlapping blobs: all particles, full size, out to 8 σ.
     pub fn without_approximations(self, scene: &Scene) -> Scene {
-        let (path, overlap) = match self {
-            ReferenceKind::Slices => (DrawPath::Tiles, Overlap::Slices),
-            _ => (DrawPath::Sprites, Overlap::Thin),
+        let (path, overlap, slice) = match self {
+            ReferenceKind::Slices => (DrawPath::Tiles, Overlap::Slices, scene.draw.slice),
+            _ => (DrawPath::Sprites, Overlap::Thin, SLICE),
         };
         let draw = Draw {
             path,
             overlap,
+            slice,
             impostors: Impostors::Off,
             resolution: Resolution::Full,
             chunks: Chunks::Of(0),

@@ -13,7 +13,7 @@ struct Knob {
 }
 
 const KNOBS: &[Knob] = &[
-    Knob { key: "draw.path", values: &["sprites", "tiles"], applies: has_particles },
+    Knob { key: "draw.path", values: &["sprites", "tiles"], applies: draws_thin },
     Knob { key: "draw.resolution", values: &["1.0", "0.5", "0.25"], applies: has_particles },
     Knob { key: "draw.cutoff", values: &["2.0", "3.0", "4.0", "auto"], applies: has_particles },
     Knob {
@@ -57,6 +57,10 @@ pub fn default_axes(scene: &Scene) -> Vec<Axis> {
         values: knob.values.iter().map(|value| (*value).to_owned()).collect(),
     };
     KNOBS.iter().filter(|knob| (knob.applies)(scene)).map(axis).collect()
+}
+
+fn draws_thin(scene: &Scene) -> bool {
+    has_particles(scene) && scene.draw.overlap == Overlap::Thin
 }
 
 fn draws_tiles(scene: &Scene) -> bool {

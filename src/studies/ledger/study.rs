@@ -211,7 +211,7 @@ impl LedgerStudy<'_> {
     /// As [`LedgerStudy::run`].
     pub fn expected_s(&self) -> Result<f64> {
         /// Most pictures in the light of the device or of its reference: one for each of the links
-        /// "drawing", "thin sprites", "first reflection" and "second reflection".
+        /// "drawing", "thin sprites" or "slices", "first reflection" and "second reflection".
         const N_OTHERS: f64 = 4.0;
         let scene = &ReferenceKind::drawn_by(self.scene).without_approximations(self.scene);
         let (mut sum, mut drawing_s) = (0.0, 0.0);

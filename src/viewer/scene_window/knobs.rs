@@ -2,7 +2,7 @@
 
 use crate::frame::toml_name;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{DrawPath, Gather, LightingMode, Scene, Simulate, Threading};
+use crate::model::scene::{DrawPath, Gather, LightingMode, Overlap, Scene, Simulate, Threading};
 
 /// A setting that a key cycles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,6 +76,9 @@ impl Knob {
     pub fn advance(self, scene: &mut Scene) -> Result<(), &'static str> {
         if self == Knob::Simulate && scene.is_animated() {
             return Err("weather that goes from step to step is moved by the game thread");
+        }
+        if self == Knob::Path && scene.draw.overlap == Overlap::Slices {
+            return Err("only tiles are composed by slices");
         }
         let (lighting, draw, threads) = (&mut scene.lighting, &mut scene.draw, &mut scene.threads);
         match self {

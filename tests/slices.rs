@@ -131,7 +131,7 @@ fn studies_and_ledgers_know_slices() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(text.contains("draw.slice=2.0") && text.contains("draw.overlap=thin"), "{text}");
     assert!(!text.contains("draw.path"), "{text}");
-    let output = run(&[&["ledger"], &small[..], &["--json", "-q"]].concat());
+    let output = run(&[&["ledger"], &small[..], &["--plain", "--json", "-q"]].concat());
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(text.contains("\"slices\"") && !text.contains("thin sprites"), "{text}");
 }

@@ -207,7 +207,7 @@ fn wrong_frames_are_noticed() {
         ("'tiles'", "cull_test.comp", "pixels.x < pixels.y", "pixels.x + 9u < pixels.y"),
         ("'sprites'", "cull_scan.comp", "uvec4(4, n, 0, 0)", "uvec4(4, n / 2u, 0, 0)"),
         ("'tiles'", "cull_scan.comp", "n = before;", "n = before / 2u;"),
-        ("'sprites'", "include/depths.glsl", "dot(push.forward", "-dot(push.forward"),
+        ("'sprites'", "include/depths.glsl", "dot(push.from", "-dot(push.from"),
     ] {
         let of = scene(&list, [DVec3::ZERO, DVec3::NEG_Z], &set(&[("path", name)]));
         let right = frame(&gpu, &gpu.compiler, &of);

@@ -91,6 +91,11 @@ fn finder(what: &str) -> &'static [&'static str] {
         "growth is ignored" => {
             &["scenes/cubes-554.toml", "--set", "cloud.0.grow_to=2", "--set", "time.start_s=60"]
         }
+        "no depth behind the last boundary"
+        | "a colour over twice the depth of its slice"
+        | "a slice closed as if it were thin" => {
+            &["scenes/cubes-554.toml", "--set", "draw.overlap='slices'"]
+        }
         _ => &["scenes/cubes-554.toml"],
     }
 }

@@ -4,8 +4,9 @@
 #include "depths.glsl"
 #include "each.glsl"
 
-// Computes the sort keys of the drawn particles from their view depth, or their distance from the
-// eye, relative to that of the lighting origin; ascending keys run far to near (passes.md "sort").
+// Computes the sort keys of the drawn particles from their view depth, or from their distance from
+// the eye. Both are relative to that of the lighting origin. Ascending keys run far to near
+// (passes.md "sort").
 // In: placed particles; the first ones of each group are drawn. Out: entries (key, particle) in
 // ascending index. Error: one dot product, or one length and a difference.
 

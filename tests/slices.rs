@@ -92,7 +92,7 @@ fn what_leaves_out_work_changes_slices_as_little_as_thin_sprites() {
     }
 }
 
-/// What the drawing of `scene` settles on.
+/// Returns the path and the overlap that the drawing of `scene` settles on.
 fn chosen(scene: &str, settings: &[&str]) -> (DrawPath, Overlap) {
     let overrides: Vec<String> = settings.iter().map(|s| (*s).to_owned()).collect();
     let file = format!("scenes/{scene}.toml");

@@ -124,9 +124,8 @@ pub enum Command {
     /// References (--against), each without an approximation of the one before it: "thin", the
     /// sprites in f64, uncut, in the scene's own light; "slices", the same blobs by slices;
     /// "volume", the integral over the overlapping blobs in that light; "model", in light without
-    /// density grid, facet groups, basis and pairs;
-    /// "reflections=K", with K reflections, those beyond the second by random paths. For knobs of
-    /// lighting use one of the last two.
+    /// density grid, facet groups, basis and pairs; "reflections=K", with K reflections, those
+    /// beyond the second by random paths. For knobs of lighting use one of the last two.
     ///
     /// Frames are timed as if everything moved in each, except for what a run makes only once
     /// (particles of boxes, textures). --as-played times the scene's own frames. An "auto" in the

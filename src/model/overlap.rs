@@ -22,9 +22,9 @@ pub const SLICE: f64 = 1.25;
 /// The most slices between a scene's nearest and farthest particle.
 pub const MAX_SLICES: f64 = 1000.0;
 
-/// Returns the thickness of a slice of `slice` σ. The σ is the mean over the particles of `groups`,
-/// as they have grown, weighted by the areas that they cover: Σσ³/Σσ², every particle of a group
-/// with the group's own such mean. All centres lie within
+/// Returns the thickness of a slice of `slice` σ. The σ is a mean over the particles of `groups`,
+/// as they have grown. It is weighted by the areas that they cover: Σσ³/Σσ². Every particle counts
+/// with its group's own such mean. All centres lie within
 /// `radius` of a point, and the slice is not thinner than 1/[`MAX_SLICES`] of that sphere.
 pub fn slice_length(slice: f64, groups: &[Group], radius: f64) -> f64 {
     let sum = |power: i32| -> f64 {

@@ -145,7 +145,7 @@ record! {
     }
 }
 
-/// What the depth of a blob is, relative to that of the lighting origin.
+/// The meaning of a blob's depth. Depths are relative to that of the lighting origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DepthFrom {
     /// The view depth, along the camera's forward axis.

@@ -21,8 +21,7 @@ use crate::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 
 pub use division::{Division, RUN, TILES_ACROSS, invocations};
 pub use push::{ClearPush, PairsPush, Push, RangesPush, RoundsPush, SplatPush};
-pub use rounds::BLOCK;
-pub use rounds::MAX_SLICES;
+pub use rounds::{BLOCK, MAX_SLICES};
 use rounds::{Form, Rounds};
 
 /// The greatest optical depth of a blob that the kernels for thin scenes handle.

@@ -1,5 +1,5 @@
-//! The layers of blobs in the pixels of a picture, model.md §9: which blobs a ray meets, with which
-//! optical depth, and how far a device may be off; in f64.
+//! The layers of blobs in the pixels of a picture, model.md §9, in f64. A layer says which blob a
+//! ray meets, with which optical depth, and how far a device may be off.
 //!
 //! In: blobs and eye relative to O, an order. Out: what a caller makes of the layers of a pixel.
 

@@ -1,5 +1,6 @@
-//! Slices, passes.md "slices": overlapping blobs dealt among shells of one thickness about the eye,
-//! and the shells composed near to far, in f64, with a bound on what a device may differ.
+//! Slices, passes.md "slices", in f64: overlapping blobs are dealt among shells of one thickness
+//! about the eye, and the shells are composed near to far. A bound says how far a device may be
+//! off.
 //!
 //! In: blobs and eye relative to O, the layers of a pixel. Out: the mixture in each slice, and the
 //! pixel composed of them.
@@ -29,7 +30,7 @@ const DEEPEST: f64 = 1e15;
 /// Relative error of the device's 1 − e^{−t}.
 const OPACITY: f64 = 3.5e-7;
 
-/// What a blob has in a slice.
+/// The part of a blob in a slice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Part {
     /// The blob.

@@ -47,7 +47,8 @@ pub(super) struct Form {
 }
 
 impl Form {
-    /// Returns `text`, what else a user must change where blobs are composed by slices.
+    /// Returns `text`, a further change that a user must make where blobs are composed by slices,
+    /// and nothing elsewhere.
     fn remedy_of_slices(self, text: &str) -> &str {
         if self.slices { text } else { "" }
     }

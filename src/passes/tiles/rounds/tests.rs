@@ -113,7 +113,7 @@ fn far_blobs_need_few_rounds_and_unknown_ones_all() {
 
 #[test]
 fn loops_with_slices_end_before_a_device_ends_them() {
-    // What a tile may turn for all splats of a round and the slices among them.
+    // The most turns that a tile takes for all splats of a round and the slices among them.
     for (form, of_splat, of_slice) in [
         (THIN, 1, 0),
         (Form { slices: true, ..THIN }, 2, 2),

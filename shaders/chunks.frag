@@ -7,7 +7,7 @@
 // pixels alone where PICKS is 1.
 
 #include "buffers.glsl"
-#include "half.glsl"
+#include "target.glsl"
 
 // 0: shows all pixels; 1: keeps only those that let less light through than push.saturated.
 layout(constant_id = 0) const uint PICKS = 0;

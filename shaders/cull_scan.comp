@@ -44,5 +44,6 @@ void main() {
         kept[0].sort = uvec4(groups(n, push.sort_tile), 1, 1, n);
         kept[0].draw = uvec4(4, n, 0, 0);
         kept[0].splat = uvec4(groups(n, push.splat_block), 1, 1, 0);
+        kept[0].points = uvec4(n, 1, 0, 0);
     }
 }

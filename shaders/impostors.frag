@@ -8,7 +8,7 @@
 // between its texels.
 
 #include "buffers.glsl"
-#include "half.glsl"
+#include "target.glsl"
 #include "impostors.glsl"
 // Four floats a texel, rows from the top.
 TEXELS(0, shell)

@@ -24,21 +24,24 @@ layout(location = 1) flat in vec3 in_radiance;
 layout(location = 2) flat in vec4 in_turn;
 layout(location = 3) flat in uvec2 in_place;
 layout(location = 4) flat in vec3 in_gain;
-layout(location = 5) flat in float in_cut;
+layout(location = 5) flat in float in_lowest;
 layout(location = 6) flat in vec4 in_conic;
+layout(location = 7) flat in vec4 in_screen;
 layout(location = 0) out vec4 out_color;
 
+const float LOG2_E = 1.44269504089;
+
 void main() {
-    vec2 ray = ray_through(push.camera, gl_FragCoord.xy, push.pixel).xy;
+    vec2 at = gl_FragCoord.xy * in_screen.xy;
+    vec2 ray = vec2(at.x - in_screen.z, in_screen.w - at.y);
     // b^2 = |c x d|^2/|d|^2 with c = z (s, 1) and d = (s + delta, 1). Only the subtraction for
     // delta can cancel.
     vec2 s = in_blob.xy;
     vec2 delta = ray - s;
     float twist = s.x * delta.y - s.y * delta.x;
-    // b^2/(2 sigma^2)
-    float e = in_blob.z * (dot(delta, delta) + twist * twist) / (1.0 + dot(ray, ray));
-    float cut = THRESHOLD != 0 ? in_cut : 0.5 * push.cutoff * push.cutoff;
-    float tau = in_blob.w;
+    // -b^2/(2 sigma^2), in powers of two.
+    float exponent = in_blob.z * (dot(delta, delta) + twist * twist) / (1.0 + dot(ray, ray));
+    float lowest = in_lowest, tau = in_blob.w;
     if (ELLIPSOIDS != 0) {
         // |M d|^2, and |d|/|M d|: the ray's length in the scene over that in the ball's
         // coordinates.
@@ -47,25 +50,25 @@ void main() {
         float up = dot(y, d);
         vec3 across = d - up * y;
         float rest = dot(across, across), white = rest + in_conic.w * up * up;
-        e = (in_conic.x * delta.x * delta.x + in_conic.y * delta.x * delta.y
-             + in_conic.z * delta.y * delta.y)
-            / white;
+        exponent = (in_conic.x * delta.x * delta.x + in_conic.y * delta.x * delta.y
+                    + in_conic.z * delta.y * delta.y)
+                   / white;
         tau *= sqrt((rest + up * up) / white);
-        cut = 0.5 * push.cutoff * push.cutoff;
         if (THRESHOLD != 0) {
-            cut = min(cut, max(log(tau * push.inv_threshold), push.least_cut));
+            float cut = max(log(tau * push.inv_threshold), push.least_cut);
+            lowest = max(lowest, -LOG2_E * cut);
         }
     }
     float alpha = 0.0;
     vec4 sums = vec4(0.0);
-    if (e <= cut) {
-        float exponent = -e;
+    if (exponent >= lowest) {
         if (TEXTURED != 0) {
-            exponent += texture_exponent(delta, in_turn, in_place, in_gain);
+            exponent += LOG2_E * texture_exponent(delta, in_turn, in_place, in_gain);
         }
-        alpha = one_minus_exp(tau * exp(exponent));
+        tau *= exp2(exponent);
+        alpha = THIN != 0 ? thin_opacity(tau) : one_minus_exp(tau);
         if (SUMS != 0) {
-            sums = vec4(tau * exp(exponent), 1.0, 0.0, gl_FragCoord.z);
+            sums = vec4(tau, 1.0, 0.0, gl_FragCoord.z);
         }
     }
     out_color = SUMS != 0 ? sums : vec4(in_radiance * alpha, alpha);

@@ -3,15 +3,15 @@
 #include "records.glsl"
 #include "blob.glsl"
 #include "strip.glsl"
-#include "half.glsl"
+#include "target.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
 #include "texture.glsl"
 
-// Draws a screen-aligned quad around each blob's silhouette, far to near (model.md §9, passes.md
-// "sprites"). In: sorted entries, placed particles, radiance of facets. Out: the quad, and the blob
-// for sprites.frag. Bound: the quad is widened by more than its rounding; the pixel's own test
-// decides.
+// Draws a screen-aligned quad or point around each blob's silhouette, far to near (model.md §9,
+// passes.md "sprites"). In: sorted entries, placed particles, radiance of facets. Out: the quad,
+// and the blob for sprites.frag. Bound: the quad is widened by more than its rounding; the pixel's
+// own test decides.
 
 #include "sprites.glsl"
 READS(0, uvec2, entries)
@@ -23,22 +23,38 @@ READS(5, uint, i_group)
 READS(6, Drawn, drawn)
 READS(7, Textured, textured)
 
-// The centre's slopes (x/z, y/z), z^2/(2 sigma^2), optical depth through the centre.
+// 0: a quad a blob, a strip of four vertices; 1: a point, which is a square.
+layout(constant_id = 10) const uint POINTS = 0;
+
+const float LOG2_E = 1.44269504089;
+// Vulkan lets a device round the side of a point. Points are drawn only where that is by no more.
+const float POINT_STEP = 1.0 / 8.0;
+
+// All that the fragments need: llvmpipe fetches a push constant again for each of them.
+// The centre's slopes (x/z, y/z), -z^2/(2 sigma^2) in powers of two, optical depth through the
+// centre.
 layout(location = 0) flat out vec4 out_blob;
 layout(location = 1) flat out vec3 out_radiance;
 layout(location = 2) flat out vec4 out_turn;
 layout(location = 3) flat out uvec2 out_place;
 layout(location = 4) flat out vec3 out_gain;
-// b^2/(2 sigma^2) at the sprite's end; only with a threshold.
-layout(location = 5) flat out float out_cut;
+// The exponent at the sprite's end, in powers of two.
+layout(location = 5) flat out float out_lowest;
 // Conic and 1/a^2; only for ellipsoids.
 layout(location = 6) flat out vec4 out_conic;
+// Sides of a pixel, as slopes, and the camera's tangents.
+layout(location = 7) flat out vec4 out_screen;
+
+// Draws nothing: a place that is clipped.
+void draw_nothing() {
+    gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
+    gl_PointSize = 1.0;
+}
 
 void main() {
-    uint i = entries[push.i_first + gl_InstanceIndex].y;
+    uint i = entries[push.i_first + (POINTS != 0 ? gl_VertexIndex : gl_InstanceIndex)].y;
     if (i == NO_PARTICLE) {
-        // Draws nothing: a quad without area.
-        gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
+        draw_nothing();
         return;
     }
     vec3 c = placed[i].position - push.camera.eye;
@@ -48,7 +64,7 @@ void main() {
     if (WEIGHTED != 0) {
         tau *= weight_of(drawn[i_group[i]], i);
     }
-    float scale = 0.5 * (v.z / sigma) * (v.z / sigma);
+    float scale = -0.5 * LOG2_E * (v.z / sigma) * (v.z / sigma);
     out_blob = vec4(v.xy / v.z, scale, tau);
     Shape shape = shape_of(push.camera, ELLIPSOIDS != 0 ? particles[i].aspect : 1.0);
     if (ELLIPSOIDS != 0) {
@@ -64,28 +80,41 @@ void main() {
     out_gain = texture_sample.gain;
     uint facet = GROUPED != 0 ? i_facet[i] : push.i_first_facet + i;
     out_radiance = in_target(LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color);
-    float reach = push.cutoff;
-    bool empty = !(tau > 0.0);
+    float cut = 0.5 * push.cutoff * push.cutoff;
     if (THRESHOLD != 0) {
-        out_cut = max(log(tau * push.inv_threshold), push.least_cut);
-        out_cut = min(0.5 * push.cutoff * push.cutoff, out_cut);
-        empty = empty || !(out_cut > 0.0);
-        reach = sqrt(2.0 * max(out_cut, 0.0));
+        cut = min(cut, max(log(tau * push.inv_threshold), push.least_cut));
     }
-    if (!(v.z >= push.camera.near) || empty) {
-        // Draws nothing: a quad without area.
-        gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
+    if (BYTES != 0 && TEXTURED == 0) {
+        cut = min(cut, log(tau * greatest_effect(out_radiance)));
+    }
+    out_lowest = -LOG2_E * cut;
+    out_screen = vec4(push.pixel, push.camera.tan_x, push.camera.tan_y);
+    if (!(v.z >= push.camera.near) || !(tau > 0.0) || !(cut > 0.0)) {
+        draw_nothing();
         return;
     }
-    float r = GROWTH * reach * sigma;
+    float r = GROWTH * sqrt(2.0 * cut) * sigma;
     vec2 across = tangents_along(shape, v, 0, r), upward = tangents_along(shape, v, 1, r);
     vec2 x = (across + vec2(-SNAP, SNAP) * push.pixel.x) / push.camera.tan_x;
     vec2 y = (upward + vec2(-SNAP, SNAP) * push.pixel.y) / push.camera.tan_y;
     // Clamped to the screen: huge quads cost the rasteriser its accuracy.
     x = clamp(x, -1.0, 1.0);
     y = clamp(y, -1.0, 1.0);
-    vec2 corner = corner_of_strip(vec2(x.x, y.x), vec2(x.y, y.y));
     // At most 1: near/near, rounded up, would be clipped.
     float depth = BEHIND != 0 ? min(push.camera.near / v.z, 1.0) : 0.0;
+    if (POINTS != 0) {
+        // From -1 to 1 there are 2 tan/pixel pixels.
+        vec2 sides = vec2(x.y - x.x, y.y - y.x) * vec2(push.camera.tan_x, push.camera.tan_y)
+                     / push.pixel;
+        if (!(min(sides.x, sides.y) > 0.0)) {
+            draw_nothing();
+            return;
+        }
+        gl_Position = vec4(0.5 * (x.x + x.y), -0.5 * (y.x + y.y), depth, 1.0);
+        gl_PointSize = max(sides.x, sides.y) + POINT_STEP;
+        return;
+    }
+    vec2 corner = corner_of_strip(vec2(x.x, y.x), vec2(x.y, y.y));
     gl_Position = vec4(corner.x, -corner.y, depth, 1.0);
+    gl_PointSize = 1.0;
 }

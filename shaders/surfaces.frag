@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
-#include "half.glsl"
+#include "target.glsl"
 #include "camera.glsl"
 
 // 1: surfaces hide blobs and are not seen.

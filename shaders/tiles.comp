@@ -60,6 +60,10 @@ TEXELS(10, conics)
 // where the splat is loaded: once, and not once for every row.
 #define OWN_EDGE (THRESHOLD && !ELLIPSOIDS)
 
+// 1: found splats wait in registers. Needs ONE_SUBGROUP.
+#ifndef QUEUE
+#define QUEUE 0
+#endif
 // 0: there is one round, and no state is kept.
 #ifndef ROUNDS
 #define ROUNDS 0
@@ -207,25 +211,24 @@ void find_depths(Loaded splat, float y, bool shows[RUN], out float tau[RUN]) {
 const uint STATE_FOURS = 1;
 #endif
 
-// Composes the found splats from k on, one loaded by each invocation. Invocations without one load
-// `spare`, any splat, without depth and light.
-void compose_some(uint k, uint n, uint spare, float y) {
+// Composes n found splats, of which each of the first invocations has one. The others load any
+// splat, without depth and light.
+void compose_some(uint r, uint n, float y) {
     uint t = lane();
-    Loaded splat = load_splat(int(k + t < n ? found[k + t] : spare));
-    splat.fours[0].w = k + t < n ? splat.fours[0].w : 0u;
-    splat.fours[1].xyz = k + t < n ? splat.fours[1].xyz : uvec3(0);
+    Loaded splat = load_splat(int(r));
+    splat.fours[0].w = t < n ? splat.fours[0].w : 0u;
+    splat.fours[1].xyz = t < n ? splat.fours[1].xyz : uvec3(0);
 #if OWN_EDGE
     float cut = max(log2(uintBitsToFloat(splat.fours[0].w) * inv_threshold), push.least_cut);
     splat.lowest = max(min_exponent, -cut);
 #endif
-    uint end = min(n - k, INVOCATIONS);
 #if SLICES
-    find_shares(splat, t, k + t < n);
+    find_shares(splat, t, t < n);
 #endif
 #if !ONE_SUBGROUP
     share_splat(splat, t);
 #endif
-    compose_loaded(splat, end, y);
+    compose_loaded(splat, n, y);
 #if !ONE_SUBGROUP
     barrier();
 #endif
@@ -293,25 +296,33 @@ void draw_tile(uvec4 range, uint i_tile) {
     // where the test comes first. Each loop has work in its first iteration.
     uint first = range.x;
     bool is_done;
+    uint n = 0;
     do {
-        uint n = 0;
         uvec2 pair;
         do {
             uint i = first + t;
             pair = pairs[min(i, range.y - 1u)];
-            n = append(n, i < range.y && (pair.x >> (BIN_BITS + i_tile) & 1u) != 0, pair.y);
+            bool hit = i < range.y && (pair.x >> (BIN_BITS + i_tile) & 1u) != 0;
+            n = append(n, hit, pair.y);
             first += INVOCATIONS;
-        } while (first < range.y && n + INVOCATIONS <= MOST);
+        } while (first < range.y && n < ENOUGH);
+#if QUEUE
+        compose_some(t < n ? waiting : pair.y, min(n, INVOCATIONS), y);
+        waiting = left_over;
+        n -= min(n, INVOCATIONS);
+#else
         wait_for_all();
         uint k = 0;
         do {
-            compose_some(k, n, pair.y, y);
+            compose_some(k + t < n ? found[k + t] : pair.y, min(n - k, INVOCATIONS), y);
             k += INVOCATIONS;
         } while (k < n);
+        n = 0;
         wait_for_all();
+#endif
         float most = 0.0;
         [[unroll]] for (uint j = 0; j < RUN; ++j) { most = max(most, 1.0 - alpha[j]); }
-        is_done = all_agree(most < push.saturated) || first >= range.y;
+        is_done = all_agree(most < push.saturated) || (first >= range.y && n == 0);
     } while (!is_done);
 #if ROUNDS
     [[unroll]] for (uint j = 0; j < RUN; ++j) {

@@ -23,16 +23,16 @@ use nimbus::frame::saturation_bound;
 use nimbus::gpu::Compiler;
 use nimbus::gpu::TargetFormat;
 use nimbus::model::film::FilmFormat;
-use nimbus::passes;
+use nimbus::passes::{self, tiles::Sharing};
 use picture::{FORMATS, Picture, Tiled, Way};
 
 const F32: (TargetFormat, FilmFormat) = (TargetFormat::Rgba32f, FilmFormat::Rgba32f);
 
-fn tiled(gpu: &Gpu, format: FilmFormat, portable: bool) -> Tiled {
+fn tiled(gpu: &Gpu, format: FilmFormat, sharing: Option<Sharing>) -> Tiled {
     let invocations = passes::tiles::invocations(gpu.device.limits());
     Tiled {
         invocations,
-        portable,
+        sharing,
         max_pairs: None,
         max_tiles: None,
         saturated: saturation_bound(format),
@@ -49,7 +49,7 @@ fn drawn(
 ) -> [Vec<f64>; 3] {
     let values = picture.draw_by(gpu, compiler, target, way);
     let (truths, bounds) = match way {
-        Way::Sprites => picture.truth(format),
+        Way::Sprites | Way::Points => picture.truth(format),
         Way::Tiles(tiled) => picture.tiled_truth(format, tiled.saturated),
         Way::Chunks(_, saturated) => picture.chunked_truth(format, saturated),
     };
@@ -73,7 +73,8 @@ fn ellipsoids_match_the_reference() {
         let formats = if picture.placed.len() > 100 { &FORMATS[1..2] } else { &FORMATS[..] };
         for (target, format) in formats.iter().copied() {
             // Every third case runs without subgroup operations.
-            let by_tiles = Way::Tiles(tiled(&gpu, format, i.is_multiple_of(3)));
+            let sharing = i.is_multiple_of(3).then_some(Sharing::Barriers);
+            let by_tiles = Way::Tiles(tiled(&gpu, format, sharing));
             for way in [Way::Sprites, by_tiles, Way::Chunks(5, saturation_bound(format))] {
                 let [values, truths, bounds] =
                     drawn(&mut gpu, None, &picture, (target, format), way);
@@ -117,7 +118,7 @@ fn flat_blobs_match_the_reference_from_all_sides() {
         for (what, picture) in decks(threshold) {
             for way in [
                 Way::Sprites,
-                Way::Tiles(tiled(&gpu, F32.1, false)),
+                Way::Tiles(tiled(&gpu, F32.1, None)),
                 Way::Chunks(7, saturation_bound(F32.1)),
             ] {
                 let [values, truths, bounds] = drawn(&mut gpu, None, &picture, F32, way);
@@ -149,7 +150,7 @@ fn spheres_are_unchanged_by_an_ellipsoid_in_the_scene() {
     );
     // A blob of optical depth 0 switches all blobs to the shaders for ellipsoids.
     let among = balls.clone().blob(balls.at(0.0, 0.0, 9.0), 0.5, 0.0).shaped(0.5);
-    for way in [Way::Sprites, Way::Tiles(tiled(&gpu, F32.1, false))] {
+    for way in [Way::Sprites, Way::Tiles(tiled(&gpu, F32.1, None))] {
         let [values, _, own] = drawn(&mut gpu, None, &among, F32, way);
         let [alone, _, bounds] = drawn(&mut gpu, None, &balls, F32, way);
         assert!(values != vec![0.0; values.len()]);
@@ -208,6 +209,6 @@ fn faulty_shaders_exceed_the_bounds() {
         }
     };
     of(Way::Sprites, &sprites, &mut gpu);
-    let way = Way::Tiles(tiled(&gpu, F32.1, false));
+    let way = Way::Tiles(tiled(&gpu, F32.1, None));
     of(way, &tiles, &mut gpu);
 }

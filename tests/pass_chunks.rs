@@ -131,7 +131,7 @@ fn wrong_pictures_are_noticed() {
         ("chunks.frag", "!(1.0 - pixel.w < push.saturated)", "1.0 - pixel.w < push.saturated"),
         ("chunks.frag", "!(1.0 - pixel.w < push.saturated)", "!(1.0 - pixel.w < 0.1)"),
         ("chunks.frag", "at.y * int(push.width) + at.x", "at.x"),
-        ("sprites.vert", "push.i_first + gl_InstanceIndex", "gl_InstanceIndex"),
+        ("sprites.vert", "push.i_first + (POINTS", "(POINTS"),
     ] {
         let wrong = Gpu::wrong_compiler(file, from, to);
         let values = picture.draw_by(&mut gpu, Some(&wrong), F32.0, way);

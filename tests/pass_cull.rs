@@ -130,7 +130,8 @@ impl Scene {
         let (placed, particles) = (gpu.upload(&self.placed), gpu.upload(&self.particles));
         let (i_group, drawn) = (gpu.upload(&self.i_group), gpu.upload(&self.drawn));
         let entries = gpu.upload(&vec![UNTOUCHED; self.placed.len()]);
-        let kept = gpu.upload(&[KeptRecord { sort: [9; 4], draw: [9; 4], splat: [9; 4] }]);
+        let kept =
+            gpu.upload(&[KeptRecord { sort: [9; 4], draw: [9; 4], splat: [9; 4], points: [9; 4] }]);
         let View { width, height, edge, smallest, .. } = self.view;
         let Edge { radius: cutoff, tau: threshold, least } = edge;
         let blobs = BlobView {
@@ -211,6 +212,7 @@ fn complaint(scene: &Scene, keys: &[u32], found: &Found) -> Option<String> {
         sort: [n.div_ceil(1024) as u32, 1, 1, n as u32],
         draw: [4, n as u32, 0, 0],
         splat: [n.div_ceil(256) as u32, 1, 1, 0],
+        points: [n as u32, 1, 0, 0],
     };
     if *kept != expected || n > entries.len() {
         return Some(format!("counts {kept:?}"));

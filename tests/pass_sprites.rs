@@ -30,7 +30,7 @@ use nimbus::model::film::FilmFormat;
 use nimbus::passes;
 use nimbus::reference::texture::Pool;
 use nimbus::reference::{live, place};
-use picture::{FORMATS, Picture};
+use picture::{FORMATS, Picture, Way};
 
 /// Draws `picture` in both formats, lit and unlit, and compares every number of every pixel.
 /// Greatest value seen.
@@ -229,14 +229,15 @@ fn wrong_pictures_are_noticed() {
     values[i] -= 2.0 * bounds[i];
     assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "one corrupted number");
     for (file, from, to) in [
-        ("sprites.frag", "0.5 * push.cutoff * push.cutoff", "0.45 * push.cutoff * push.cutoff"),
+        ("sprites.vert", "0.5 * push.cutoff * push.cutoff", "0.45 * push.cutoff * push.cutoff"),
         ("sprites.frag", " + twist * twist", ""),
         ("sprites.frag", " / (1.0 + dot(ray, ray))", ""),
-        ("sprites.frag", "exp(exponent)", "(1.0 + exponent)"),
+        ("sprites.frag", "exp2(exponent)", "(1.0 + exponent)"),
+        ("sprites.vert", "-0.5 * LOG2_E", "-0.5"),
         ("include/blob.glsl", "GROWTH = 1.0 + 1e-4", "GROWTH = 0.97"),
         ("include/blob.glsl", "min(low, high) > 0.0", "true"),
         ("sprites.vert", "-corner.y", "corner.y"),
-        ("sprites.vert", "entries[push.i_first + gl_InstanceIndex].y", "gl_InstanceIndex"),
+        ("sprites.vert", "].y;\n    if (i == NO_PARTICLE)", "].y / 2u;\n    if (i == NO_PARTICLE)"),
     ] {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{from}");
@@ -244,6 +245,58 @@ fn wrong_pictures_are_noticed() {
         let values = picture.draw(&mut gpu, Some(&compiler), TargetFormat::Rgba16f);
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
     }
+}
+
+/// Small blobs within the picture, at its edges and beyond.
+fn small() -> Picture {
+    let mut picture = front();
+    for (k, (x, y)) in [(0.0, 0.0), (2.3, 0.4), (-2.31, -1.7), (0.7, 1.73), (9.0, 0.1), (0.2, -1.0)]
+        .iter()
+        .enumerate()
+    {
+        let at = picture.at(*x, *y, 5.0 + 0.2 * k as f64);
+        picture = picture.blob(at, 0.06 + 0.02 * k as f64, 0.02 + 0.015 * k as f64);
+    }
+    picture
+}
+
+/// Points are for devices that are CPUs; blobs larger than the largest point are quads there, too.
+#[test]
+fn sprites_are_points_unless_one_is_too_large() {
+    let mut gpu = Gpu::new();
+    let is_cpu = gpu.device.info().kind == "cpu" && gpu.device.limits().max_point_size > 64.0;
+    let picture = small();
+    assert!(compare(&mut gpu, "points", &picture) > 0.02);
+    assert_eq!(picture.has_points(&gpu), is_cpu);
+    let at = picture.at(0.3, 0.1, 1.5);
+    let huge = picture.clone().blob(at, 100.0, 0.1);
+    assert!(compare(&mut gpu, "one is large", &huge) > 0.05);
+    assert!(!huge.has_points(&gpu));
+    if !is_cpu {
+        return;
+    }
+    let (truths, bounds) = picture.truth(FilmFormat::Rgba32f);
+    for (from, to) in [
+        ("max(sides.x, sides.y)", "0.9 * max(sides.x, sides.y)"),
+        ("-0.5 * (y.x + y.y)", "0.5 * (y.x + y.y)"),
+        ("? gl_VertexIndex :", "? gl_InstanceIndex :"),
+    ] {
+        let wrong = Gpu::wrong_compiler("sprites.vert", from, to);
+        let values = picture.draw_by(&mut gpu, Some(&wrong), TargetFormat::Rgba32f, Way::Points);
+        assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
+    }
+}
+
+/// Layers that bytes cannot show are left out there: no byte changes.
+#[test]
+fn what_bytes_cannot_show_is_left_out() {
+    let mut gpu = Gpu::new();
+    let picture = small();
+    let own = picture.draw(&mut gpu, None, TargetFormat::Rgba8);
+    let whole = Gpu::wrong_compiler("sprites.vert", "BYTES != 0 && TEXTURED == 0", "false");
+    assert_eq!(picture.draw(&mut gpu, Some(&whole), TargetFormat::Rgba8), own);
+    let less = Gpu::wrong_compiler("include/target.glsl", "return 510.0 *", "return 250.0 *");
+    assert_ne!(picture.draw(&mut gpu, Some(&less), TargetFormat::Rgba8), own);
 }
 
 /// Groups of which a part is drawn, and the last of it in part.

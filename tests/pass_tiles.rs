@@ -30,7 +30,7 @@ use nimbus::frame::saturation_bound;
 use nimbus::gpu::Compiler;
 use nimbus::gpu::TargetFormat;
 use nimbus::model::film::FilmFormat;
-use nimbus::passes;
+use nimbus::passes::{self, tiles::Sharing};
 use nimbus::reference::texture::Pool;
 use picture::{FORMATS, Picture, Tiled, Way};
 use scenery::Scenery;
@@ -40,7 +40,7 @@ fn usual(gpu: &Gpu, format: FilmFormat) -> Tiled {
     let invocations = passes::tiles::invocations(gpu.device.limits());
     Tiled {
         invocations,
-        portable: false,
+        sharing: None,
         max_pairs: None,
         max_tiles: None,
         saturated: saturation_bound(format),
@@ -91,7 +91,8 @@ fn textures_of_every_size() {
     let drawn =
         |gpu: &mut Gpu, tiled: &Tiled| picture.draw_by(gpu, None, FORMATS[2].0, Way::Tiles(*tiled));
     assert!(
-        drawn(&mut gpu, &tiled) == drawn(&mut gpu, &Tiled { portable: true, ..tiled }),
+        drawn(&mut gpu, &tiled)
+            == drawn(&mut gpu, &Tiled { sharing: Some(Sharing::Barriers), ..tiled }),
         "without subgroups"
     );
     let (truths, bounds) = picture.tiled_truth(FORMATS[2].1, tiled.saturated);
@@ -121,14 +122,17 @@ fn workgroups_and_rounds_do_not_show() {
     let mut draw = |tiled: &Tiled| picture.draw_by(&mut gpu, None, target, Way::Tiles(*tiled));
     let once = draw(&tiled);
     assert!(draw(&tiled) == once, "drawn twice");
+    let by_subgroup = Tiled { sharing: Some(Sharing::Subgroup), ..tiled };
+    assert!(draw(&by_subgroup) == once, "by a subgroup's lists");
     for invocations in [8, 16, 32, 64] {
-        let other = Tiled { invocations, portable: true, ..tiled };
+        let other = Tiled { invocations, sharing: Some(Sharing::Barriers), ..tiled };
         assert!(draw(&other) == once, "{invocations} invocations without subgroups");
     }
     for max_tiles in [1, 3, 16].map(Some) {
         assert!(draw(&Tiled { max_tiles, ..tiled }) == once, "{max_tiles:?} tiles a workgroup");
         assert!(
-            draw(&Tiled { invocations: 32, portable: true, max_tiles, ..tiled }) == once,
+            draw(&Tiled { invocations: 32, sharing: Some(Sharing::Barriers), max_tiles, ..tiled })
+                == once,
             "{max_tiles:?}, portable"
         );
     }
@@ -184,12 +188,16 @@ fn wrong_pictures_are_noticed() {
         ("tiles.comp", "min_exponent = -push.cut", "min_exponent = -0.9 * push.cut"),
         ("tiles.comp", "* inv_norm[j]", ""),
         ("include/tile_thin.glsl", "alpha[j] += here;", "alpha[j] += 0.999 * here;"),
-        ("tiles.comp", "k + t < n ? splat.fours[0].w", "k + t <= n ? splat.fours[0].w"),
+        ("tiles.comp", "t < n ? splat.fours[0].w", "t <= n ? splat.fours[0].w"),
         (
             "include/tile_splats.glsl",
             "n + subgroupBallotBitCount(hits)",
             "n + min(subgroupBallotBitCount(hits), 7u)",
         ),
+        ("include/tile_queue.glsl", "t - subgroupBallotExclusiveBitCount(hits)", "0u"),
+        ("include/tile_queue.glsl", "(by_there & k) != 0", "(by_there & k & 3u) != 0"),
+        ("include/tile_queue.glsl", "(t - n) &", "(t + 1u - n) &"),
+        ("include/tile_queue.glsl", "left_over = r;", "left_over = waiting;"),
         ("tiles_splat.comp", "n_splats - 1u - r", "r"),
         ("tiles_splat.comp", "before + here.x - n;", "before + here.x;"),
         ("tiles_pairs.comp", "y[3 - j]", "y[j]"),
@@ -198,11 +206,17 @@ fn wrong_pictures_are_noticed() {
         ("include/blob.glsl", "min(low, high) > 0.0", "true"),
     ] {
         let limits = gpu.device.limits();
+        let sharing = match file {
+            "include/tile_queue.glsl" => Some(Sharing::Registers),
+            "include/tile_splats.glsl" => Some(Sharing::Subgroup),
+            _ => None,
+        };
         // Where a workgroup is no subgroup, no operation of subgroups is compiled.
-        if from.contains("subgroup") && !limits.is_one_subgroup(passes::tiles::invocations(limits))
-        {
+        let is_subgroup = limits.is_one_subgroup(passes::tiles::invocations(limits));
+        if sharing.is_some() && !is_subgroup {
             continue;
         }
+        let tiled = Tiled { sharing, ..tiled };
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{from}");
         let compiler = Compiler::new(sources, None).expect("shaderc");

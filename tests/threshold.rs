@@ -100,7 +100,7 @@ fn usual(gpu: &Gpu) -> Tiled {
     let invocations = passes::tiles::invocations(gpu.device.limits());
     Tiled {
         invocations,
-        portable: false,
+        sharing: None,
         max_pairs: None,
         max_tiles: None,
         saturated: saturation_bound(FORMAT.1),
@@ -110,7 +110,7 @@ fn usual(gpu: &Gpu) -> Tiled {
 /// Returns the reference picture and its bound for sprites or tiles.
 fn truth(picture: &Picture, way: Way) -> (Vec<f64>, Vec<f64>) {
     match way {
-        Way::Sprites => picture.truth(FORMAT.1),
+        Way::Sprites | Way::Points => picture.truth(FORMAT.1),
         Way::Tiles(tiled) => picture.tiled_truth(FORMAT.1, tiled.saturated),
         Way::Chunks(_, saturated) => picture.chunked_truth(FORMAT.1, saturated),
     }
@@ -220,15 +220,15 @@ fn faulty_shaders_exceed_the_bounds() {
             "log(tau * push.inv_threshold)",
             "0.98 * log(tau * push.inv_threshold)",
         ),
-        (Way::Sprites, "sprites.vert", "sqrt(2.0 * max", "sqrt(1.8 * max"),
+        (Way::Sprites, "sprites.vert", "sqrt(2.0 * cut)", "sqrt(1.8 * cut)"),
         (Way::Sprites, "sprites.vert", "if (THRESHOLD != 0) {", "if (THRESHOLD > 1) {"),
-        (Way::Sprites, "sprites.frag", "? in_cut :", "? 1.02 * in_cut :"),
+        (Way::Sprites, "sprites.frag", "lowest = in_lowest", "lowest = 1.02 * in_lowest"),
         (tiled, "tiles_splat.comp", "sqrt(2.0 * cut)", "sqrt(1.5 * cut)"),
         (tiled, "tiles_pairs.comp", "log2(splats[r].tau", "0.7 * log2(splats[r].tau"),
         (tiled, "tiles.comp", "max(log2(uintBits", "max(0.98 * log2(uintBits"),
         (tiled, "tiles.comp", "max(min_exponent, -cut)", "min(min_exponent, -cut)"),
         // A blob's least reach.
-        (Way::Sprites, "sprites.vert", "push.least_cut);", "0.9 * push.least_cut);"),
+        (Way::Sprites, "sprites.vert", "push.least_cut));", "0.9 * push.least_cut));"),
         (tiled, "tiles.comp", "inv_threshold), push.least_cut", "inv_threshold), 0.0"),
         (tiled, "tiles_splat.comp", "push.least_cut);", "0.5 * push.least_cut);"),
     ] {

@@ -74,6 +74,7 @@ struct Kept {
     uvec4 sort;
     uvec4 draw;
     uvec4 splat;
+    uvec4 points;
 };
 struct SplatTexture {
     vec4 turn;

@@ -24,11 +24,18 @@ struct Loaded {
 #endif
 };
 
+#if !QUEUE
 // Splats that reach the tile, collected before they are composed.
 const uint MOST = 8 * INVOCATIONS;
 shared uint found[MOST];
+// They are composed from this number on.
+const uint ENOUGH = MOST - INVOCATIONS + 1u;
+#endif
 
 #if ONE_SUBGROUP
+#if QUEUE
+#include "tile_queue.glsl"
+#else
 // Appends the splats that the invocations found, in the order of invocations; returns the new
 // number of found ones.
 uint append(uint n, bool hit, uint r) {
@@ -38,6 +45,7 @@ uint append(uint n, bool hit, uint r) {
     }
     return n + subgroupBallotBitCount(hits);
 }
+#endif
 
 bool all_agree(bool b) { return subgroupAll(b); }
 #else

@@ -2,13 +2,7 @@
 // of the whole splat, at its centre (passes.md "tiles"). Needs the row of tiles.comp.
 
 #if THIN
-// Returns 1 - e^-t for t in [0, 1/8]: t times the cubic through (1 - e^-t)/t at Chebyshev's points,
-// within 1.6e-8 of it.
-float opacity(float t) {
-    return t
-           * ((0.999999984752 - t * 0.499996093888)
-              + t * t * (0.166509869621 - t * 0.039641773912));
-}
+float opacity(float t) { return thin_opacity(t); }
 #else
 float opacity(float t) { return one_minus_exp(t); }
 #endif
@@ -37,12 +31,17 @@ void compose(Loaded splat, float y) {
 
 // Composes the `end` first splats that the invocations have loaded.
 void compose_loaded(Loaded splat, uint end, float y) {
-    // By twos: a loop writes its carried values again in each iteration, and the number of
-    // iterations bounds the splats of a round (passes.md "tiles").
+    // A loop writes its carried values again in each iteration, and the number of iterations bounds
+    // the splats of a round (passes.md "tiles").
+#if QUEUE && INVOCATIONS <= 8
+    // Few splats are spared: every invocation has one, but for the last time.
+    [[unroll]] for (uint m = 0; m < INVOCATIONS; ++m) { compose(of_invocation(splat, m), y); }
+#else
     uint m = 0;
     do {
         compose(of_invocation(splat, m), y);
         compose(of_invocation(splat, m + 1), y);
         m += 2;
     } while (m < end);
+#endif
 }

@@ -79,7 +79,7 @@ pub(super) fn n_chunks(scene: &Scene) -> u32 {
 /// The way in which blobs are drawn.
 enum Method {
     /// Far to near.
-    Sprites(Sprites),
+    Sprites(Box<Sprites>),
     /// Near to far.
     Chunks(Box<ChunkedSprites>),
     /// In compute shaders, near to far.
@@ -119,7 +119,8 @@ impl BlobTarget {
                 return Ok(Method::Chunks(Box::new(chunks)));
             }
             let blend = if has_depth { BlendMode::OverTested } else { BlendMode::Over };
-            Ok(Method::Sprites(Sprites::new(device, compiler, format, variant, blend)?))
+            let sprites = Sprites::new(device, compiler, format, variant, blend)?;
+            Ok(Method::Sprites(Box::new(sprites)))
         };
         let depth = || Image::depth(device, "surfaces.depth", width, height);
         let n_images = if spec.has_images(path) { n_pictures } else { 0 };

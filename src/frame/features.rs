@@ -10,7 +10,7 @@ use crate::model::scene::{
     Cull, DrawPath, Gather, Impostors, LightingMode, Overlap, Scene, Simulate,
 };
 use crate::passes::blobs::BlobVariant;
-use crate::passes::tiles::THIN;
+use crate::passes::blobs::THIN;
 
 /// Properties of a scene in which no knob is "auto".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -175,6 +175,7 @@ pub(super) fn blob_variant(scene: &Scene) -> BlobVariant {
         textured: scene.is_textured(),
         threshold: scene.draw.edge().has_threshold(),
         ellipsoids: scene.has_ellipsoids(),
+        thin: is_thin(scene) && !scene.is_textured(),
     }
 }
 

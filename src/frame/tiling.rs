@@ -1,6 +1,6 @@
 //! Blobs drawn by the tile passes: splats, their pairs sorted by bin, and the pictures.
 
-use super::features::{blob_variant, tau_max};
+use super::features::blob_variant;
 use crate::error::{Error, Result};
 use crate::gpu::{
     Buffer, Compiler, Device, MemoryUsage, RecordCount, Recorder, Target, TargetFormat,
@@ -74,9 +74,8 @@ impl Tiling {
             blobs: blob_variant(scene),
             format,
             has_under,
-            tau_max: tau_max(scene),
             slices: scene.draw.overlap == Overlap::Slices,
-            portable: false,
+            sharing: None,
             max_pairs: None,
             max_tiles: None,
         };

@@ -366,6 +366,7 @@ fn create(
         .shader_int64(info.limits.has_int64)
         .shader_float64(info.limits.has_float64)
         .pipeline_statistics_query(counts_invocations)
+        .large_points(info.limits.max_point_size > 1.0)
         // A read far beyond the end must not end the process.
         .robust_buffer_access(options.guard);
     let mut create = vk::DeviceCreateInfo::default()

@@ -178,6 +178,7 @@ impl DeviceInfo {
                     .max_image_dimension2_d
                     .min(limits.max_framebuffer_width)
                     .min(limits.max_framebuffer_height),
+                max_point_size: features::max_point_size(&features, &limits),
                 device_memory_bytes: memory_bytes.unwrap_or(0),
                 subgroup_size: subgroup.subgroup_size,
                 has_subgroup_arithmetic: has_subgroup(Subgroup::ARITHMETIC),

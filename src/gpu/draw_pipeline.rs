@@ -10,11 +10,21 @@ use super::rate::Rate;
 use super::shader::Compiler;
 use crate::error::Result;
 
-/// A graphics pipeline that draws triangle strips of four vertices.
+/// A graphics pipeline that draws strips or points.
 pub struct DrawPipeline {
     pub(super) pipeline: Pipeline,
+    pub(super) primitives: Primitives,
     /// Whether it draws into a target with depth.
     pub(super) has_depth: bool,
+}
+
+/// The primitives that a pipeline draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Primitives {
+    /// Triangle strips of four vertices, an instance each.
+    Strips,
+    /// Points, a vertex each: squares, of [`Limits::max_point_size`](super::Limits) at most.
+    Points,
 }
 
 /// How a fragment combines with what the target holds.
@@ -71,11 +81,13 @@ impl BlendMode {
     }
 }
 
-/// The specialization constant that is 1 for targets of 16-bit floats; the shaders' HALF.
+/// The specialization constants that are 1 for targets of 16-bit floats and of bytes; the shaders'
+/// HALF and BYTES.
 const HALF: u32 = 7;
+const BYTES: u32 = 11;
 
 impl DrawPipeline {
-    /// Makes a pipeline from `name.vert` and `name.frag` for targets of `format`.
+    /// Makes a pipeline of strips from `name.vert` and `name.frag` for targets of `format`.
     ///
     /// `push` are the host's push constants in order; `constants` the specialization constants by
     /// id.
@@ -86,6 +98,21 @@ impl DrawPipeline {
         device: &Device,
         compiler: &Compiler,
         name: &str,
+        push: &[Field],
+        constants: &[(u32, u32)],
+        target: (TargetFormat, BlendMode),
+    ) -> Result<DrawPipeline> {
+        Self::of(device, compiler, (name, Primitives::Strips), push, constants, target)
+    }
+
+    /// Makes the same of `primitives`.
+    ///
+    /// # Errors
+    /// As [`DrawPipeline::new`].
+    pub fn of(
+        device: &Device,
+        compiler: &Compiler,
+        (name, primitives): (&str, Primitives),
         push: &[Field],
         constants: &[(u32, u32)],
         (format, mode): (TargetFormat, BlendMode),
@@ -99,30 +126,34 @@ impl DrawPipeline {
         ];
         let interface = Interface::new(device, name, &stages, push)?;
         let is_half = format == TargetFormat::Rgba16f;
-        let constants = Constants::new(&[constants, &[(HALF, u32::from(is_half))]].concat());
+        let is_bytes = matches!(format, TargetFormat::Rgba8 | TargetFormat::Bgra8);
+        let of_format = [(HALF, u32::from(is_half)), (BYTES, u32::from(is_bytes))];
+        let constants = Constants::new(&[constants, &of_format[..]].concat());
         let specialization = constants.info();
         let infos = stages.each_ref().map(|stage| stage.info(&specialization));
-        let raw = create(device, &interface, name, &infos, format, mode)?;
+        let raw = create(device, &interface, (name, primitives), &infos, format, mode)?;
         let handle = device.shared().own(raw, name, ash::Device::destroy_pipeline);
         device.shared().report(raw, name, &[])?;
         let point = vk::PipelineBindPoint::GRAPHICS;
         let (name, rate) = (name.to_owned(), Rate::default());
         let pipeline = Pipeline { handle, point, interface, name, rate };
-        Ok(DrawPipeline { pipeline, has_depth: mode.has_depth() })
+        Ok(DrawPipeline { pipeline, primitives, has_depth: mode.has_depth() })
     }
 }
 
 fn create(
     device: &Device,
     interface: &Interface,
-    name: &str,
+    (name, primitives): (&str, Primitives),
     stages: &[vk::PipelineShaderStageCreateInfo<'_>],
     format: TargetFormat,
     mode: BlendMode,
 ) -> Result<vk::Pipeline> {
     let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
-    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
-        .topology(vk::PrimitiveTopology::TRIANGLE_STRIP);
+    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(match primitives {
+        Primitives::Strips => vk::PrimitiveTopology::TRIANGLE_STRIP,
+        Primitives::Points => vk::PrimitiveTopology::POINT_LIST,
+    });
     let viewport =
         vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
     let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);

@@ -5,7 +5,7 @@ use bytemuck::Pod;
 
 use super::barriers::Scope;
 use super::buffer::Buffer;
-use super::draw_pipeline::DrawPipeline;
+use super::draw_pipeline::{DrawPipeline, Primitives};
 use super::image::Image;
 use super::recorder::Recorder;
 use crate::error::{Error, Result};
@@ -18,7 +18,7 @@ pub struct Target<'a> {
     pub depth: Option<&'a mut Image>,
 }
 
-/// A number of strips of four vertices.
+/// A number of strips or points.
 #[derive(Clone, Copy)]
 pub enum InstanceCount<'a> {
     /// The host knows the number.
@@ -65,7 +65,7 @@ impl<'a> Target<'a> {
 }
 
 impl Recorder<'_> {
-    /// Draws strips of four vertices into `target`.
+    /// Draws strips or points into `target`.
     ///
     /// # Errors
     /// Target, buffers or push constants differ from the pipeline's.
@@ -99,9 +99,14 @@ impl Recorder<'_> {
                 unsafe {
                     device.cmd_set_viewport(commands, 0, &[viewport]);
                     device.cmd_set_scissor(commands, 0, &[rows]);
-                    match instances {
-                        InstanceCount::Known(n) => device.cmd_draw(commands, 4, n, 0, 0),
-                        InstanceCount::Indirect(counts, word) => {
+                    match (instances, pipeline.primitives) {
+                        (InstanceCount::Known(n), Primitives::Strips) => {
+                            device.cmd_draw(commands, 4, n, 0, 0)
+                        }
+                        (InstanceCount::Known(n), Primitives::Points) => {
+                            device.cmd_draw(commands, n, 1, 0, 0)
+                        }
+                        (InstanceCount::Indirect(counts, word), _) => {
                             let offset = 4 * u64::from(word);
                             device.cmd_draw_indirect(commands, counts.raw(), offset, 1, 0)
                         }

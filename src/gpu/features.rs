@@ -32,6 +32,17 @@ pub(super) fn has_float16(instance: &ash::Instance, physical: vk::PhysicalDevice
     v12.shader_float16 == vk::TRUE
 }
 
+/// Returns the pixels along a side of the largest point, see [`Limits::max_point_size`].
+pub(super) fn max_point_size(
+    features: &vk::PhysicalDeviceFeatures,
+    limits: &vk::PhysicalDeviceLimits,
+) -> f32 {
+    match features.large_points == vk::TRUE && limits.point_size_granularity <= 0.125 {
+        true => limits.point_size_range[1],
+        false => 0.0,
+    }
+}
+
 /// Returns whether a device tells when the pictures that it presents are visible.
 pub(super) fn has_present_wait(instance: &ash::Instance, physical: vk::PhysicalDevice) -> bool {
     let extensions = [khr::swapchain::NAME, khr::present_id::NAME, khr::present_wait::NAME];

@@ -19,6 +19,9 @@ pub struct Limits {
     pub max_push_constant_bytes: u32,
     /// Pixels along a side of an image that is drawn into.
     pub max_image_extent: u32,
+    /// Pixels along a side of the largest point; 0 where the sides of points are rounded by more
+    /// than an eighth of a pixel.
+    pub max_point_size: f32,
     /// Bytes of the largest device-local heap.
     pub device_memory_bytes: u64,
     /// Invocations of a subgroup, unless a kernel asks for another size.

@@ -74,7 +74,7 @@ pub use counters::Invocations;
 pub use device::Device;
 pub use device_info::DeviceInfo;
 pub use device_options::DeviceOptions;
-pub use draw_pipeline::{BlendMode, DrawPipeline};
+pub use draw_pipeline::{BlendMode, DrawPipeline, Primitives};
 pub use draws::{InstanceCount, LoadOp, Target};
 pub use host_clock::ClockCalibration;
 pub use image::{DEPTH_BYTES_PER_PIXEL, Image, TargetFormat, has_depth24};

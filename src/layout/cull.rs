@@ -12,6 +12,8 @@ record! {
         draw: [u32; 4],
         /// Workgroups that make splats of the particles: [n, 1, 1]; 0.
         splat: [u32; 4],
+        /// Arguments of a draw of points: vertices, instances, 0, 0.
+        points: [u32; 4],
     }
 }
 
@@ -24,6 +26,8 @@ impl KeptRecord {
     pub const I_DRAW: u32 = 4;
     /// The first of the three words with the splats' workgroups.
     pub const I_SPLAT: u32 = 8;
+    /// The first of the four words of the draw of points.
+    pub const I_POINTS: u32 = 12;
 
     /// Returns the record of `n` particles that the host knows, where a workgroup makes
     /// `splat_block` splats. The host sorts by its own number, so the sort has no workgroups here.
@@ -32,6 +36,7 @@ impl KeptRecord {
             sort: [0, 1, 1, n],
             draw: [4, n, 0, 0],
             splat: [n.div_ceil(splat_block), 1, 1, 0],
+            points: [n, 1, 0, 0],
         }
     }
 }

@@ -31,6 +31,12 @@ bindings! {
     }
 }
 
+/// The greatest optical depth of blobs that are thin: shaders compute their opacity by a
+/// polynomial.
+pub const THIN: f64 = 0.125;
+/// Relative room for the rounding of slopes, and of a blob's own growth.
+const SLACK: f64 = 1.01;
+
 /// The properties of a scene's blobs that pipelines are specialized for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct BlobVariant {
@@ -46,14 +52,17 @@ pub struct BlobVariant {
     pub threshold: bool,
     /// Some blobs are not spheres.
     pub ellipsoids: bool,
+    /// No blob's optical depth is above [`THIN`], and none has a texture.
+    pub thin: bool,
 }
 
 impl BlobVariant {
     /// Returns the specialization constants that the blob shaders share, by id.
-    pub(super) fn constants(self) -> [(u32, u32); 6] {
-        let BlobVariant { lit, grouped, weighted, textured, threshold, ellipsoids } = self;
-        [(0, lit), (2, grouped), (3, weighted), (4, textured), (5, threshold), (6, ellipsoids)]
-            .map(|(id, is_on)| (id, u32::from(is_on)))
+    pub(super) fn constants(self) -> [(u32, u32); 7] {
+        let BlobVariant { lit, grouped, weighted, textured, threshold, ellipsoids, thin } = self;
+        let ids = [0, 2, 3, 4, 5, 6, 9];
+        let are_on = [lit, grouped, weighted, textured, threshold, ellipsoids, thin];
+        std::array::from_fn(|k| (ids[k], u32::from(are_on[k])))
     }
 }
 
@@ -115,6 +124,43 @@ impl BlobView<'_> {
     /// Returns the least b²/2σ² at which a blob ends.
     pub(super) fn least_cut(&self) -> f64 {
         0.5 * self.least * self.least
+    }
+
+    /// Returns bounds of the slopes, along x and y, between the two sides of any blob in the
+    /// picture; infinity where the places of the blobs are unknown.
+    pub(super) fn widest(&self) -> [f64; 2] {
+        let Some(extents) = self.extents else { return [f64::INFINITY; 2] };
+        let wider = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
+        extents.iter().map(|e| self.widest_of(e)).fold([0.0; 2], wider)
+    }
+
+    /// Returns the same of the blobs of `extent`: those of a ball at its least depth, wherever that
+    /// is seen. They are 0 where no blob is in front of the near plane.
+    ///
+    /// A ball has radius R, depth z and distance x from the axis. Its slopes from the axis are
+    /// (x z ± R √(x² + z² − R²)) / (z² − R²). It is in the picture if x < t z + R √(1 + t²); t is
+    /// the slope at the picture's edge. The difference of its slopes grows with x and falls with z.
+    pub(super) fn widest_of(&self, extent: &Extent) -> [f64; 2] {
+        let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+        let forward = vector(self.camera.forward);
+        let middle = (extent.center - vector(self.camera.eye)).dot(forward);
+        let reach = extent.half.dot(forward.abs());
+        let radius = SLACK * extent.radius();
+        let near = f64::from(self.camera.near);
+        if SLACK * (middle + reach) < near {
+            return [0.0; 2];
+        }
+        let z = (middle - reach).max(near) / SLACK;
+        // Near the ball its slopes are unbounded.
+        if z <= SLACK * radius || !z.is_finite() {
+            return [f64::INFINITY; 2];
+        }
+        [self.camera.tan_x, self.camera.tan_y].map(|tangent| {
+            let t = f64::from(tangent);
+            let x = t * z + radius * (1.0 + t * t).sqrt();
+            let square = z * z - radius * radius;
+            SLACK * 2.0 * radius * (x * x + square).sqrt() / square
+        })
     }
 }
 

@@ -24,8 +24,16 @@ pub use push::{ClearPush, PairsPush, Push, RangesPush, RoundsPush, SplatPush};
 pub use rounds::{BLOCK, MAX_SLICES};
 use rounds::{Form, Rounds};
 
-/// The greatest optical depth of a blob that the kernels for thin scenes handle.
-pub const THIN: f64 = 0.125;
+/// The way in which the invocations of a tile share the splats that they have found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sharing {
+    /// In registers, by subgroup operations.
+    Registers,
+    /// In shared memory, by subgroup operations.
+    Subgroup,
+    /// In shared memory, by barriers. A device whose workgroups are not one subgroup has no other.
+    Barriers,
+}
 
 /// Words of a round.
 const ROUND_WORDS: u32 = (size_of::<RoundRecord>() / 4) as u32;
@@ -39,12 +47,10 @@ pub struct Variant {
     pub format: TargetFormat,
     /// The blobs are composed over a picture of surfaces or of an impostor layer.
     pub has_under: bool,
-    /// Bound of a blob's optical depth.
-    pub tau_max: f64,
     /// Overlapping blobs are composed by slices. Views have a slice then.
     pub slices: bool,
-    /// Subgroup operations are not used.
-    pub portable: bool,
+    /// The way in which invocations share splats; by default as suits the device.
+    pub sharing: Option<Sharing>,
     /// Bound of the pairs held at once; by default as many as suit the device.
     pub max_pairs: Option<u64>,
     /// Bound of the tiles that a workgroup draws, up to all of a bin; by default as suits the
@@ -132,9 +138,16 @@ impl Tiles {
         n_max: u32,
         variant: &Variant,
     ) -> Result<Tiles> {
-        let Variant { blobs, format, has_under, tau_max, slices, portable, .. } = *variant;
+        let Variant { blobs, format, has_under, slices, .. } = *variant;
         let limits = device.limits();
-        let is_one_subgroup = !portable && limits.is_one_subgroup(division.invocations);
+        let sharing = match variant.sharing {
+            _ if !limits.is_one_subgroup(division.invocations) => Sharing::Barriers,
+            Some(sharing) => sharing,
+            // It reads and writes shared memory for one invocation after the other.
+            None if device.info().kind == "cpu" => Sharing::Registers,
+            None => Sharing::Subgroup,
+        };
+        let is_one_subgroup = sharing != Sharing::Barriers;
         let form = Form { is_one_subgroup, slices };
         let rounds = Rounds::new(n_max, &division, limits, variant.max_pairs, form)?;
         let constants = blobs.constants();
@@ -144,11 +157,12 @@ impl Tiles {
             ("INVOCATIONS", division.invocations),
             ("ROWS", division.tile[1]),
             ("ONE_SUBGROUP", u32::from(is_one_subgroup)),
-            ("THIN", u32::from(tau_max <= THIN && !blobs.textured)),
+            ("THIN", u32::from(blobs.thin)),
             ("TEXTURED", u32::from(blobs.textured)),
             ("ELLIPSOIDS", u32::from(blobs.ellipsoids)),
             ("THRESHOLD", u32::from(blobs.threshold)),
             ("SLICES", u32::from(slices)),
+            ("QUEUE", u32::from(sharing == Sharing::Registers)),
             ("PIXEL_WORDS", pixel_words),
             ("TOGETHER", if division.width.is_multiple_of(together) { together } else { 1 }),
             ("WORDS_64", u32::from(limits.has_int64)),

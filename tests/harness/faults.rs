@@ -155,8 +155,8 @@ pub const FAULTS: &[Fault] = &[
     (
         "optical depth used as opacity",
         "sprites.frag",
-        "one_minus_exp(tau * exp(exponent))",
-        "tau * exp(exponent)",
+        "THIN != 0 ? thin_opacity(tau) : one_minus_exp(tau)",
+        "tau",
         "space/narrow",
     ),
     ("growth is ignored", "place.comp", "sigma * group.scale", "sigma", "space/late-growth"),

@@ -6,15 +6,16 @@ use nimbus::error::Result;
 use nimbus::frame::{ChunkCount, ChunkedSprites, Tiling};
 use nimbus::gpu::TargetFormat;
 use nimbus::gpu::{
-    BlendMode, Buffer, Compiler, Image, LoadOp, MemoryUsage, RecordCount, Recorder, Target,
+    BlendMode, Buffer, Compiler, Image, LoadOp, MemoryUsage, Primitives, RecordCount, Recorder,
+    Target,
 };
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::edge::Edge;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
-use nimbus::passes::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
+use nimbus::passes::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView, Extent, THIN};
 use nimbus::passes::sprites::Sprites;
 use nimbus::passes::surfaces::Surfaces;
-use nimbus::passes::tiles::{Division, Variant};
+use nimbus::passes::tiles::{Division, Sharing, Variant};
 use nimbus::reference::Blob;
 use nimbus::reference::texture::{Level, Pool, QUANTUM};
 
@@ -26,8 +27,8 @@ use crate::harness::Gpu;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tiled {
     pub invocations: u32,
-    /// Without subgroup operations.
-    pub portable: bool,
+    /// By default as suits the device.
+    pub sharing: Option<Sharing>,
     pub max_pairs: Option<u64>,
     pub max_tiles: Option<u32>,
     pub saturated: f64,
@@ -36,7 +37,10 @@ pub struct Tiled {
 /// A drawing path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Way {
+    /// As quads.
     Sprites,
+    /// As points, where none is too large for the device.
+    Points,
     Tiles(Tiled),
     /// Number of chunks, and the saturation beyond which layers are left out.
     Chunks(u32, f64),
@@ -54,21 +58,61 @@ struct Uploaded {
 
 /// The passes.
 enum Made {
-    Sprites(Sprites),
+    /// As points where they fit.
+    Sprites(Box<Sprites>, bool),
     Tiles(Box<Tiling>, f64),
     Chunks(Box<ChunkedSprites>, f64),
 }
 
 impl Picture {
-    /// Draws the picture and returns four numbers per pixel. Without particles only rectangles are
-    /// drawn.
+    /// Draws the picture as sprites and returns four numbers per pixel. Without particles only
+    /// rectangles are drawn. Quads and points must have the same pixels; a mutated shader draws
+    /// quads alone.
     pub fn draw(
         &self,
         gpu: &mut Gpu,
         compiler: Option<&Compiler>,
         format: TargetFormat,
     ) -> Vec<f64> {
-        self.draw_by(gpu, compiler, format, Way::Sprites)
+        let quads = self.draw_by(gpu, compiler, format, Way::Sprites);
+        if compiler.is_none() {
+            assert_eq!(self.draw_by(gpu, None, format, Way::Points), quads, "points and quads");
+        }
+        quads
+    }
+
+    /// Returns whether sprites are drawn as points.
+    pub fn has_points(&self, gpu: &Gpu) -> bool {
+        let made = self.make(gpu, &gpu.compiler, TargetFormat::Rgba8, Way::Points);
+        let (camera, extents) = (self.camera_record(), self.extents());
+        let view = self.blob_view(&camera, Some(&extents), 0.0);
+        let size = [self.view.width, self.view.height];
+        let is_points = |s: &Sprites| s.primitives(&view, size) == Primitives::Points;
+        matches!(made, Made::Sprites(sprites, _) if is_points(&sprites))
+    }
+
+    /// Returns the extents of the blobs, each one's alone.
+    fn extents(&self) -> Vec<Extent> {
+        let of = |blob: &Blob| Extent {
+            center: blob.position,
+            half: DVec3::ZERO,
+            sigma_max: blob.sigma * blob.aspect.max(1.0),
+            sigma_mean: blob.sigma,
+            reach: self.view.edge.radius,
+            n_particles: 1,
+        };
+        self.blobs().iter().map(of).collect()
+    }
+
+    fn blob_view<'a>(
+        &self,
+        camera: &'a CameraRecord,
+        extents: Option<&'a [Extent]>,
+        saturated: f64,
+    ) -> BlobView<'a> {
+        let Edge { radius: cutoff, tau: threshold, least } = self.view.edge;
+        let slice = self.view.slice;
+        BlobView { camera, cutoff, threshold, least, saturated, slice, extents }
     }
 
     /// Draws the picture by the given path.
@@ -151,12 +195,11 @@ impl Picture {
     fn make(&self, gpu: &Gpu, compiler: &Compiler, format: TargetFormat, way: Way) -> Made {
         let variant = self.variant();
         match way {
-            Way::Sprites => {
+            Way::Sprites | Way::Points => {
                 let blend =
                     if self.scenery.is_some() { BlendMode::OverTested } else { BlendMode::Over };
-                Made::Sprites(
-                    Sprites::new(&gpu.device, compiler, format, variant, blend).expect("sprites"),
-                )
+                let made = Sprites::new(&gpu.device, compiler, format, variant, blend);
+                Made::Sprites(Box::new(made.expect("sprites")), way == Way::Points)
             }
             Way::Tiles(tiled) => {
                 Made::Tiles(Box::new(self.tiling(gpu, compiler, format, &tiled)), tiled.saturated)
@@ -232,19 +275,14 @@ impl Picture {
         };
         let i_first_facet = uploaded.n_surface_facets;
         let n = BlobCount { n: RecordCount::Known(uploaded.n_entries), i_first_facet };
-        let Edge { radius: cutoff, tau: threshold, least } = self.view.edge;
-        let view = |saturated: f64| BlobView {
-            camera,
-            cutoff,
-            threshold,
-            least,
-            saturated,
-            slice: self.view.slice,
-            extents: None,
-        };
+        let view = |saturated: f64| self.blob_view(camera, None, saturated);
+        let extents = self.extents();
         let start = if self.scenery.is_some() { LoadOp::Load } else { LoadOp::Clear };
         match made {
-            Made::Sprites(sprites) => sprites.record(rec, &from, (target, start), &view(0.0), n),
+            Made::Sprites(sprites, points) => {
+                let view = self.blob_view(camera, points.then_some(&extents[..]), 0.0);
+                sprites.record(rec, &from, (target, start), &view, n)
+            }
             Made::Tiles(tiling, saturated) => {
                 let under = self.scenery.is_some().then_some(target);
                 tiling.record(rec, 0, under, &from, &view(*saturated), n)
@@ -265,15 +303,12 @@ impl Picture {
         let division = Division::new(self.view.width, self.view.height, tiled.invocations)
             .expect("a division");
         let blobs = self.blobs();
-        let tau_max = blobs.iter().map(Blob::deepest).fold(0.0, f64::max);
         let variant = Variant {
             blobs: self.variant(),
             format,
             has_under: self.scenery.is_some(),
-            // One rounding above the blobs' own numbers in f32.
-            tau_max: tau_max * (1.0 + 8.0 * U),
             slices: self.view.slice > 0.0,
-            portable: tiled.portable,
+            sharing: tiled.sharing,
             max_pairs: tiled.max_pairs,
             max_tiles: tiled.max_tiles,
         };
@@ -282,6 +317,9 @@ impl Picture {
     }
 
     fn variant(&self) -> BlobVariant {
+        let of = |b: &Blob| b.deepest();
+        // Some roundings above the blobs' own numbers in f32.
+        let tau_max = (1.0 + 8.0 * U) * self.blobs().iter().map(of).fold(0.0, f64::max);
         BlobVariant {
             lit: self.lit.is_some(),
             grouped: self.i_facet.is_some(),
@@ -289,6 +327,7 @@ impl Picture {
             textured: self.textured.is_some(),
             threshold: self.view.edge.has_threshold(),
             ellipsoids: self.has_ellipsoids(),
+            thin: self.textured.is_none() && tau_max <= THIN,
         }
     }
 }

@@ -6,7 +6,7 @@ use nimbus::gpu::Compiler;
 use nimbus::gpu::TargetFormat;
 use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
-use nimbus::passes;
+use nimbus::passes::{self, tiles::Sharing};
 
 use super::{compare, usual};
 use crate::bounded::{Random, greatest_ratio};
@@ -102,8 +102,10 @@ fn workgroups_and_rounds_of_slices_do_not_show() {
         let mut draw = |tiled: &Tiled| picture.draw_by(&mut gpu, None, target, Way::Tiles(*tiled));
         let once = draw(&tiled);
         assert!(draw(&tiled) == once, "drawn twice");
+        let by_subgroup = Tiled { sharing: Some(Sharing::Subgroup), ..tiled };
+        assert!(draw(&by_subgroup) == once, "by a subgroup's lists");
         for invocations in [8, 16, 32, 64] {
-            let other = Tiled { invocations, portable: true, ..tiled };
+            let other = Tiled { invocations, sharing: Some(Sharing::Barriers), ..tiled };
             assert!(draw(&other) == once, "{invocations} invocations without subgroups");
         }
         assert!(draw(&Tiled { max_tiles: Some(3), ..tiled }) == once, "tiles of a workgroup");

@@ -1,7 +1,5 @@
 //! The rounds of a frame: how many pairs of bins and splats are held at once.
 
-use glam::DVec3;
-
 use super::division::{Division, TILES_ACROSS};
 use crate::error::{Error, Result};
 use crate::gpu::Limits;
@@ -145,44 +143,24 @@ impl Rounds {
     }
 }
 
-/// Relative room for the rounding of slopes, and of a splat's own growth.
-const SLACK: f64 = 1.01;
-
-/// Returns the most bins that a blob of `extent` reaches: those of a ball at the extent's least
-/// depth, wherever it is seen.
-///
-/// A ball has radius R, depth z and distance x from the axis. Its slopes from the axis are
-/// (x z ± R √(x² + z² − R²)) / (z² − R²). It is in the picture if x < t z + R √(1 + t²); t is the
-/// slope at the picture's edge. The difference of its slopes grows with x and falls with z.
+/// Returns the most bins that a blob of `extent` reaches.
 fn most_bins(division: &Division, view: &BlobView<'_>, extent: &Extent) -> u64 {
-    let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
-    let forward = vector(view.camera.forward);
-    let middle = (extent.center - vector(view.camera.eye)).dot(forward);
-    let reach = extent.half.dot(forward.abs());
-    let radius = SLACK * extent.radius();
-    let near = f64::from(view.camera.near);
-    if SLACK * (middle + reach) < near {
+    let Division { width, height, n_bins_x, n_bins, .. } = *division;
+    let [across, up] = view.widest_of(extent);
+    if across == 0.0 {
         return 0;
     }
-    let z = (middle - reach).max(near) / SLACK;
-    let all = u64::from(division.n_bins);
-    // Near the ball its slopes are unbounded.
-    if z <= SLACK * radius || !z.is_finite() {
-        return all;
+    if !(across.max(up)).is_finite() {
+        return n_bins.into();
     }
-    let Division { width, height, n_bins_x, .. } = *division;
     let [bin_width, bin_height] = division.tile.map(|n| f64::from(TILES_ACROSS * n));
-    let along = |tangent: f32, pixels: u32, bin: f64, n_bins: u32| {
-        let t = f64::from(tangent);
-        let x = t * z + radius * (1.0 + t * t).sqrt();
-        let square = z * z - radius * radius;
-        let width = 2.0 * radius * (x * x + square).sqrt() / square;
-        // The picture is 2 t wide. A quad is widened by a part of a pixel.
-        let reached = (SLACK * width * f64::from(pixels) / (2.0 * t) + 2.0) / bin;
-        (reached.ceil() as u64 + 1).min(n_bins.into())
+    let along = |slopes: f64, tangent: f32, pixels: u32, bin: f64, n_bins: u32| {
+        // The picture is 2 tangents wide. A quad is widened by a part of a pixel.
+        let reached = (slopes * f64::from(pixels) / (2.0 * f64::from(tangent)) + 2.0) / bin;
+        (reached.ceil() as u64).saturating_add(1).min(n_bins.into())
     };
-    let across = along(view.camera.tan_x, width, bin_width, n_bins_x);
-    across * along(view.camera.tan_y, height, bin_height, division.n_bins / n_bins_x)
+    along(across, view.camera.tan_x, width, bin_width, n_bins_x)
+        * along(up, view.camera.tan_y, height, bin_height, n_bins / n_bins_x)
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The bound of a frame's rounds.
 
+use glam::DVec3;
 use proptest::prelude::*;
 
 use super::*;

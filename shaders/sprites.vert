@@ -9,9 +9,9 @@
 #include "texture.glsl"
 
 // Draws a screen-aligned quad or point around each blob's silhouette, far to near (model.md §9,
-// passes.md "sprites"). In: sorted entries, placed particles, radiance of facets. Out: the quad,
-// and the blob for sprites.frag. Bound: the quad is widened by more than its rounding; the pixel's
-// own test decides.
+// passes.md "sprites"). In: sorted entries, placed particles, radiance of facets. Out: the quad
+// or point, and the blob for sprites.frag. Bound: it is widened by more than its rounding; the
+// pixel's own test decides.
 
 #include "sprites.glsl"
 READS(0, uvec2, entries)
@@ -27,10 +27,11 @@ READS(7, Textured, textured)
 layout(constant_id = 10) const uint POINTS = 0;
 
 const float LOG2_E = 1.44269504089;
-// Vulkan lets a device round the side of a point. Points are drawn only where that is by no more.
+// A device may round the side of a point. The host takes points only where it rounds by no more
+// than this (max_point_size).
 const float POINT_STEP = 1.0 / 8.0;
 
-// All that the fragments need: llvmpipe fetches a push constant again for each of them.
+// All that the fragments of balls need: llvmpipe fetches a push constant again for each of them.
 // The centre's slopes (x/z, y/z), -z^2/(2 sigma^2) in powers of two, optical depth through the
 // centre.
 layout(location = 0) flat out vec4 out_blob;

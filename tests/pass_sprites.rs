@@ -260,20 +260,35 @@ fn small() -> Picture {
     picture
 }
 
-/// Points are for devices that are CPUs; blobs larger than the largest point are quads there, too.
+/// Points are for devices that are CPUs; where a blob is larger than the largest point, all are
+/// quads there, too. [`Picture::draw`] compares both forms.
 #[test]
 fn sprites_are_points_unless_one_is_too_large() {
     let mut gpu = Gpu::new();
-    let is_cpu = gpu.device.info().kind == "cpu" && gpu.device.limits().max_point_size > 64.0;
+    let most = f64::from(gpu.device.limits().max_point_size);
+    let is_cpu = gpu.device.info().kind == "cpu" && most > 200.0;
     let picture = small();
     assert!(compare(&mut gpu, "points", &picture) > 0.02);
     assert_eq!(picture.has_points(&gpu), is_cpu);
+    // Larger than the picture: what lies beyond it is not drawn.
     let at = picture.at(0.3, 0.1, 1.5);
     let huge = picture.clone().blob(at, 100.0, 0.1);
     assert!(compare(&mut gpu, "one is large", &huge) > 0.05);
-    assert!(!huge.has_points(&gpu));
+    assert_eq!(huge.has_points(&gpu), is_cpu);
     if !is_cpu {
         return;
+    }
+    // At the edge of a larger picture, where blobs of a size are widest.
+    let [width, height] = [2.5, 1.875].map(|of_most: f64| (of_most * most) as u32);
+    let mut large = front();
+    (large.view.width, large.view.height) = (width, height);
+    let at = large.at(2.3, 0.1, 5.0);
+    for (sigma, is_point) in [(0.25, true), (0.45, false)] {
+        let picture = large.clone().blob(at, sigma, 0.1);
+        assert_eq!(picture.has_points(&gpu), is_point, "{sigma}");
+        for format in [TargetFormat::Rgba8, TargetFormat::Rgba32f] {
+            picture.draw(&mut gpu, None, format);
+        }
     }
     let (truths, bounds) = picture.truth(FilmFormat::Rgba32f);
     for (from, to) in [
@@ -291,12 +306,18 @@ fn sprites_are_points_unless_one_is_too_large() {
 #[test]
 fn what_bytes_cannot_show_is_left_out() {
     let mut gpu = Gpu::new();
-    let picture = small();
+    let mut picture = small();
+    picture.particles[0].color = [0.5, 20.0, 0.0];
     let own = picture.draw(&mut gpu, None, TargetFormat::Rgba8);
     let whole = Gpu::wrong_compiler("sprites.vert", "BYTES != 0 && TEXTURED == 0", "false");
     assert_eq!(picture.draw(&mut gpu, Some(&whole), TargetFormat::Rgba8), own);
-    let less = Gpu::wrong_compiler("include/target.glsl", "return 510.0 *", "return 250.0 *");
-    assert_ne!(picture.draw(&mut gpu, Some(&less), TargetFormat::Rgba8), own);
+    for (from, to) in [
+        ("return 510.0 *", "return 250.0 *"),
+        ("max(max(radiance.x, radiance.y), max(radiance.z, 1.0))", "1.0"),
+    ] {
+        let wrong = Gpu::wrong_compiler("include/target.glsl", from, to);
+        assert_ne!(picture.draw(&mut gpu, Some(&wrong), TargetFormat::Rgba8), own, "{from}");
+    }
 }
 
 /// Groups of which a part is drawn, and the last of it in part.

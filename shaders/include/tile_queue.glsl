@@ -15,8 +15,8 @@ uint append(uint n, bool hit, uint r) {
     uint t = lane();
     uvec4 hits = subgroupBallot(hit);
     // Each moves towards the first invocation by the number of those before it that missed: by 1 or
-    // not, by 2 or not, and so on. No two meet, as their order stays. Copies that are left behind
-    // are behind all that moved, and do not count.
+    // not, by 2 or not, and so on. No two meet, as their order stays. Copies that are left behind,
+    // and those of the last invocation, are behind all that moved, and do not count.
     uint by = hit ? t - subgroupBallotExclusiveBitCount(hits) : 0u;
     [[unroll]] for (uint k = 1; k < INVOCATIONS; k *= 2) {
         uint from = min(t + k, INVOCATIONS - 1u);

@@ -34,7 +34,7 @@ void compose_loaded(Loaded splat, uint end, float y) {
     // A loop writes its carried values again in each iteration, and the number of iterations bounds
     // the splats of a round (passes.md "tiles").
 #if QUEUE && INVOCATIONS <= 8
-    // Few splats are spared: every invocation has one, but for the last time.
+    // Every batch but a tile's last is full.
     [[unroll]] for (uint m = 0; m < INVOCATIONS; ++m) { compose(of_invocation(splat, m), y); }
 #else
     uint m = 0;

@@ -14,5 +14,5 @@ layout(constant_id = 4) const uint TEXTURED = 0;
 layout(constant_id = 5) const uint THRESHOLD = 0;
 // 1: some blobs are ellipsoids.
 layout(constant_id = 6) const uint ELLIPSOIDS = 0;
-// 1: no blob's optical depth is above 1/8.
+// 1: no blob's optical depth is above 1/8, and none has a texture.
 layout(constant_id = 9) const uint THIN = 0;

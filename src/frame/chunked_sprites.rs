@@ -67,7 +67,7 @@ impl ChunkedSprites {
             let n_pixels = u64::from(width) * u64::from(height);
             Ok(ChunkedSprites {
                 chunks: Chunks::new(device, compiler, format)?,
-                sprites: Sprites::new(device, compiler, FORMAT, variant, BlendMode::UnderTested)?,
+                sprites: Sprites::quads(device, compiler, FORMAT, variant, BlendMode::UnderTested)?,
                 n_chunks,
                 stride: n_max.div_ceil(n_chunks),
                 composed,

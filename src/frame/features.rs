@@ -210,8 +210,11 @@ pub(super) fn tau_bound(scene: &Scene, group: &Group) -> f64 {
     if scene.is_animated() {
         return f64::INFINITY;
     }
-    // At most, one particle stands for all of its group.
+    SQRT_TAU * group.kappa_max * group.sigma_widest() * denser_at_most(scene, group)
+}
+
+/// Returns a bound of the factor on the extinction of `group` where few particles stand for all.
+pub(super) fn denser_at_most(scene: &Scene, group: &Group) -> f64 {
     let conserves = scene.draw.count.is_some_and(|c| c.conserve);
-    let denser = if conserves { f64::from(group.n_particles) } else { 1.0 };
-    SQRT_TAU * group.kappa_max * group.sigma_widest() * denser
+    if conserves { f64::from(group.n_particles) } else { 1.0 }
 }

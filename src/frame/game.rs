@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use tracing::info_span;
 
 use super::clock::ms;
-use super::features::{has_impostors, has_live, is_glossy, tau_bound};
+use super::features::{denser_at_most, has_impostors, has_live, is_glossy, tau_bound};
 use super::live::{disc_records, live_particles};
 use super::packet::Packet;
 use super::tensor_shape::{Shape, basis_of, is_edited, kind_of};
@@ -227,12 +227,17 @@ impl Game {
         let moved = live
             .filter(|_| self.scene.is_animated())
             .map(|all| SQRT_TAU * all.iter().map(tau_of).fold(0.0, f64::max));
+        // Records are from before their groups grew.
+        let tau_of_group = |g: &Group| match moved {
+            Some(tau) => tau * g.scale * denser_at_most(&self.scene, g),
+            None => tau_bound(&self.scene, g),
+        };
         let of = |g: &Group| Extent {
             center: origins[g.i_cloud] + g.center,
             half: g.half_extent + DVec3::splat(g.gust_reach),
             sigma_max: g.sigma_widest(),
             sigma_mean: g.sigma_mean * g.aspects[0].min(1.0),
-            reach: self.scene.draw.edge().reach(moved.unwrap_or_else(|| tau_bound(&self.scene, g))),
+            reach: self.scene.draw.edge().reach(tau_of_group(g)),
             n_particles: g.n_particles,
         };
         groups.iter().filter(|g| g.n_particles > 0).map(of).collect()

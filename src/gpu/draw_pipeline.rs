@@ -133,7 +133,9 @@ impl DrawPipeline {
         let infos = stages.each_ref().map(|stage| stage.info(&specialization));
         let raw = create(device, &interface, (name, primitives), &infos, format, mode)?;
         let handle = device.shared().own(raw, name, ash::Device::destroy_pipeline);
-        device.shared().report(raw, name, &[])?;
+        let variant = [("POINTS", 1)];
+        let n_macros = usize::from(primitives == Primitives::Points);
+        device.shared().report(raw, name, &variant[..n_macros])?;
         let point = vk::PipelineBindPoint::GRAPHICS;
         let (name, rate) = (name.to_owned(), Rate::default());
         let pipeline = Pipeline { handle, point, interface, name, rate };

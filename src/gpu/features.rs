@@ -37,7 +37,9 @@ pub(super) fn max_point_size(
     features: &vk::PhysicalDeviceFeatures,
     limits: &vk::PhysicalDeviceLimits,
 ) -> f32 {
-    match features.large_points == vk::TRUE && limits.point_size_granularity <= 0.125 {
+    // sprites.vert widens points by this POINT_STEP.
+    const MOST_GRANULARITY: f32 = 0.125;
+    match features.large_points == vk::TRUE && limits.point_size_granularity <= MOST_GRANULARITY {
         true => limits.point_size_range[1],
         false => 0.0,
     }

@@ -52,8 +52,9 @@ pub struct Sprites {
     points: Option<Points>,
 }
 
-/// Sprites drawn as points. A CPU runs the vertices of a draw side by side, and the fragments along
-/// a quad's diagonal once and not twice: 0.8 of the time for sprites of 20 pixels.
+/// Sprites drawn as points. llvmpipe runs the vertices of a draw side by side, and computes blocks
+/// of fragments along a quad's diagonal twice (docs/explanation/performance.md, "Tiles or
+/// sprites").
 struct Points {
     pipeline: DrawPipeline,
     /// Pixels along a side of the largest point.
@@ -84,21 +85,29 @@ impl Sprites {
         variant: BlobVariant,
         blend: BlendMode,
     ) -> Result<Sprites> {
-        let of = |primitives: Primitives| {
-            let is_points = primitives == Primitives::Points;
-            let own = [(1, blend != BlendMode::Over), (POINTS, is_points)];
-            let own = own.map(|(id, is_on)| (id, u32::from(is_on)));
-            let constants = [&own[..], &variant.constants()[..]].concat();
-            let (name, target) = (("sprites", primitives), (format, blend));
-            DrawPipeline::of(device, compiler, name, Push::FIELDS, &constants, target)
-        };
+        let quads = Sprites::quads(device, compiler, format, variant, blend)?;
         let most = f64::from(device.limits().max_point_size);
-        let has_points = device.info().kind == "cpu" && most > WIDENED;
-        let points = || Ok(Points { pipeline: of(Primitives::Points)?, most });
-        Ok(Sprites {
-            strips: of(Primitives::Strips)?,
-            points: has_points.then(points).transpose()?,
-        })
+        if device.info().kind != "cpu" || most <= WIDENED {
+            return Ok(quads);
+        }
+        let points = Primitives::Points;
+        let pipeline = pipeline(device, compiler, format, variant, (blend, points))?;
+        Ok(Sprites { points: Some(Points { pipeline, most }), ..quads })
+    }
+
+    /// Creates the same pipelines without that of points.
+    ///
+    /// # Errors
+    /// As [`Sprites::new`].
+    pub fn quads(
+        device: &Device,
+        compiler: &Compiler,
+        format: TargetFormat,
+        variant: BlobVariant,
+        blend: BlendMode,
+    ) -> Result<Sprites> {
+        let strips = pipeline(device, compiler, format, variant, (blend, Primitives::Strips))?;
+        Ok(Sprites { strips, points: None })
     }
 
     /// Creates the pipeline that sums over the layers of each pixel: it adds up optical depths in
@@ -124,7 +133,8 @@ impl Sprites {
     pub fn primitives(&self, view: &BlobView<'_>, [width, height]: [u32; 2]) -> Primitives {
         let [across, up] = view.widest();
         let [x, y] = view.camera.pixel_slopes(width, height).map(f64::from);
-        let side = (across / x).max(up / y) + WIDENED;
+        // What lies beyond the picture is not drawn.
+        let side = (across / x).min(width.into()).max((up / y).min(height.into())) + WIDENED;
         let fits = |points: &Points| side <= points.most;
         if self.points.as_ref().is_some_and(fits) { Primitives::Points } else { Primitives::Strips }
     }
@@ -168,6 +178,21 @@ impl Sprites {
     ) -> Result<()> {
         record_by(&self.strips, rec, buffers, target, view, range)
     }
+}
+
+fn pipeline(
+    device: &Device,
+    compiler: &Compiler,
+    format: TargetFormat,
+    variant: BlobVariant,
+    (blend, primitives): (BlendMode, Primitives),
+) -> Result<DrawPipeline> {
+    let is_points = primitives == Primitives::Points;
+    let own = [(1, blend != BlendMode::Over), (POINTS, is_points)];
+    let own = own.map(|(id, is_on)| (id, u32::from(is_on)));
+    let constants = [&own[..], &variant.constants()[..]].concat();
+    let (name, target) = (("sprites", primitives), (format, blend));
+    DrawPipeline::of(device, compiler, name, Push::FIELDS, &constants, target)
 }
 
 fn record_by(

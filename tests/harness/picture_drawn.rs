@@ -58,8 +58,7 @@ struct Uploaded {
 
 /// The passes.
 enum Made {
-    /// As points where they fit.
-    Sprites(Box<Sprites>, bool),
+    Sprites(Box<Sprites>),
     Tiles(Box<Tiling>, f64),
     Chunks(Box<ChunkedSprites>, f64),
 }
@@ -88,7 +87,7 @@ impl Picture {
         let view = self.blob_view(&camera, Some(&extents), 0.0);
         let size = [self.view.width, self.view.height];
         let is_points = |s: &Sprites| s.primitives(&view, size) == Primitives::Points;
-        matches!(made, Made::Sprites(sprites, _) if is_points(&sprites))
+        matches!(made, Made::Sprites(sprites) if is_points(&sprites))
     }
 
     /// Returns the extents of the blobs, each one's alone.
@@ -198,8 +197,9 @@ impl Picture {
             Way::Sprites | Way::Points => {
                 let blend =
                     if self.scenery.is_some() { BlendMode::OverTested } else { BlendMode::Over };
-                let made = Sprites::new(&gpu.device, compiler, format, variant, blend);
-                Made::Sprites(Box::new(made.expect("sprites")), way == Way::Points)
+                let new = if way == Way::Points { Sprites::new } else { Sprites::quads };
+                let made = new(&gpu.device, compiler, format, variant, blend);
+                Made::Sprites(Box::new(made.expect("sprites")))
             }
             Way::Tiles(tiled) => {
                 Made::Tiles(Box::new(self.tiling(gpu, compiler, format, &tiled)), tiled.saturated)
@@ -279,8 +279,8 @@ impl Picture {
         let extents = self.extents();
         let start = if self.scenery.is_some() { LoadOp::Load } else { LoadOp::Clear };
         match made {
-            Made::Sprites(sprites, points) => {
-                let view = self.blob_view(camera, points.then_some(&extents[..]), 0.0);
+            Made::Sprites(sprites) => {
+                let view = self.blob_view(camera, Some(&extents), 0.0);
                 sprites.record(rec, &from, (target, start), &view, n)
             }
             Made::Tiles(tiling, saturated) => {

@@ -102,8 +102,10 @@ fn workgroups_and_rounds_of_slices_do_not_show() {
         let mut draw = |tiled: &Tiled| picture.draw_by(&mut gpu, None, target, Way::Tiles(*tiled));
         let once = draw(&tiled);
         assert!(draw(&tiled) == once, "drawn twice");
-        let by_subgroup = Tiled { sharing: Some(Sharing::Subgroup), ..tiled };
-        assert!(draw(&by_subgroup) == once, "by a subgroup's lists");
+        for sharing in [Sharing::Registers, Sharing::Subgroup] {
+            let other = Tiled { sharing: Some(sharing), ..tiled };
+            assert!(draw(&other) == once, "{sharing:?}");
+        }
         for invocations in [8, 16, 32, 64] {
             let other = Tiled { invocations, sharing: Some(Sharing::Barriers), ..tiled };
             assert!(draw(&other) == once, "{invocations} invocations without subgroups");

@@ -38,7 +38,7 @@ fn resolution() -> Spec<Resolution> {
 }
 
 keys! { DRAW: fn draw(s) -> Draw { Draw;
-    /// How particles are drawn: as quads in the graphics pipeline, as tiles of pixels in compute,
+    /// How particles are drawn: as sprites in the graphics pipeline, as tiles of pixels in compute,
     /// or whichever is faster at the first frame.
     path: choice("tiles", &DrawPath::NAMES);
     /// Whether distant particles are shown again from a picture of them.

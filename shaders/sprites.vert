@@ -86,7 +86,7 @@ void main() {
         cut = min(cut, max(log(tau * push.inv_threshold), push.least_cut));
     }
     if (BYTES != 0 && TEXTURED == 0) {
-        cut = min(cut, log(tau * greatest_effect(out_radiance)));
+        cut = min(cut, log(tau * inv_least_shown(out_radiance)));
     }
     out_lowest = -LOG2_E * cut;
     out_screen = vec4(push.pixel, push.camera.tan_x, push.camera.tan_y);

@@ -19,7 +19,7 @@ use glam::DVec3;
 use harness::{Gpu, assert_within};
 use nimbus::error::Error;
 use nimbus::gpu::TargetFormat;
-use nimbus::gpu::{Barriers, BlendMode, Image, LoadOp, RecordCount, Target};
+use nimbus::gpu::{Barriers, BlendMode, Image, LoadOp, Primitives, RecordCount, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::film::FilmFormat;
@@ -329,8 +329,10 @@ fn a_target_that_does_not_fit_is_refused() {
     let mut gpu = Gpu::new();
     let format = TargetFormat::Rgba16f;
     let variant = BlobVariant::default();
-    let over =
-        |blend| Sprites::new(&gpu.device, &gpu.compiler, format, variant, blend).expect("sprites");
+    let over = |blend| {
+        let way = (blend, Primitives::Strips);
+        Sprites::new(&gpu.device, &gpu.compiler, format, variant, way).expect("sprites")
+    };
     let (alone, behind) = (over(BlendMode::Over), over(BlendMode::OverTested));
     let surfaces = Surfaces::new(&gpu.device, &gpu.compiler, format, false).expect("surfaces");
     let mut color =

@@ -18,6 +18,6 @@ vec3 in_target(vec3 radiance) {
 // Returns the number n for which a layer in a target of bytes changes no pixel where its opacity is
 // below 1/n. It changes a number C of the target by alpha (L - C), and the opacity by at most
 // alpha. That is below half a byte's step, and a device that rounds to nearest rounds it away.
-float greatest_effect(vec3 radiance) {
+float inv_least_shown(vec3 radiance) {
     return 510.0 * max(max(radiance.x, radiance.y), max(radiance.z, 1.0));
 }

@@ -9,6 +9,15 @@ const uint ENOUGH = INVOCATIONS;
 uint waiting;
 uint left_over;
 
+// Moves splats by k invocations towards the first one where `by` has this bit.
+void move_by(uint k, inout uint by, inout uint r) {
+    uint from = min(lane() + k, INVOCATIONS - 1u);
+    uint by_there = subgroupShuffle(by, from), there = subgroupShuffle(r, from);
+    bool comes = (by_there & k) != 0;
+    by = comes ? by_there : by;
+    r = comes ? there : r;
+}
+
 // Appends the splats of the invocations that hit to the n that wait, in the order of invocations;
 // returns the new number, below twice that of invocations.
 uint append(uint n, bool hit, uint r) {
@@ -18,13 +27,13 @@ uint append(uint n, bool hit, uint r) {
     // not, by 2 or not, and so on. No two meet, as their order stays. Copies that are left behind,
     // and those of the last invocation, are behind all that moved, and do not count.
     uint by = hit ? t - subgroupBallotExclusiveBitCount(hits) : 0u;
-    [[unroll]] for (uint k = 1; k < INVOCATIONS; k *= 2) {
-        uint from = min(t + k, INVOCATIONS - 1u);
-        uint by_there = subgroupShuffle(by, from), there = subgroupShuffle(r, from);
-        bool comes = (by_there & k) != 0;
-        by = comes ? by_there : by;
-        r = comes ? there : r;
-    }
+    // No loop: llvmpipe does not unroll one that doubles its counter, and counts its iterations.
+    move_by(1, by, r);
+    move_by(2, by, r);
+    move_by(4, by, r);
+    if (INVOCATIONS > 8) { move_by(8, by, r); }
+    if (INVOCATIONS > 16) { move_by(16, by, r); }
+    if (INVOCATIONS > 32) { move_by(32, by, r); }
     // Behind those that wait, and around the end.
     r = subgroupShuffle(r, (t - n) & (INVOCATIONS - 1u));
     waiting = t < n ? waiting : r;

@@ -7,7 +7,7 @@ use super::tiling::Tiling;
 use crate::error::{Error, Result};
 use crate::gpu::{
     BlendMode, Buffer, BufferSpec, Compiler, DEPTH_BYTES_PER_PIXEL, Device, Image, LoadOp,
-    Recorder, Target, TargetFormat,
+    Primitives, Recorder, Target, TargetFormat,
 };
 use crate::model::scene::{Chunks, DrawPath, Scene};
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};
@@ -119,7 +119,8 @@ impl BlobTarget {
                 return Ok(Method::Chunks(Box::new(chunks)));
             }
             let blend = if has_depth { BlendMode::OverTested } else { BlendMode::Over };
-            let sprites = Sprites::new(device, compiler, format, variant, blend)?;
+            let way = (blend, Primitives::Points);
+            let sprites = Sprites::new(device, compiler, format, variant, way)?;
             Ok(Method::Sprites(Box::new(sprites)))
         };
         let depth = || Image::depth(device, "surfaces.depth", width, height);

@@ -3,8 +3,8 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::{
-    BlendMode, Buffer, Compiler, Device, Image, InstanceCount, LoadOp, RecordCount, Recorder,
-    Target, TargetFormat, buffers,
+    BlendMode, Buffer, Compiler, Device, Image, InstanceCount, LoadOp, Primitives, RecordCount,
+    Recorder, Target, TargetFormat, buffers,
 };
 use crate::layout::cull::KeptRecord;
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobVariant, BlobView};
@@ -64,10 +64,11 @@ impl ChunkedSprites {
         let make = || -> Result<ChunkedSprites> {
             // First the image, whose error says whether the device can blend into it.
             let composed = Image::color_target(device, "chunks.composed", width, height, FORMAT)?;
+            let way = (BlendMode::UnderTested, Primitives::Strips);
             let n_pixels = u64::from(width) * u64::from(height);
             Ok(ChunkedSprites {
                 chunks: Chunks::new(device, compiler, format)?,
-                sprites: Sprites::quads(device, compiler, FORMAT, variant, BlendMode::UnderTested)?,
+                sprites: Sprites::new(device, compiler, FORMAT, variant, way)?,
                 n_chunks,
                 stride: n_max.div_ceil(n_chunks),
                 composed,

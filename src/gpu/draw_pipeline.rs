@@ -133,9 +133,11 @@ impl DrawPipeline {
         let infos = stages.each_ref().map(|stage| stage.info(&specialization));
         let raw = create(device, &interface, (name, primitives), &infos, format, mode)?;
         let handle = device.shared().own(raw, name, ash::Device::destroy_pipeline);
-        let variant = [("POINTS", 1)];
-        let n_macros = usize::from(primitives == Primitives::Points);
-        device.shared().report(raw, name, &variant[..n_macros])?;
+        let macros: &[_] = match primitives {
+            Primitives::Strips => &[],
+            Primitives::Points => &[("POINTS", 1)],
+        };
+        device.shared().report(raw, name, macros)?;
         let point = vk::PipelineBindPoint::GRAPHICS;
         let (name, rate) = (name.to_owned(), Rate::default());
         let pipeline = Pipeline { handle, point, interface, name, rate };

@@ -74,7 +74,8 @@ pub struct Range<'a> {
 
 impl Sprites {
     /// Creates the pipelines. `Over` draws far to near into a color target, `OverTested` far to
-    /// near over surfaces with depth, and `UnderTested` near to far into a target with depth.
+    /// near over surfaces with depth, and `UnderTested` near to far into a target with depth. With
+    /// `Points`, sprites are points where the device takes them, and strips elsewhere.
     ///
     /// # Errors
     /// Fails if a shader does not compile or the pipeline cannot be created.
@@ -83,31 +84,24 @@ impl Sprites {
         compiler: &Compiler,
         format: TargetFormat,
         variant: BlobVariant,
-        blend: BlendMode,
+        (blend, primitives): (BlendMode, Primitives),
     ) -> Result<Sprites> {
-        let quads = Sprites::quads(device, compiler, format, variant, blend)?;
+        let of = |primitives: Primitives| {
+            let is_points = primitives == Primitives::Points;
+            let own = [(1, blend != BlendMode::Over), (POINTS, is_points)];
+            let own = own.map(|(id, is_on)| (id, u32::from(is_on)));
+            let constants = [&own[..], &variant.constants()[..]].concat();
+            let (name, target) = (("sprites", primitives), (format, blend));
+            DrawPipeline::of(device, compiler, name, Push::FIELDS, &constants, target)
+        };
         let most = f64::from(device.limits().max_point_size);
-        if device.info().kind != "cpu" || most <= WIDENED {
-            return Ok(quads);
-        }
-        let points = Primitives::Points;
-        let pipeline = pipeline(device, compiler, format, variant, (blend, points))?;
-        Ok(Sprites { points: Some(Points { pipeline, most }), ..quads })
-    }
-
-    /// Creates the same pipelines without that of points.
-    ///
-    /// # Errors
-    /// As [`Sprites::new`].
-    pub fn quads(
-        device: &Device,
-        compiler: &Compiler,
-        format: TargetFormat,
-        variant: BlobVariant,
-        blend: BlendMode,
-    ) -> Result<Sprites> {
-        let strips = pipeline(device, compiler, format, variant, (blend, Primitives::Strips))?;
-        Ok(Sprites { strips, points: None })
+        let takes_points = device.info().kind == "cpu" && most > WIDENED;
+        let points = || Ok(Points { pipeline: of(Primitives::Points)?, most });
+        let has_points = takes_points && primitives == Primitives::Points;
+        Ok(Sprites {
+            strips: of(Primitives::Strips)?,
+            points: has_points.then(points).transpose()?,
+        })
     }
 
     /// Creates the pipeline that sums over the layers of each pixel: it adds up optical depths in
@@ -133,7 +127,7 @@ impl Sprites {
     pub fn primitives(&self, view: &BlobView<'_>, [width, height]: [u32; 2]) -> Primitives {
         let [across, up] = view.widest();
         let [x, y] = view.camera.pixel_slopes(width, height).map(f64::from);
-        // What lies beyond the picture is not drawn.
+        // Parts of a sprite beyond the picture's edge are not drawn.
         let side = (across / x).min(width.into()).max((up / y).min(height.into())) + WIDENED;
         let fits = |points: &Points| side <= points.most;
         if self.points.as_ref().is_some_and(fits) { Primitives::Points } else { Primitives::Strips }
@@ -178,21 +172,6 @@ impl Sprites {
     ) -> Result<()> {
         record_by(&self.strips, rec, buffers, target, view, range)
     }
-}
-
-fn pipeline(
-    device: &Device,
-    compiler: &Compiler,
-    format: TargetFormat,
-    variant: BlobVariant,
-    (blend, primitives): (BlendMode, Primitives),
-) -> Result<DrawPipeline> {
-    let is_points = primitives == Primitives::Points;
-    let own = [(1, blend != BlendMode::Over), (POINTS, is_points)];
-    let own = own.map(|(id, is_on)| (id, u32::from(is_on)));
-    let constants = [&own[..], &variant.constants()[..]].concat();
-    let (name, target) = (("sprites", primitives), (format, blend));
-    DrawPipeline::of(device, compiler, name, Push::FIELDS, &constants, target)
 }
 
 fn record_by(

@@ -27,8 +27,7 @@ use rounds::{Form, Rounds};
 /// The way in which the invocations of a tile share the splats that they have found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sharing {
-    /// In registers, by subgroup operations. Not with slices, whose loops would then take more
-    /// iterations than a round is planned for (`compositing/thin-slices`).
+    /// In registers, by subgroup operations.
     Registers,
     /// In shared memory, by subgroup operations.
     Subgroup,
@@ -143,9 +142,8 @@ impl Tiles {
         let limits = device.limits();
         let sharing = match variant.sharing {
             _ if !limits.is_one_subgroup(division.invocations) => Sharing::Barriers,
-            Some(Sharing::Registers) | None if slices => Sharing::Subgroup,
             Some(sharing) => sharing,
-            // It reads and writes shared memory for one invocation after the other.
+            // llvmpipe reads and writes shared memory for one invocation after the other.
             None if device.info().kind == "cpu" => Sharing::Registers,
             None => Sharing::Subgroup,
         };

@@ -197,8 +197,12 @@ impl Picture {
             Way::Sprites | Way::Points => {
                 let blend =
                     if self.scenery.is_some() { BlendMode::OverTested } else { BlendMode::Over };
-                let new = if way == Way::Points { Sprites::new } else { Sprites::quads };
-                let made = new(&gpu.device, compiler, format, variant, blend);
+                let primitives = match way {
+                    Way::Points => Primitives::Points,
+                    _ => Primitives::Strips,
+                };
+                let way = (blend, primitives);
+                let made = Sprites::new(&gpu.device, compiler, format, variant, way);
                 Made::Sprites(Box::new(made.expect("sprites")))
             }
             Way::Tiles(tiled) => {

@@ -102,7 +102,7 @@ fn workgroups_and_rounds_of_slices_do_not_show() {
         let mut draw = |tiled: &Tiled| picture.draw_by(&mut gpu, None, target, Way::Tiles(*tiled));
         let once = draw(&tiled);
         assert!(draw(&tiled) == once, "drawn twice");
-        for sharing in [Sharing::Subgroup, Sharing::Barriers] {
+        for sharing in [Sharing::Registers, Sharing::Subgroup] {
             let other = Tiled { sharing: Some(sharing), ..tiled };
             assert!(draw(&other) == once, "{sharing:?}");
         }

@@ -16,8 +16,8 @@
 // (passes.md "tiles"). In: splats, sorted pairs (bin, splat), the ranges of the
 // bins. Out: the picture, premultiplied, over the surfaces where there are any. Law: as sprites,
 // but near to far (tile_thin.glsl), or by slices (tile_slices.glsl). A pixel that lets less through
-// than push.saturated ends. Bound: (1 - A) of the radiance behind a saturated pixel;
-// power_of_two()'s and opacity()'s errors.
+// than push.saturated ends. Bound: (1 - A) of the radiance behind a saturated pixel; the errors of
+// the power of two and of the opacity.
 
 #ifndef INVOCATIONS
 #define INVOCATIONS 8
@@ -109,6 +109,9 @@ READS(7, uint, depths)
 TEXELS(8, splat_textures)
 #endif
 
+// The picture has 16 bits a channel or fewer, and its functions of a splat are less exact.
+const bool HALVES = PIXEL_WORDS < 4 && SLICES == 0;
+
 #include "tile_splats.glsl"
 
 // The invocation's row of pixels while it is composed.
@@ -197,9 +200,9 @@ void find_depths(Loaded splat, float y, bool shows[RUN], out float tau[RUN]) {
                 );
         e[j] = clamp(e[j], -125.0, 125.0);
 #endif
+        float factor = HALVES ? power_of_two_16(e[j]) : power_of_two(e[j]);
         // By bits: llvmpipe takes twice as long to choose between two floats.
-        tau[j] =
-            uintBitsToFloat(floatBitsToUint(deep[j] * power_of_two(e[j])) & (is_seen ? ~0u : 0u));
+        tau[j] = uintBitsToFloat(floatBitsToUint(deep[j] * factor) & (is_seen ? ~0u : 0u));
     }
 }
 

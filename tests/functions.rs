@@ -30,6 +30,10 @@ void main() {
         case 1: y[i] = erf_approx(x[i]); break;
         case 2: y[i] = one_minus_exp(x[i]); break;
         case 5: y[i] = power_of_two(x[i]); break;
+        case 6: y[i] = power_of_two_16(x[i]); break;
+        case 7: y[i] = one_minus_exp_16(x[i]); break;
+        case 8: y[i] = thin_opacity(x[i]); break;
+        case 9: y[i] = thin_opacity_16(x[i]); break;
         default: y[i] = unit_at(x[i])[push.which - 3];
         }
     }
@@ -70,6 +74,10 @@ const ERF: u32 = 1;
 const ONE_MINUS_EXP: u32 = 2;
 const UNIT_AT: u32 = 3;
 const POWER_OF_TWO: u32 = 5;
+const POWER_OF_TWO_16: u32 = 6;
+const ONE_MINUS_EXP_16: u32 = 7;
+const THIN_OPACITY: u32 = 8;
+const THIN_OPACITY_16: u32 = 9;
 
 fn evaluate(gpu: &mut Gpu, kernel: &Kernel, which: u32, x: &[f32]) -> Vec<f64> {
     let (input, output) = (gpu.upload(x), gpu.buffer::<f32>(x.len()));
@@ -228,6 +236,37 @@ fn powers_of_two_are_within_their_documented_error() {
     let wrong = wrong_functions(&gpu, "0.0555071327386", "0.0555171327386");
     let values = evaluate(&mut gpu, &wrong, POWER_OF_TWO, &x);
     assert!(check_within("a wrong power", &values, &truths, &bounds).is_err());
+
+    // The one for 16 bits: its polynomial errs by 2.6e-6. Rounding is the same.
+    let bounds: Vec<f64> = truths.iter().map(|t| (2.6e-6 + 3.7 * U_F32) * t).collect();
+    let values = evaluate(&mut gpu, &kernel, POWER_OF_TWO_16, &x);
+    assert_within_and_say("a power of two for 16 bits", &values, &truths, &bounds);
+    let wrong = wrong_functions(&gpu, "0.0559178603194", "0.0559378603194");
+    let values = evaluate(&mut gpu, &wrong, POWER_OF_TWO_16, &x);
+    assert!(check_within("a wrong power for 16 bits", &values, &truths, &bounds).is_err());
+}
+
+/// The opacities of thin blobs. Their fits err by 1.6e-8 and by 2.5e-6. The bracket is near 1 and
+/// at most 1: its last sum rounds by u, what it adds up by less than u/4 together, and the product
+/// by u.
+#[test]
+fn thin_opacities_keep_their_relative_accuracy() {
+    let mut gpu = Gpu::new();
+    let kernel = gpu.test_kernel("functions", FUNCTIONS, Push::FIELDS);
+    let mut x: Vec<f32> = sweep(1e-30, 0.125, 200_000).into_iter().map(f32::abs).collect();
+    x.extend([0.0, 0.125]);
+    let truths: Vec<f64> = x.iter().map(|x| -libm::expm1(-f64::from(*x))).collect();
+    for (what, which, fit, from, to) in [
+        ("thin", THIN_OPACITY, 1.6e-8, "0.499996093888", "0.499986093888"),
+        ("thin for 16 bits", THIN_OPACITY_16, 2.5e-6, "0.159046454904", "0.159446454904"),
+    ] {
+        let bounds: Vec<f64> = truths.iter().map(|t| (fit + 2.25 * U_F32) * t).collect();
+        let values = evaluate(&mut gpu, &kernel, which, &x);
+        assert_within_and_say(what, &values, &truths, &bounds);
+        let wrong = wrong_functions(&gpu, from, to);
+        let values = evaluate(&mut gpu, &wrong, which, &x);
+        assert!(check_within(what, &values, &truths, &bounds).is_err(), "{to}");
+    }
 }
 
 /// The relative error that functions.glsl promises. The exponent x is rounded twice. Where n is 0,
@@ -248,6 +287,14 @@ fn one_minus_exp_keeps_its_relative_accuracy() {
     let bounds: Vec<f64> = truths.iter().map(|t| ONE_MINUS_EXP_ERROR * t).collect();
     assert_within_and_say("1 - e^-t", &values, &truths, &bounds);
     assert_eq!(values[x.len() - 5], 0.0);
+
+    // The one for 16 bits: its fit errs by 1.5e-5.
+    let bounds_16: Vec<f64> = truths.iter().map(|t| (1.5e-5 + ONE_MINUS_EXP_ERROR) * t).collect();
+    let values = evaluate(&mut gpu, &kernel, ONE_MINUS_EXP_16, &x);
+    assert_within_and_say("1 - e^-t for 16 bits", &values, &truths, &bounds_16);
+    let wrong = wrong_functions(&gpu, "0.0558372882603", "0.0559372882603");
+    let values = evaluate(&mut gpu, &wrong, ONE_MINUS_EXP_16, &x);
+    assert!(check_within("wrong for 16 bits", &values, &truths, &bounds_16).is_err());
 
     // The cancellation near 0 must show, and a wrong digit.
     for (from, to) in [

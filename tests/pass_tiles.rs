@@ -174,6 +174,30 @@ fn a_bin_of_all_splats_keeps_the_last_ones() {
     assert!((alpha - (1.0 - (-8f64).exp())).abs() < 1e-5, "{alpha}");
 }
 
+/// A picture of floats takes the exact functions, whether thin or not: those of fewer bits are some
+/// ten times worse, which is less than the bound allows at a sprite's edge.
+#[test]
+fn pictures_of_floats_have_exact_functions() {
+    let mut gpu = Gpu::new();
+    let (target, format) = FORMATS[2];
+    let tiled = usual(&gpu, format);
+    let wrong = Gpu::wrong_compiler("tiles.comp", "PIXEL_WORDS < 4", "PIXEL_WORDS <= 4");
+    for tau in [0.1, 2.0] {
+        let picture = front();
+        let at = picture.at(0.1, 0.1, 5.0);
+        let picture = picture.blob(at, 0.5, tau);
+        let (truths, _) = picture.tiled_truth(format, tiled.saturated);
+        let mut rms = |compiler: Option<&Compiler>| {
+            let values = picture.draw_by(&mut gpu, compiler, target, Way::Tiles(tiled));
+            let sum: f64 = values.iter().zip(&truths).map(|(a, b)| (a - b).powi(2)).sum();
+            (sum / values.len() as f64).sqrt()
+        };
+        let [exact, coarse] = [rms(None), rms(Some(&wrong))];
+        println!("{tau}: {exact:.1e}, of fewer bits {coarse:.1e}");
+        assert!(exact < 1e-7 * tau.min(1.0) && coarse > 4.0 * exact, "{tau}: {exact:e} {coarse:e}");
+    }
+}
+
 #[test]
 fn wrong_pictures_are_noticed() {
     let mut gpu = Gpu::new();

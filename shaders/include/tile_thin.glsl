@@ -1,11 +1,13 @@
 // Composition near to far of splats that are thin: C += (1 - A) a L, A += (1 - A) a, a the opacity
 // of the whole splat, at its centre (passes.md "tiles"). Needs the row of tiles.comp.
 
+float opacity(float t) {
 #if THIN
-float opacity(float t) { return thin_opacity(t); }
+    return HALVES ? thin_opacity_16(t) : thin_opacity(t);
 #else
-float opacity(float t) { return one_minus_exp(t); }
+    return HALVES ? one_minus_exp_16(t) : one_minus_exp(t);
 #endif
+}
 
 void compose(Loaded splat, float y) {
     // Radiance, near/z.

@@ -42,7 +42,10 @@ impl Picture {
         saturated: f64,
         by_tiles: bool,
     ) -> (Vec<f64>, Vec<f64>) {
-        let [off_alpha, edge, tau] = self.worst(by_tiles);
+        let [mut off_alpha, edge, tau] = self.worst(by_tiles);
+        if by_tiles {
+            off_alpha += tiles::off_alpha(format);
+        }
         let depth = crate::picture::DEPTH;
         let rounding = Rounding { depth, tau, ..Rounding::of(format, off_alpha, edge) };
         let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());

@@ -143,7 +143,7 @@ fn wrong_slices_are_noticed() {
         ("include/tile_slices.glsl", "(wall[j] - distance) * in_sigmas", "10.0", 1),
         ("include/tile_slices.glsl", "+ flatness * upward[j]", "", 1),
         ("include/tile_slices.glsl", "sqrt(white / norm)", "1.0", 1),
-        ("tiles.comp", "tau[j] =\n            uint", "tau[j] = 0.99 *\n            uint", 0),
+        ("tiles.comp", "tau[j] = uint", "tau[j] = 0.99 * uint", 0),
     ] {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{from}");

@@ -8,12 +8,13 @@ use super::frame::FrameReference;
 use super::local_scene;
 use super::pixels::Pixels;
 use super::sprites::{drawn_blobs, raster, set_order, with_textures};
-use crate::model::scene::{LightingMode, Scene};
+use crate::model::scene::{DrawPath, LightingMode, Scene};
 use crate::model::terrain::Terrain;
 use crate::reference::Blob;
 use crate::reference::composite::{OpaquePixel, Rounding};
 use crate::reference::parallel::parallel_map;
 use crate::reference::sprites::{self, Bounded, Sprites};
+use crate::reference::tiles::off_alpha;
 use crate::reference::view::View;
 use crate::reference::{surfaces, terrain};
 
@@ -209,8 +210,10 @@ pub(super) fn rounding(scene: &Scene, view: &View, blobs: &[Blob]) -> Rounding {
     let off = N_ROUNDINGS * unit * farthest / narrow.unwrap_or(1.0);
     let texture = if scene.is_textured() { TEXTURED } else { 0.0 };
     let reach = blobs.iter().map(|b| view.edge.reach(b.deepest())).fold(0.0, f64::max);
-    let alpha = ONE_MINUS_EXP + reach * off + texture;
-    let stored = Rounding::of(scene.film.format, alpha, off);
+    let format = scene.film.format;
+    let by_tiles = if scene.draw.path == DrawPath::Sprites { 0.0 } else { off_alpha(format) };
+    let alpha = ONE_MINUS_EXP + reach * off + texture + by_tiles;
+    let stored = Rounding::of(format, alpha, off);
     // Besides the store there are four roundings: L1 + L2, α L, (1 − α) C and their sum.
     Rounding { depth: N_ROUNDINGS * unit, unit: stored.unit + 2.0 * unit, ..stored }
 }

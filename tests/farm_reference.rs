@@ -111,7 +111,7 @@ fn impossible_references_are_refused() {
     let plan = ["farm", "plan", "-o", path_text(&folder)];
     let hello = ["scenes/hello.toml", "--set", PLAIN];
     for (more, expected) in [
-        (&["--reference", "thick"][..], "expected thin, slices, volume, model or reflections=K"),
+        (&["--reference", "thick"][..], "expected thin, slices, volume, model, reflections=K"),
         (&["--reference", "thin", "--samples", "0"], "expected a number of samples from 1 to"),
         (&["--reference", "thin", "--shard-samples", "12"], "expected a power of two"),
         (&["--reference", "thin", "--frames", "4"], "cannot be used with"),

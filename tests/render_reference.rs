@@ -177,7 +177,7 @@ fn what_a_reference_cannot_do_is_said_and_nothing_written() {
     let dir = temp();
     let out = path(&dir, "never.exr");
     for (args, expected) in [
-        (&["--reference", "thick"][..], "expected thin, slices, volume, model or reflections=K"),
+        (&["--reference", "thick"][..], "expected thin, slices, volume, model, reflections=K"),
         (&["--reference", "thin", "--device", "0"], "cannot be used with"),
         (&["--reference", "thin", "--validation"], "cannot be used with"),
         (&["--reference", "volume", "--no-skip"], "cannot be used with"),

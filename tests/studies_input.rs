@@ -96,8 +96,8 @@ fn faulty_arguments_are_refused_before_any_work() {
         ),
         (
             &["error", "scene.toml", "--against=nonsense"],
-            "invalid value 'nonsense' for '--against <WHAT>': expected thin, slices, volume, model \
-             or reflections=K with K from 1 to 64, found \"nonsense\"",
+            "invalid value 'nonsense' for '--against <WHAT>': expected thin, slices, volume, \
+             model, reflections=K with K from 1 to 64, or transport, found \"nonsense\"",
         ),
         (
             &["error", "scene.toml", "--against=reflections=2", "--set", "lighting.mode=\"none\""],

@@ -61,15 +61,16 @@ pub enum Command {
     /// Draw one frame to a PNG or EXR file
     ///
     /// With --reference the frame is drawn in f64 on the processor, without a Vulkan device and
-    /// without shaders (docs/explanation/model.md §9). There are five references, each without an
+    /// without shaders (docs/explanation/model.md §9). There are six references, each without an
     /// approximation of the one before it.
     ///
     /// "thin" draws the same sprites as the device, sorted by exact depth; it differs from the
     /// device by arithmetic alone. "slices" draws the same blobs composed by slices (draw.overlap).
     /// "volume" integrates light through the overlapping blobs, to about a millionth of the
     /// brightest. "model" also computes the light on the blobs by the model itself, and the light
-    /// on surfaces pixel by pixel. "reflections=K" computes K reflections. --samples takes the mean
-    /// over each pixel's area, and more random paths, instead of the value at its centre.
+    /// on surfaces pixel by pixel. "reflections=K" computes K reflections. "transport" follows random
+    /// paths of light through the blobs as a medium (docs/explanation/transport.md). --samples takes
+    /// the mean over each pixel's area, and more random paths, instead of the value at its centre.
     Render(RenderArgs),
     /// Time a scene in the serial and the parallel loop
     ///
@@ -125,7 +126,8 @@ pub enum Command {
     /// sprites in f64, uncut, in the scene's own light; "slices", the same blobs by slices;
     /// "volume", the integral over the overlapping blobs in that light; "model", in light without
     /// density grid, facet groups, basis and pairs; "reflections=K", with K reflections, those
-    /// beyond the second by random paths. For knobs of lighting use one of the last two.
+    /// beyond the second by random paths; "transport", radiative transfer by random paths
+    /// (docs/explanation/transport.md). For knobs of lighting use one of the last three.
     ///
     /// Frames are timed as if everything moved in each, except for what a run makes only once
     /// (particles of boxes, textures). --as-played times the scene's own frames. An "auto" in the

@@ -20,7 +20,7 @@ pub fn check(args: &RenderArgs) -> Result<()> {
             "--layers: the reference \"{kind}\" is no picture of layers; expected --reference thin"
         )));
     }
-    if args.samples > 1 {
+    if args.samples.is_some_and(|n| n > 1) {
         return Err(Error::usage(
             "--layers: depths and numbers have no mean over a pixel; expected --samples 1",
         ));

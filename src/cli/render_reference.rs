@@ -8,15 +8,18 @@ use super::args::RenderArgs;
 use super::progress::ReferenceProgress;
 use super::scene::print_sizes;
 use super::{output, render_layers};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io::console::say;
 use crate::io::image::{self, image_hash};
 use crate::io::layers::{self, CHANNELS};
 use crate::model::scene::{Draw, Scene};
 use crate::reference::picture::{
-    self, BlobModel, DrawnPicture, Pixels, ReferenceKind, ReferenceRequest, check_memory,
-    drawn_as_set, layers_as_set,
+    self, BlobModel, DrawnPicture, Enough, MAX_SAMPLES, MeanPicture, Pixels, ReferenceKind,
+    ReferenceRequest, check_memory, drawn_as_set, layers_as_set,
 };
+
+/// Random paths of a pixel where nothing says how many.
+const PATHS: u32 = 64;
 
 /// A picture in f64 and the JSON keys that only its kind has.
 struct Computed {
@@ -31,7 +34,14 @@ struct Computed {
 pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -> Result<()> {
     let film = scene.film;
     let n_pixels = u64::from(film.width) * u64::from(film.height);
-    check_memory(n_pixels, args.samples, scene.n_particles())?;
+    let is_random = kind == ReferenceKind::Transport;
+    let n_samples = args.samples.unwrap_or(if is_random { PATHS } else { 1 });
+    check_memory(n_pixels, n_samples, scene.n_particles())?;
+    if args.error.is_some() && !is_random {
+        return Err(Error::usage(format!(
+            "--error: only \"transport\" is random; expected --samples with --reference {kind}"
+        )));
+    }
     if args.options.verbose {
         print_sizes(scene, None);
     }
@@ -43,9 +53,9 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
     if args.layers {
         return with_layers(args, scene, time_s);
     }
-    let Computed { rgba, keys } = match drawing.filter(|_| args.samples == 1) {
+    let Computed { rgba, keys } = match drawing.filter(|_| n_samples == 1) {
         Some(drawing) => at_centers(args, drawing, &composed_by(kind, scene), time_s)?,
-        None => sampled(args, kind, scene, time_s)?,
+        None => sampled(args, kind, n_samples, (scene, time_s))?,
     };
     let rgba = picture::to_f32(&rgba);
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
@@ -138,22 +148,38 @@ fn at_centers(
 }
 
 /// Draws the mean of several samples a pixel, summed in the order in which parts of it are joined.
-fn sampled(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -> Result<Computed> {
+fn sampled(
+    args: &RenderArgs,
+    kind: ReferenceKind,
+    n_samples: u32,
+    (scene, time_s): (&Scene, f64),
+) -> Result<Computed> {
     let (film, never) = (scene.film, AtomicBool::new(false));
     let pixels = Pixels::all(film.width, film.height);
     let shown = ReferenceProgress::new(args.options.quiet);
     let subject = ReferenceRequest { kind, scene, time_s };
     let listener = &|work, n| shown.advance(work, n);
-    let mean = picture::sums(&subject, &pixels, 0..args.samples, &never, listener)?.mean();
+    let sums = match args.error {
+        Some(error) => {
+            let is_enough = &|mean: &MeanPicture| mean.relative_error <= error;
+            let enough = Enough { least: 2, most: MAX_SAMPLES, is_enough };
+            picture::sums_until(&subject, &pixels, false, &enough, (&never, listener))?
+        }
+        None => picture::sums(&subject, &pixels, 0..n_samples, &never, listener)?,
+    };
+    let (n_samples, mean) = (sums.n_samples, sums.mean());
     drop(shown);
-    let accuracy = kind.accuracy_text(scene, args.samples);
+    let accuracy = kind.accuracy_text(scene, n_samples);
     if args.options.verbose {
         say!(
             "off by about {:.1e} (root mean square of the pixels' estimates; {accuracy})",
             mean.own_error
         );
+        say!("the mean of all pixels is known to {:.1e} of it", mean.relative_error);
     }
-    let keys =
-        json!({ "samples": args.samples, "own_error": mean.own_error, "accuracy": accuracy });
+    let keys = json!({
+        "samples": n_samples, "own_error": mean.own_error, "accuracy": accuracy,
+        "relative_error": mean.relative_error,
+    });
     Ok(Computed { rgba: mean.rgba, keys })
 }

@@ -196,13 +196,18 @@ mod tests {
     use super::*;
     use crate::model::basis::Sampling;
     use crate::model::material::Brdf;
+    use crate::model::phase::Scattering;
 
     fn material(keys: &[(f64, f64, f64)]) -> Material {
         let key = |&(time_s, ks, ns): &(f64, f64, f64)| MaterialKey {
             time_s,
             brdf: Brdf { kd: DVec3::splat(0.5), ks: DVec3::splat(ks), ns },
         };
-        Material { name: "m".into(), keys: keys.iter().map(key).collect() }
+        Material {
+            name: "m".into(),
+            keys: keys.iter().map(key).collect(),
+            scattering: Scattering::default(),
+        }
     }
 
     #[test]

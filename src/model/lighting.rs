@@ -55,6 +55,8 @@ pub struct Lighting {
     pub pairs: Pairs,
     /// Formation of long sums.
     pub sums: Sums,
+    /// Angular radius of directional lights in the reference "transport", radians.
+    pub sun_radius: f64,
 }
 
 /// Greatest number of divisions of an emitter: it is 2¹⁶ times smaller then.

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use super::phase::Scattering;
+
 /// A material that may change over time: keys in rising time, linear between them, constant before
 /// the first and after the last. A constant material has one key.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,6 +12,8 @@ pub struct Material {
     pub name: String,
     /// Keys in rising time.
     pub keys: Vec<MaterialKey>,
+    /// How a cloud of the material scatters light, for the reference "transport".
+    pub scattering: Scattering,
 }
 
 /// Material at one time.
@@ -96,7 +100,8 @@ mod tests {
     fn edits_run_straight_between_keys() {
         let key = |time_s, brdf| MaterialKey { time_s, brdf };
         let keys = vec![key(1.0, brdf(0.5, 0.0, 8.0)), key(3.0, brdf(0.7, 0.2, 16.0))];
-        let material = Material { name: "m".into(), keys };
+        let scattering = Scattering::default();
+        let material = Material { name: "m".into(), keys, scattering };
         assert_eq!(
             (material.at(0.0), material.at(9.0)),
             (brdf(0.5, 0.0, 8.0), brdf(0.7, 0.2, 16.0))

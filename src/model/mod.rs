@@ -31,6 +31,7 @@ mod named;
 pub mod overlap;
 pub mod pairings;
 mod particle;
+pub mod phase;
 pub mod philox;
 pub mod resolution;
 pub mod scene;

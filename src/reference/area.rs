@@ -16,5 +16,5 @@ mod tests;
 mod visibility;
 
 pub use adaptive::{Accuracy, Estimate};
-pub use scene::{AreaScene, DiscFacet, Receiver, reflectance};
+pub use scene::{AreaScene, DiscFacet, Receiver};
 pub use second::form_factor;

@@ -140,6 +140,12 @@ fn halves(terrain: &Terrain) -> impl Iterator<Item = [usize; 3]> + '_ {
     (0..terrain.n_cells()).flat_map(of_cell)
 }
 
+/// Returns the triangles of `terrain`, in the scene: corner, end of u and end of v. The front faces
+/// upward.
+pub fn triangles(terrain: &Terrain) -> impl Iterator<Item = [DVec3; 3]> + '_ {
+    halves(terrain).map(|numbers| numbers.map(|k| terrain.origin + terrain.points[k]))
+}
+
 /// Shares of the radiance at corner, end of u and end of v in that at `hit`.
 fn shares(hit: &Hit) -> [f64; 3] {
     [1.0 - hit.s - hit.t, hit.s, hit.t]

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::model::basis::{Basis, N_NODES, Sampling, evaluate, node};
 use crate::model::material::Brdf;
 use crate::model::scene::{LightingMode, Scene};
-use crate::reference::area::reflectance;
+use crate::reference::brdf::reflectance;
 use crate::reference::rounding::U_F32;
 
 /// The cases of this file, in the order in which they run.

@@ -74,7 +74,7 @@ impl Provenance {
 /// The reference that pictures are compared with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceRecord {
-    /// "thin", "slices", "volume", "model" or "reflections=K".
+    /// "thin", "slices", "volume", "model", "reflections=K" or "transport".
     pub against: String,
     /// SHA-256 of everything that it depends on.
     pub hash: String,

@@ -107,8 +107,11 @@ pub(super) fn hash_of(
 /// Returns `scene` with every setting that this kind of reference ignores at a fixed value.
 fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
     let scene = against.without_approximations(scene);
-    let Lighting { mode, grid, step, forward, facets_per_cloud, .. } = scene.lighting;
-    let by_model = matches!(against, ReferenceKind::Model | ReferenceKind::Reflections(_));
+    let Lighting { mode, grid, step, forward, facets_per_cloud, sun_radius, .. } = scene.lighting;
+    let by_model = matches!(
+        against,
+        ReferenceKind::Model | ReferenceKind::Reflections(_) | ReferenceKind::Transport
+    );
     let (grid, step, facets_per_cloud) =
         if by_model { (1, 1.0, None) } else { (grid, step, facets_per_cloud) };
     let lighting = Lighting {
@@ -124,6 +127,7 @@ fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
         theta: 0.0,
         pairs: Pairs { size: 1.0, levels: 0, steps: 1 },
         sums: Sums::default(),
+        sun_radius,
     };
     let film = Film {
         format: FilmFormat::Rgba32f,

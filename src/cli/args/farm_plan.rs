@@ -27,7 +27,7 @@ pub struct PlanArgs {
     #[arg(long, group = "told-more", conflicts_with_all = ["frames", "shard_frames", "format"])]
     pub bench: bool,
     /// Plan a picture in f64 in place of frames, as `nimbus render --reference` draws it: thin,
-    /// slices, volume, model or reflections=K
+    /// slices, volume, model, reflections=K or transport
     #[arg(
         long,
         value_name = "WHICH",

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args as ClapArgs;
 
 use super::scene::SceneArgs;
-use super::values::parse_samples;
+use super::values::{parse_positive, parse_samples};
 use crate::reference::picture::ReferenceKind;
 
 /// Arguments of `nimbus render`.
@@ -17,6 +17,9 @@ use crate::reference::picture::ReferenceKind;
     nimbus render scenes/cubes-554.toml --size 200x150 --reference volume \\\n      \
     --set 'cloud.0.texture=\"none\"' -o volume.exr\n  \
     nimbus compare thin.exr drawn.exr\n  nimbus compare volume.exr thin.exr\n\n\
+    Light in the cloud by random paths, until the mean is known to 1 %:\n  \
+    nimbus render scenes/study-cloud.toml --size 80x60 --reference transport \\\n      \
+    --error 0.01 -o transport.exr\n\n\
     The picture of a device and of its reference, layer by layer:\n  \
     nimbus render scenes/hello.toml --layers -o layers.exr\n  \
     nimbus render scenes/hello.toml --layers --reference thin -o f64.exr\n\n\
@@ -35,22 +38,26 @@ pub struct RenderArgs {
     /// Time in seconds, in place of a frame number
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub time: Option<f64>,
-    /// Draw a reference in f64 instead of the device's picture: thin, slices, volume, model, or
-    /// reflections=K
+    /// Draw a reference in f64 instead of the device's picture: thin, slices, volume, model,
+    /// reflections=K or transport
     #[arg(long, value_name = "WHICH")]
     #[arg(conflicts_with_all = ["device", "shaders", "validation", "guard", "max_submit_ms"])]
     #[arg(conflicts_with_all = ["limits", "no_skip"])]
     pub reference: Option<ReferenceKind>,
     /// Samples of every pixel of a reference: the first through its centre, the others spread over
-    /// it
+    /// it [default: 1, and 64 random paths of "transport"]
+    #[arg(long, value_name = "N", requires = "reference", value_parser = parse_samples)]
+    pub samples: Option<u32>,
+    /// Follow random paths of "transport" until the standard error of the picture's mean is this
+    /// share of it
     #[arg(
         long,
-        value_name = "N",
-        default_value_t = 1,
+        value_name = "SHARE",
         requires = "reference",
-        value_parser = parse_samples
+        conflicts_with_all = ["samples", "layers"],
+        value_parser = parse_positive
     )]
-    pub samples: u32,
+    pub error: Option<f64>,
     /// Write named layers to the EXR file, too: depth, optical depth, number of particles, and the
     /// picture of each reflection alone (docs/reference/files.md)
     #[arg(long)]

@@ -34,7 +34,7 @@ pub struct ErrorArgs {
     /// that save time for little error]
     #[arg(long, requires = "knob", help_heading = "Knobs")]
     pub grid: bool,
-    /// Reference of the pictures: thin, slices, volume, model or reflections=K
+    /// Reference of the pictures: thin, slices, volume, model, reflections=K or transport
     #[arg(long, value_name = "WHAT", default_value = "model", help_heading = "Error")]
     pub against: ReferenceKind,
     /// Draw every cloud without its texture, which the references but thin and slices do not have

@@ -44,7 +44,12 @@ impl PieceAmounts {
         let PieceAmounts { scene, of, layers, visits } = self;
         let n_particles = scene.n_particles() as f64;
         let by_model = matches!(of, ReferenceKind::Model | ReferenceKind::Reflections(_));
-        let n_facets = if by_model { n_particles } else { scene.n_facets() as f64 };
+        // Paths in a medium know no facets.
+        let n_facets = match of {
+            ReferenceKind::Transport => 0.0,
+            _ if by_model => n_particles,
+            _ => scene.n_facets() as f64,
+        };
         // Light comes from particles' facets, and from the areas of surfaces.
         let n_emitters = n_facets + scene.surfaces.len() as f64;
         let n_reflected =

@@ -40,6 +40,10 @@ keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
     facets_per_cloud: integer(0, 0, u32::MAX).map(|n| Some(n).filter(|n| *n > 0));
     pairs => pairs(s)?;
     sums => sums(s)?;
+    /// Angular radius of directional lights, for the reference "transport". The default is the
+    /// sun's.
+    sun_radius ["sun_radius_deg"]: number(0.27, Bounds::Within(0.01, 30.0)).map(f64::to_radians),
+        "degree";
 }}
 
 keys! { PAIRS: fn pairs(s) -> Pairs { Pairs;

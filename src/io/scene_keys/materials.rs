@@ -3,12 +3,13 @@
 use glam::DVec3;
 
 use super::key::{Keys, keys, names, read_path, read_tables};
-use super::spec::{described, number, required_text, text, vector};
+use super::spec::{Spec, described, number, one_of, required_text, text, vector};
 use crate::error::Result;
 use crate::io::bounds::{AMOUNT, Bounds, COORDINATE, GREATEST_EXPONENT, SHARE};
 use crate::io::document::section::Section;
 use crate::io::document::suggest::{list_given, shown, suggestion};
 use crate::model::material::{Brdf, Material, MaterialKey};
+use crate::model::phase::{Phase, RADII_UM, Scattering};
 
 /// Material of a scene without any `[[material]]`.
 pub const DEFAULT_MATERIAL: &str = r#"
@@ -25,7 +26,45 @@ keys! { MATERIAL: fn material(s) -> Material { Material;
     /// Settings of a material that changes over time, in place of `kd`, `ks` and `ns`. A setting
     /// left out is that of the entry before.
     keys ["path"]: described("array of { time_s, kd, ks, ns }") => |_| read_keys(s);
+    scattering => scattering(s)?;
 }}
+
+keys! { SCATTERING: fn scattering(s) -> Scattering { Scattering;
+    /// Albedo of single scattering in a cloud, linear RGB, for the reference "transport". "derived"
+    /// is that of a thick cloud that reflects `kd`.
+    albedo: one_of("derived", [("derived".into(), None)], Some(vector([1.0; 3], SHARE).map(Some)));
+    /// Phase function of a cloud, for the reference "transport": the mean cosine g of Henyey and
+    /// Greenstein's, "mie" for droplets of water, or "derived", which is g = `lighting.forward`.
+    phase: one_of("derived", [("derived".into(), Shape::Derived), ("mie".into(), Shape::Droplets)],
+        Some(number(0.85, COSINE).map(Shape::MeanCosine))) => |shape| read_phase(s, &shape);
+}}
+
+keys! {
+    /// Radius of the droplets where `phase` is "mie".
+    DROPLET: fn droplet(s) -> f64 =
+        "droplet_um": number(10.0, Bounds::Within(RADII_UM[0], RADII_UM[1])), "um";
+}
+
+/// Range of a phase function's mean cosine.
+const COSINE: Bounds = Bounds::Within(-0.99, 0.99);
+
+/// A phase function as a scene names it.
+#[derive(Debug, Clone, Copy)]
+enum Shape {
+    Derived,
+    Droplets,
+    MeanCosine(f64),
+}
+
+fn read_phase(s: &mut Section, shape: &Spec<Shape>) -> Result<Option<Phase>> {
+    let shape = shape.take(s, "phase")?;
+    let radius_um = droplet(s)?;
+    Ok(match shape {
+        Shape::Derived => None,
+        Shape::Droplets => Some(Phase::droplets(radius_um)),
+        Shape::MeanCosine(g) => Some(Phase::HenyeyGreenstein { g }),
+    })
+}
 
 keys! { BRDF: fn brdf(s, before: Brdf) -> Brdf { Brdf;
     /// Diffuse reflectance K_d, linear RGB.
@@ -66,7 +105,7 @@ keys! {
 }
 
 /// Keys of `[[material]]`.
-pub const KEYS: [Keys; 2] = [MATERIAL, BRDF];
+pub const KEYS: [Keys; 4] = [MATERIAL, SCATTERING, DROPLET, BRDF];
 /// Keys of the entries of a material's path.
 pub const PATH_KEYS: [Keys; 2] = [MATERIAL_KEY, BRDF];
 

@@ -12,6 +12,7 @@ use crate::model::light::Light;
 use crate::model::material::Brdf;
 use crate::model::surface::Surface;
 use crate::reference::Blob;
+use crate::reference::brdf::reflectance;
 use crate::reference::occlude::{Rectangle, Source, source_of};
 use crate::reference::parallel::parallel_map;
 
@@ -255,18 +256,6 @@ pub(super) fn divide(polygon: Polygon, shadows: &[[Line; 5]]) -> (Vec<Polygon>, 
         open = left;
     }
     (shaded, open)
-}
-
-/// Returns f for light from the unit vector `from` reflected along `toward`; only its diffuse part
-/// where either is behind. *Source*: C (11).
-pub fn reflectance(brdf: &Brdf, normal: DVec3, from: DVec3, toward: DVec3) -> DVec3 {
-    let diffuse = brdf.kd * FRAC_1_PI;
-    if brdf.ks == DVec3::ZERO || normal.dot(from) <= 0.0 || normal.dot(toward) <= 0.0 {
-        return diffuse;
-    }
-    // 1 − cos γ = |n − h|²/2 keeps its digits where γ is small.
-    let w = 0.5 * (normal - (from + toward).normalize_or_zero()).length_squared();
-    diffuse + brdf.ks * Brdf::lobe(brdf.ns, w)
 }
 
 /// L1 and I_d that one light causes at `p`. The sky has no direction that a lobe could reflect.

@@ -8,10 +8,11 @@ use glam::{DVec2, DVec3};
 use super::adaptive::{self, Accuracy, Cell, Estimate, Integrand, NOTHING, Sample, triangles};
 use super::clip::{self, Line, WHOLE};
 use super::resolve::{self, ViewOfSurface};
-use super::scene::{AreaScene, Exposure, LitRegion, Receiver, divide, reflectance};
+use super::scene::{AreaScene, Exposure, LitRegion, Receiver, divide};
 use crate::model::light::Light;
 use crate::model::material::Brdf;
 use crate::model::surface::Surface;
+use crate::reference::brdf::reflectance;
 use crate::reference::occlude::{Rectangle, Source};
 
 impl AreaScene<'_> {

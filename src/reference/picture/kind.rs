@@ -10,8 +10,8 @@ use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Overlap, Scene};
 use crate::model::sort_bits::SortBits;
 
-/// A reference picture, as `--against thin|slices|volume|model|reflections=K` names it. Each kind
-/// drops an approximation that the kind before it still shares with the device.
+/// A reference picture, as `--against thin|slices|volume|model|reflections=K|transport` names it.
+/// Each kind drops an approximation that the kind before it still shares with the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReferenceKind {
     /// The scene's lighting method in f64 with areas integrated, drawn as sorted thin sprites
@@ -26,6 +26,8 @@ pub enum ReferenceKind {
     Model,
     /// The model with this many reflections instead of the scene's.
     Reflections(u32),
+    /// Radiative transfer in the blobs as a medium, by random paths (transport.md).
+    Transport,
 }
 
 /// Greatest number of reflections. At an albedo of 0.9 the next one is 10⁻³ of the first.
@@ -44,10 +46,11 @@ impl FromStr for ReferenceKind {
             "slices" => Ok(ReferenceKind::Slices),
             "volume" => Ok(ReferenceKind::Volume),
             "model" => Ok(ReferenceKind::Model),
+            "transport" => Ok(ReferenceKind::Transport),
             _ => reflections().ok_or_else(|| {
                 format!(
-                    "expected thin, slices, volume, model or reflections=K with K from 1 to \
-                     {MAX_REFLECTIONS}, found \"{text}\""
+                    "expected thin, slices, volume, model, reflections=K with K from 1 to \
+                     {MAX_REFLECTIONS}, or transport, found \"{text}\""
                 )
             }),
         }
@@ -62,6 +65,7 @@ impl fmt::Display for ReferenceKind {
             ReferenceKind::Volume => f.write_str("volume"),
             ReferenceKind::Model => f.write_str("model"),
             ReferenceKind::Reflections(k) => write!(f, "reflections={k}"),
+            ReferenceKind::Transport => f.write_str("transport"),
         }
     }
 }
@@ -108,6 +112,9 @@ impl ReferenceKind {
     /// Describes what the estimate of this reference's own error consists of, for a mean of
     /// `n_samples` samples.
     pub fn accuracy_text(self, scene: &Scene, n_samples: u32) -> String {
+        if self == ReferenceKind::Transport {
+            return format!("{n_samples} random paths a pixel: one standard error");
+        }
         let mut parts = vec![match self {
             ReferenceKind::Thin => "sprites composed in f64: rounding",
             ReferenceKind::Slices => "slices composed in f64: rounding",
@@ -141,7 +148,9 @@ mod tests {
 
     #[test]
     fn names_parse_and_print_alike_and_others_are_refused() {
-        for text in ["thin", "slices", "volume", "model", "reflections=1", "reflections=64"] {
+        for text in
+            ["thin", "slices", "volume", "model", "reflections=1", "reflections=64", "transport"]
+        {
             assert_eq!(text.parse::<ReferenceKind>().unwrap().to_string(), text);
         }
         for text in [

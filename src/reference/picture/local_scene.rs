@@ -13,12 +13,16 @@ use crate::reference::terrain;
 /// Surfaces, ground, lights and materials at one time; positions relative to the lighting origin.
 #[derive(Debug, Clone)]
 pub(super) struct LocalScene {
+    /// Place of the lighting origin in the scene.
+    pub origin: DVec3,
     /// Surfaces.
     pub surfaces: Vec<Surface>,
     /// Lights.
     pub lights: Vec<Light>,
     /// Material of every region: surfaces, ground, clouds.
     brdfs: Vec<Brdf>,
+    /// Number of surfaces and of grounds together.
+    n_solids: usize,
     /// Facets of the ground, one a point.
     pub ground: Vec<Facet>,
 }
@@ -29,9 +33,11 @@ impl LocalScene {
         let terrains = scene.terrains.iter().zip(scene.surfaces.len() as u32..);
         let brdf = |i: usize| scene.region_material(i).at(time_s);
         LocalScene {
+            origin,
             surfaces: surfaces(scene, origin),
             lights: scene.lights.iter().map(|l| l.relative_to(origin)).collect(),
             brdfs: (0..scene.n_regions()).map(brdf).collect(),
+            n_solids: scene.n_solids(),
             ground: terrains.flat_map(|(t, region)| terrain::facets(t, origin, region)).collect(),
         }
     }
@@ -39,6 +45,11 @@ impl LocalScene {
     /// Materials of the surfaces.
     pub fn surface_brdfs(&self) -> &[Brdf] {
         &self.brdfs[..self.surfaces.len()]
+    }
+
+    /// Materials of surfaces and ground.
+    pub fn solid_brdfs(&self) -> &[Brdf] {
+        &self.brdfs[..self.n_solids]
     }
 
     /// K_d of every region.

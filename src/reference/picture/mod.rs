@@ -25,6 +25,7 @@ mod samples;
 mod scene_light;
 mod shares;
 mod sprites;
+mod transport;
 
 pub use background::view;
 pub use error_estimate::ErrorEstimate;
@@ -39,7 +40,8 @@ pub use progress::{OnProgress, RenderStage};
 pub use render::{DrawnPicture, Reference, drawn_as_set};
 pub use renderer::render_model;
 pub use samples::{
-    MAX_SAMPLES, MeanPicture, N_VALUES, PairwiseSum, ReferenceRequest, SampleSums, sums, to_f32,
+    Enough, MAX_SAMPLES, MeanPicture, N_VALUES, PairwiseSum, ReferenceRequest, SampleSums, sums,
+    sums_until, to_f32,
 };
 pub use scene_light::{BlobModel, PixelSample, RenderedPixels, render_lit_scene};
 pub use shares::{Emitters, PixelShares, drawn_by_settings, pixel_shares};

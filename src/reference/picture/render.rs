@@ -1,14 +1,17 @@
 //! Reference pictures through the centres of their pixels.
 
 use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::background::{opaque_pixels, view};
+use super::error_estimate::root_mean_square;
 use super::frame::FrameReference;
 use super::kind::ReferenceKind;
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
 use super::renderer::{check_scene, with_renderer};
+use super::samples::{Enough, ReferenceRequest, sums_until};
 use super::scene_light::{BlobModel, PixelSample, brightest, render_lit_scene};
 use super::sprites::{drawn_blobs, with_textures};
 use crate::error::Result;
@@ -45,6 +48,9 @@ impl ReferenceKind {
         on_progress: OnProgress,
     ) -> Result<Reference> {
         let begin = Instant::now();
+        if self == ReferenceKind::Transport {
+            return self.render_paths(scene, time_s, pixels, on_progress);
+        }
         self.check(scene, time_s)?;
         let scene = &self.without_approximations(scene);
         let drawing_since = OnceLock::new();
@@ -66,6 +72,40 @@ impl ReferenceKind {
         })
     }
 }
+
+impl ReferenceKind {
+    /// Draws `scene` by as many random paths through the centre of each pixel as it takes.
+    fn render_paths(
+        self,
+        scene: &Scene,
+        time_s: f64,
+        pixels: &Pixels,
+        on_progress: OnProgress,
+    ) -> Result<Reference> {
+        let begin = Instant::now();
+        let request = ReferenceRequest { kind: self, scene, time_s };
+        let never = AtomicBool::new(false);
+        let found = sums_until(&request, pixels, true, &PATHS, (&never, on_progress))?;
+        let (mean, seconds) = (found.mean(), begin.elapsed().as_secs_f64());
+        Ok(Reference {
+            own_error: mean.own_error,
+            rgba: mean.rgba,
+            accuracy: self.accuracy_text(scene, found.n_samples),
+            seconds,
+            pixels_s: seconds,
+        })
+    }
+}
+
+/// Paths of a reference at its pixels: until the error of a pixel is a hundredth of the picture, or
+/// as many as take some minutes at two thousand pixels.
+const PATHS: Enough<'static> = Enough {
+    least: 64,
+    most: 4096,
+    is_enough: &|mean| {
+        mean.own_error <= 0.01 * root_mean_square(mean.rgba.iter().flatten().copied())
+    },
+};
 
 /// A whole picture drawn in f64 with the scene's own drawing settings.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,6 +10,7 @@ use super::model_picture::{ModelDrawing, ModelPicture};
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
 use super::scene_light::{BlobModel, PixelSample, RenderedPixels, render_lit_scene};
+use super::transport::TransportPicture;
 use crate::error::{Error, Result};
 use crate::model::scene::{LightingMode, Scene};
 
@@ -29,6 +30,9 @@ impl ReferenceKind {
                  volume or model"
             )));
         }
+        if self == ReferenceKind::Transport {
+            check_transport(scene)?;
+        }
         Ok(())
     }
 
@@ -39,6 +43,17 @@ impl ReferenceKind {
             _ => BlobModel::Volume,
         }
     }
+}
+
+/// Checks that there is light for a medium to scatter.
+fn check_transport(scene: &Scene) -> Result<()> {
+    if scene.lighting.mode == LightingMode::None {
+        return Err(Error::usage(
+            "transport: nothing is lit where lighting.mode is \"none\"; expected another \
+             reference, or --set 'lighting.mode=\"first\"'",
+        ));
+    }
+    Ok(())
 }
 
 /// Checks that the references can draw `scene` with that blob model.
@@ -78,6 +93,11 @@ pub(super) fn with_renderer<T>(
     on_progress: OnProgress,
     draw: impl FnOnce(&mut dyn FnMut(PixelSample) -> RenderedPixels) -> Result<T>,
 ) -> Result<T> {
+    if kind == ReferenceKind::Transport {
+        let frame = FrameReference::unlit(scene, time_s)?;
+        let picture = TransportPicture::new(scene, &frame);
+        return draw(&mut |sample| picture.draw(pixels, sample, on_progress));
+    }
     let is_model = matches!(kind, ReferenceKind::Model | ReferenceKind::Reflections(_));
     if is_model && scene.lighting.mode != LightingMode::None {
         let how = ModelDrawing { n_reflections: kind.n_reflections(scene), by_facet: false };

@@ -51,6 +51,9 @@ pub struct MeanPicture {
     /// Root mean square of the pixels' error estimates: quadrature, and one standard error of the
     /// mean.
     pub own_error: f64,
+    /// Standard error of the mean over all pixels, were the samples random, as a share of it; 0 of
+    /// a black picture.
+    pub relative_error: f64,
 }
 
 /// Returns where in a pixel sample `i` lies, off its centre, in pixels. The first sample is the
@@ -95,6 +98,51 @@ pub fn sums(
     })
 }
 
+/// How many random samples a picture takes.
+pub struct Enough<'a> {
+    /// The least number of samples, from 2 on, so that their spread is known.
+    pub least: u32,
+    /// The greatest number.
+    pub most: u32,
+    /// Whether a mean is good enough.
+    pub is_enough: &'a (dyn Fn(&MeanPicture) -> bool + Sync),
+}
+
+/// Draws samples at `pixels`, through their centres if `at_centers`, until a number that is a power
+/// of two is enough.
+///
+/// # Errors
+/// As for [`sums`].
+pub fn sums_until(
+    request: &ReferenceRequest<'_>,
+    pixels: &Pixels,
+    at_centers: bool,
+    enough: &Enough<'_>,
+    (stop, on_progress): (&AtomicBool, OnProgress),
+) -> Result<SampleSums> {
+    let ReferenceRequest { kind, scene, time_s } = *request;
+    kind.check(scene, time_s)?;
+    with_renderer(kind, (scene, time_s), pixels, &|_, _| (), |render| {
+        let mut pairs = PairwiseSum::default();
+        for i in 0..enough.most {
+            if stop.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
+            let shift = if at_centers { DVec2::ZERO } else { shift(i) };
+            pairs.push(SampleSums::of_one(&render(PixelSample { i, shift })));
+            on_progress(RenderStage::Sampling, enough.most as usize);
+            let n = i + 1;
+            if n >= enough.least && n.is_power_of_two() {
+                let is_last = |sums: &SampleSums| (enough.is_enough)(&sums.mean());
+                if pairs.whole().is_some_and(is_last) {
+                    break;
+                }
+            }
+        }
+        pairs.finish().ok_or_else(|| Error::usage("no samples: expected at least one"))
+    })
+}
+
 /// Converts a picture to the f32 values that files hold.
 pub fn to_f32(rgba: &[[f64; 4]]) -> Vec<f32> {
     rgba.iter().flatten().map(|v| *v as f32).collect()
@@ -121,17 +169,21 @@ impl SampleSums {
     pub fn mean(&self) -> MeanPicture {
         let n = f64::from(self.n_samples);
         let rgba = |v: &[f64]| [v[0] / n, v[1] / n, v[2] / n, v[3] / n];
-        let error = |v: &[f64]| {
+        // The spread of all channels together bounds that of each. Samples are spread more evenly
+        // than random ones, so the mean is more accurate than this.
+        let spread = |v: &[f64]| {
             let of_mean: f64 = rgba(v).iter().map(|c| c * c).sum();
-            // The spread of all channels together bounds that of each. Samples are spread more
-            // evenly than random ones, so the mean is more accurate than this.
-            let spread = ((v[4] / n - of_mean).max(0.0) / (n - 1.0).max(1.0)).sqrt();
-            v[5] / n + spread.max(v[6].sqrt() / n)
+            ((v[4] / n - of_mean).max(0.0) / (n - 1.0).max(1.0)).sqrt()
         };
+        let error = |v: &[f64]| v[5] / n + spread(v).max(v[6].sqrt() / n);
         let pixels = || self.values.chunks_exact(N_VALUES);
+        let sum = |k: usize| pixels().map(|v| v[k] / n).sum::<f64>();
+        let all = (0..4).map(|k| sum(k).powi(2)).sum::<f64>().sqrt();
+        let off = pixels().map(|v| spread(v).powi(2)).sum::<f64>().sqrt();
         MeanPicture {
             rgba: pixels().map(rgba).collect(),
             own_error: root_mean_square(pixels().map(error)),
+            relative_error: if all > 0.0 { off / all } else { 0.0 },
         }
     }
 
@@ -167,6 +219,11 @@ impl PairwiseSum {
             next = last.add(&next);
         }
         self.open.push(next);
+    }
+
+    /// Returns the sum of all ranges if it is one complete tree.
+    pub fn whole(&self) -> Option<&SampleSums> {
+        if let [whole] = &self.open[..] { Some(whole) } else { None }
     }
 
     /// Returns the sum of all ranges; `None` if there were none.
@@ -246,7 +303,9 @@ mod tests {
             values: vec![red, 0.0, 0.0, 0.0, red * red, 0.25, chance * chance],
         };
         let two = of(1.0, 0.0).add(&of(3.0, 0.0));
-        assert_eq!(two.mean(), MeanPicture { rgba: vec![[2.0, 0.0, 0.0, 0.0]], own_error: 1.25 });
+        let mean =
+            MeanPicture { rgba: vec![[2.0, 0.0, 0.0, 0.0]], own_error: 1.25, relative_error: 0.5 };
+        assert_eq!(two.mean(), mean);
         // One sample has its own standard error alone; equal ones have what their paths say:
         // sqrt(0.5)/2 · 0.6.
         assert_eq!(of(1.0, 0.5).mean().own_error, 0.75);

@@ -302,6 +302,7 @@ fn a_ledger_sums_up() {
         "density grid",
         "facets of surfaces",
         "reflections",
+        "model",
     ];
     assert_eq!(names, all);
     let number = |value: &Value| value.as_f64().expect("a number");

@@ -74,6 +74,7 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
         n_rounds: args.rounds as usize,
         pixels: &pixels,
         n_reflections: args.reflections,
+        n_paths: args.paths,
         stop,
         parts: &parts,
     };
@@ -103,14 +104,17 @@ fn announce(args: &LedgerArgs, study: &LedgerStudy<'_>) -> Result<()> {
         return Ok(());
     }
     let estimating = spinner("estimating the time", false);
-    let seconds = study.expected_s()?;
+    let (seconds, paths_s) = (study.expected_s()?, study.expected_paths_s()?);
     drop(estimating);
     let least = n_reflections(study.scene);
     let hint = match seconds > LONG_S && args.reflections > least {
-        true => format!("; --reflections {least} leaves out the last row, the longest"),
+        true => format!("; --reflections {least} leaves out the longest row"),
         false => String::new(),
     };
     say!("the pictures in f64 take about {} on this machine{hint}", about(seconds));
+    if paths_s > 0.0 {
+        say!("the random paths take at most about {}; --paths 0 leaves them out", about(paths_s));
+    }
     Ok(())
 }
 

@@ -192,8 +192,8 @@ mod tests {
         assert!((Phase::HenyeyGreenstein { g: 0.0 }.at(0.3) - 0.25 / PI).abs() < 1e-16);
     }
 
-    /// The parameters of Jendersie and d'Eon's fit at d = 20 µm, by hand from its four exponentials.
-    /// The asymmetry of droplets of 10 µm is 0.86 to 0.87 in visible light.
+    /// The parameters of Jendersie and d'Eon's fit at d = 20 µm, by hand from its exponentials. The
+    /// asymmetry of droplets of 10 µm is 0.86 to 0.87 in visible light.
     #[test]
     fn droplets_are_those_of_the_fit() {
         let Phase::Droplets { mixture: m } = Phase::droplets(10.0) else { unreachable!() };

@@ -4,6 +4,7 @@
 mod adding;
 mod blobs;
 mod known;
+mod scenes;
 mod slab;
 mod slabs;
 mod solids;

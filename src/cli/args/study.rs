@@ -7,7 +7,7 @@ use clap::Args as ClapArgs;
 use super::farm_plan::{Span, parse_span};
 use super::scene::SceneArgs;
 use super::values::{parse_block, parse_positive, parse_rounds};
-use crate::reference::picture::ReferenceKind;
+use crate::reference::picture::{MAX_SAMPLES, ReferenceKind};
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::front::Metric;
 
@@ -137,7 +137,7 @@ pub struct LedgerArgs {
     /// Frame number
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub frame: u32,
-    /// Reflections of the last row
+    /// Reflections of the last row by the model
     #[arg(
         long,
         value_name = "K",
@@ -145,6 +145,15 @@ pub struct LedgerArgs {
         value_parser = clap::value_parser!(u32).range(1..=64)
     )]
     pub reflections: u32,
+    /// Most random paths of a pixel in the row "model", which compares with radiative transfer
+    /// (docs/explanation/transport.md); 0 leaves it out. Fewer do where they resolve the row
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1024,
+        value_parser = clap::value_parser!(u32).range(0..=i64::from(MAX_SAMPLES))
+    )]
+    pub paths: u32,
     /// Timed blocks of each picture that the device draws
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = parse_rounds)]
     pub rounds: u32,

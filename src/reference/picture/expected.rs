@@ -2,10 +2,12 @@
 
 use std::time::{Duration, Instant};
 
+use super::frame::FrameReference;
 use super::model_picture::ModelDrawing;
 use super::pixels::Pixels;
 use super::renderer::with_picture;
 use super::scene_light::PixelSample;
+use super::transport::TransportPicture;
 use crate::error::Result;
 use crate::model::scene::Scene;
 use crate::reference::parallel::parallel_map;
@@ -17,6 +19,9 @@ const N_PROBED_PIXELS: usize = 128;
 /// 2³²/φ: its multiples spread evenly over 32 bits, so that the probed points are far apart.
 const SPREAD: u32 = 0x9e37_79b9;
 
+/// Pixels whose paths are timed.
+const N_PROBED_PATHS: usize = 2000;
+
 /// Seconds that a picture is expected to take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PictureTime {
@@ -24,6 +29,21 @@ pub struct PictureTime {
     pub lighting_s: f64,
     /// The light of surfaces, and the pixels.
     pub drawing_s: f64,
+}
+
+/// Extrapolates the seconds that a random path through each of `pixels` takes, from one through
+/// some of them.
+///
+/// # Errors
+/// As for [`super::sums`] of "transport".
+pub fn expected_path_s(scene: &Scene, time_s: f64, pixels: &Pixels) -> Result<f64> {
+    let few = Pixels::sample(pixels.width, pixels.height, N_PROBED_PATHS.min(pixels.at.len()));
+    let frame = FrameReference::unlit(scene, time_s)?;
+    let picture = TransportPicture::new(scene, &frame);
+    let begin = Instant::now();
+    picture.draw(&few, PixelSample::CENTER, &|_, _| ());
+    let n_times = pixels.at.len() as f64 / few.at.len().max(1) as f64;
+    Ok(begin.elapsed().as_secs_f64() * n_times)
 }
 
 /// Extrapolates the time of [`super::render_model`] with `n_reflections` at `pixels` from some of

@@ -88,7 +88,7 @@ impl ReferenceKind {
         let found = sums_until(&request, pixels, true, &PATHS, (&never, on_progress))?;
         let (mean, seconds) = (found.mean(), begin.elapsed().as_secs_f64());
         Ok(Reference {
-            own_error: mean.own_error,
+            own_error: mean.random_error,
             rgba: mean.rgba,
             accuracy: self.accuracy_text(scene, found.n_samples),
             seconds,
@@ -103,7 +103,7 @@ const PATHS: Enough<'static> = Enough {
     least: 64,
     most: 4096,
     is_enough: &|mean| {
-        mean.own_error <= 0.01 * root_mean_square(mean.rgba.iter().flatten().copied())
+        mean.random_error <= 0.01 * root_mean_square(mean.rgba.iter().flatten().copied())
     },
 };
 

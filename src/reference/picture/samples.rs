@@ -51,6 +51,9 @@ pub struct MeanPicture {
     /// Root mean square of the pixels' error estimates: quadrature, and one standard error of the
     /// mean.
     pub own_error: f64,
+    /// Root mean square of the standard errors of all channels of all pixels, were the samples
+    /// random: what they add to a picture's RMSE.
+    pub random_error: f64,
     /// Standard error of the mean over all pixels, were the samples random, as a share of it; 0 of
     /// a black picture.
     pub relative_error: f64,
@@ -183,6 +186,7 @@ impl SampleSums {
         MeanPicture {
             rgba: pixels().map(rgba).collect(),
             own_error: root_mean_square(pixels().map(error)),
+            random_error: root_mean_square(pixels().map(|v| 0.5 * spread(v))),
             relative_error: if all > 0.0 { off / all } else { 0.0 },
         }
     }
@@ -303,8 +307,12 @@ mod tests {
             values: vec![red, 0.0, 0.0, 0.0, red * red, 0.25, chance * chance],
         };
         let two = of(1.0, 0.0).add(&of(3.0, 0.0));
-        let mean =
-            MeanPicture { rgba: vec![[2.0, 0.0, 0.0, 0.0]], own_error: 1.25, relative_error: 0.5 };
+        let mean = MeanPicture {
+            rgba: vec![[2.0, 0.0, 0.0, 0.0]],
+            own_error: 1.25,
+            random_error: 0.5,
+            relative_error: 0.5,
+        };
         assert_eq!(two.mean(), mean);
         // One sample has its own standard error alone; equal ones have what their paths say:
         // sqrt(0.5)/2 · 0.6.

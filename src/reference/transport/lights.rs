@@ -83,8 +83,8 @@ impl Lights {
         [of_suns.sum(), self.sky[usize::from(toward.dot(UP) < 0.0)]]
     }
 
-    /// Returns the density per solid angle with which [`Lights::receive`] at `p` draws the direction
-    /// `toward`, by whichever light.
+    /// Returns the density per solid angle with which [`Lights::receive`] at `p` draws the
+    /// direction `toward`, by whichever light.
     pub fn density(&self, p: DVec3, toward: DVec3) -> f64 {
         let all = self.all(p);
         let of_sky = self.sky_strength() / all * self.sky_density(toward);

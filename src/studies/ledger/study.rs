@@ -14,14 +14,18 @@ use crate::measure::figure::Figure;
 use crate::measure::stats::median;
 use crate::model::scene::{LightingMode, Overlap, Scene};
 use crate::reference::picture::{
-    BlobModel, FrameReference, ModelDrawing, OnProgress, PixelSample, Pixels, ReferenceKind,
-    RenderStage, RenderedPixels, expected_time, n_reflections, render_lit_scene, render_model,
+    BlobModel, Enough, FrameReference, MeanPicture, ModelDrawing, OnProgress, PixelSample, Pixels,
+    ReferenceKind, ReferenceRequest, RenderStage, RenderedPixels, expected_path_s, expected_time,
+    n_reflections, render_lit_scene, render_model, sums_until,
 };
 use crate::studies::error::blocks::TimedBlock;
 use crate::studies::error::device_runner::{DeviceRunner, FrameChoice};
 use crate::studies::error::study::Runner;
 use crate::studies::picture_error::{RESOLVED, magnitude, picture_error, sampled};
 use crate::studies::provenance::Provenance;
+
+/// Least number of random paths of a pixel: fewer do not tell their own error.
+const LEAST_PATHS: u32 = 32;
 
 /// A ledger and everything that it is made with.
 pub struct LedgerStudy<'a> {
@@ -35,8 +39,10 @@ pub struct LedgerStudy<'a> {
     pub n_rounds: usize,
     /// The pixels that are compared.
     pub pixels: &'a Pixels,
-    /// Reflections of the last picture.
+    /// Reflections of the last picture by the model.
     pub n_reflections: u32,
+    /// Most random paths of a pixel of the picture by radiative transfer; with 0 there is none.
+    pub n_paths: u32,
     /// Ends the study early once it is set.
     pub stop: &'a AtomicBool,
     /// The finished parts, which other threads may look at.
@@ -171,7 +177,42 @@ impl LedgerStudy<'_> {
             let link = Link::new("second reflection", "pairs in f32", "areas in f64");
             self.add(link, draw(&exact, BlobModel::Volume));
         }
-        self.add_models(scene, listener)
+        self.add_models(scene, listener)?;
+        self.add_transport(scene, listener)
+    }
+
+    /// Adds the picture by radiative transfer: the light without the model. Its paths are enough
+    /// when their error is resolved.
+    fn add_transport(&self, scene: &Scene, listener: OnProgress) -> Result<()> {
+        if self.n_paths == 0 || self.is_stopped() {
+            return Ok(());
+        }
+        let last = lock(self.parts).chain.pictures.last().map(|p| p.rgba.clone());
+        let last = last.unwrap_or_default();
+        let is_enough = |mean: &MeanPicture| {
+            let off =
+                mean.rgba.iter().zip(&last).flat_map(|(a, b)| [0, 1, 2, 3].map(|k| a[k] - b[k]));
+            let squares: f64 = off.map(|d| d * d).sum();
+            let rmse = (squares / (4 * last.len()) as f64).sqrt();
+            mean.random_error * RESOLVED <= rmse
+        };
+        let enough = Enough { least: LEAST_PATHS, most: self.n_paths, is_enough: &is_enough };
+        let kind = ReferenceKind::Transport;
+        let request = ReferenceRequest { kind, scene, time_s: self.frames.time_s };
+        let mean = match sums_until(&request, self.pixels, true, &enough, (self.stop, listener)) {
+            Ok(sums) => sums.mean(),
+            // What is finished counts.
+            Err(Error::Interrupted) => return Ok(()),
+            Err(error) => return Err(error),
+        };
+        let from = match self.n_reflections {
+            1 => "one reflection".to_owned(),
+            n => format!("{n} reflections"),
+        };
+        let chain = &mut lock(self.parts).chain;
+        chain.links.push(Link::new("model", &from, "transport"));
+        chain.pictures.push(ChainPicture { rgba: mean.rgba, own_error: mean.random_error });
+        Ok(())
     }
 
     /// Adds the pictures that are lit by the model itself.
@@ -221,6 +262,18 @@ impl LedgerStudy<'_> {
             drawing_s = time.drawing_s;
         }
         Ok(sum + N_OTHERS * drawing_s)
+    }
+
+    /// Estimates the seconds that the random paths take at most.
+    ///
+    /// # Errors
+    /// As [`LedgerStudy::run`].
+    pub fn expected_paths_s(&self) -> Result<f64> {
+        if self.n_paths == 0 {
+            return Ok(0.0);
+        }
+        let path_s = expected_path_s(self.scene, self.frames.time_s, self.pixels)?;
+        Ok(path_s * f64::from(self.n_paths))
     }
 
     /// Times rounds of one block for each configuration, every second round in reverse order.

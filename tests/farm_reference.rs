@@ -31,6 +31,7 @@ fn the_merged_picture_is_that_of_one_process() {
         (&cubes[..], "thin", "1", &["--tile", "16x11"][..], 9),
         (&cubes, "thin", "1", &["--tile", "41x7", "--format", "png"], 5),
         (&plain, "volume", "6", &["--tile", "20x30", "--shard-samples", "4"], 6),
+        (&plain, "transport", "10", &["--tile", "41x30", "--shard-samples", "2"], 5),
         (&room, "reflections=3", "5", &["--tile", "9x4", "--shard-samples", "2"], 6),
     ] {
         let what = ["--reference", which, "--samples", samples];

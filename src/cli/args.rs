@@ -1,6 +1,7 @@
 //! The command line: every command, its arguments and their help.
 
 mod bench;
+mod export;
 mod farm;
 mod farm_plan;
 mod inspect;
@@ -17,6 +18,7 @@ mod weather;
 use clap::{ColorChoice, Parser, Subcommand};
 
 pub use bench::{BenchArgs, ThreadingArg};
+pub use export::ExportArgs;
 pub use farm::{
     EmitArgs, EngineArg, FarmArgs, FarmCommand, GcArgs, JobArgs, LocalArgs, MergeArgs, RunArgs,
     StatusArgs, SubmitArg, SubmitArgs,
@@ -202,6 +204,12 @@ pub enum Command {
     /// missing. Mixing ratios that are negative, NaN or a fill value are counted and taken as 0; in
     /// other variables they are an error.
     Weather(WeatherArgs),
+    /// Write a scene for another renderer, which can check the reference "transport"
+    ///
+    /// --mitsuba writes the scene for Mitsuba 3 (scalar_rgb, volpath): the blobs as extinction on a
+    /// grid, surfaces, ground, lights and camera. Lobes, spot lights and textures are refused:
+    /// Mitsuba has none as nimbus has them (docs/explanation/transport.md).
+    Export(ExportArgs),
     /// Distribute frames, studies, sweeps or reference pictures over machines that share a folder
     ///
     /// `plan` divides the work into shards, each with a key that follows from scene, shaders, build

@@ -26,6 +26,7 @@ mod edit;
 mod error;
 mod error_configurations;
 mod error_table;
+mod export;
 mod farm;
 mod farm_jobs;
 mod farm_plan;
@@ -119,6 +120,7 @@ fn run(args: &Args, zones: Option<&Zones>) -> Result<()> {
         #[cfg(feature = "window")]
         Command::Edit(a) => edit::run(a, graceful_stop()),
         Command::Weather(a) => weather::run(a),
+        Command::Export(a) => export::run(a),
         Command::Farm(a) => farm::run(a),
     }
 }

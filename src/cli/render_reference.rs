@@ -15,7 +15,7 @@ use crate::io::layers::{self, CHANNELS};
 use crate::model::scene::{Draw, Scene};
 use crate::reference::picture::{
     self, BlobModel, DrawnPicture, Enough, MAX_SAMPLES, MeanPicture, Pixels, ReferenceKind,
-    ReferenceRequest, check_memory, drawn_as_set, layers_as_set,
+    ReferenceRequest, check_memory, drawn_as_set, layers_as_set, transport_layers,
 };
 
 /// Random paths of a pixel where nothing says how many.
@@ -51,7 +51,10 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
         _ => None,
     };
     if args.layers {
-        return with_layers(args, scene, time_s);
+        return match is_random {
+            true => with_transport_layers(args, n_samples, scene, time_s),
+            false => with_layers(args, scene, time_s),
+        };
     }
     let Computed { rgba, keys } = match drawing.filter(|_| n_samples == 1) {
         Some(drawing) => at_centers(args, drawing, &composed_by(kind, scene), time_s)?,
@@ -83,6 +86,27 @@ fn with_layers(args: &RenderArgs, scene: &Scene, time_s: f64) -> Result<()> {
     let hash = image_hash(&layers.beauty);
     let keys = json!({ "channels": CHANNELS });
     tell(args, (ReferenceKind::Thin, scene, time_s), (hash, n_bad), keys)
+}
+
+/// Draws the layers of the reference "transport" and writes them.
+fn with_transport_layers(
+    args: &RenderArgs,
+    n_samples: u32,
+    scene: &Scene,
+    time_s: f64,
+) -> Result<()> {
+    let shown = ReferenceProgress::new(args.options.quiet);
+    let drawn = transport_layers(scene, time_s, n_samples, &|work, n| shown.advance(work, n))?;
+    drop(shown);
+    let channels = render_layers::of_transport(&drawn);
+    let n_bad = channels.iter().flatten().filter(|v| !v.is_finite()).count();
+    warn_of_bad(args, n_bad, channels.iter().map(Vec::len).sum());
+    let names = render_layers::TRANSPORT_CHANNELS;
+    let size = [scene.film.width, scene.film.height];
+    layers::write_channels(&args.output, size, names.into_iter().zip(channels))?;
+    let hash = image_hash(&picture::to_f32(&drawn.rgba));
+    let keys = json!({ "channels": names, "samples": n_samples });
+    tell(args, (ReferenceKind::Transport, scene, time_s), (hash, n_bad), keys)
 }
 
 fn warn_of_bad(args: &RenderArgs, n_bad: usize, n: usize) {

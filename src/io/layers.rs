@@ -61,11 +61,24 @@ pub fn check_path(path: &Path) -> Result<()> {
 /// # Errors
 /// When the extension is not .exr, or the file cannot be written.
 pub fn write(path: &Path, layers: &Layers) -> Result<()> {
+    write_channels(path, layers.size, CHANNELS.into_iter().zip(channels_of(layers)))
+}
+
+/// Writes channels, each of a name and of one number a pixel, row 0 at the top, to an EXR file of
+/// 32-bit floats.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_channels<'a>(
+    path: &Path,
+    size: [u32; 2],
+    channels: impl Iterator<Item = (&'a str, Vec<f32>)>,
+) -> Result<()> {
     check_path(path)?;
-    let [width, height] = layers.size.map(|n| n as usize);
+    let [width, height] = size.map(|n| n as usize);
     let channel =
         |(name, samples): (&str, Vec<f32>)| AnyChannel::new(name, FlatSamples::F32(samples));
-    let list: SmallVec<_> = CHANNELS.into_iter().zip(channels_of(layers)).map(channel).collect();
+    let list: SmallVec<_> = channels.map(channel).collect();
     let attributes =
         LayerAttributes { software_name: Some("nimbus".into()), ..LayerAttributes::default() };
     let channels = AnyChannels::sort(list);

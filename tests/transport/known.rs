@@ -160,6 +160,30 @@ fn layers_tell_orders_and_lights() {
     }
 }
 
+/// Where nothing shines, or a lamp's cone does not reach, everything is black and a number.
+#[test]
+fn the_dark_is_black() {
+    let spot = Light::Spot {
+        position: DVec3::new(0.0, 9.0, 0.0),
+        direction: DVec3::Y,
+        intensity: DVec3::ONE,
+        radius: 0.01,
+        cos_inner: 0.9,
+        cos_outer: 0.8,
+    };
+    let black = Light::Sky { irradiance: DVec3::ZERO, constant: 0.5 };
+    let eye = ray(DVec3::new(3.0, 1.0, 4.0), DVec3::ZERO);
+    for lights in [&[][..], &[spot], &[black]] {
+        let scene = TransportScene {
+            medium: medium(1.0, phases()[1]),
+            solids: floor(0.5),
+            lights: Lights::new(lights, 0.005),
+        };
+        let mean = radiance(&scene, eye, 2000);
+        assert_eq!((mean.value, mean.error), (0.0, 0.0), "{lights:?}");
+    }
+}
+
 /// A white floor in the sun alone: E K_d cos θ/π.
 #[test]
 fn a_bare_floor_reflects_as_its_material_says() {

@@ -45,3 +45,4 @@ pub use samples::{
 };
 pub use scene_light::{BlobModel, PixelSample, RenderedPixels, render_lit_scene};
 pub use shares::{Emitters, PixelShares, drawn_by_settings, pixel_shares};
+pub use transport::{TransportLayers, TransportParts, transport_layers};

@@ -63,7 +63,7 @@ pub struct MeanPicture {
 /// centre; any number of first samples is spread evenly.
 ///
 /// *Source*: R2 sequence, powers of the plastic number's inverse (Roberts 2018).
-fn shift(i: u32) -> DVec2 {
+pub(super) fn shift(i: u32) -> DVec2 {
     const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_7, 0.569_840_290_998_053_2);
     (0.5 + f64::from(i) * STEP).fract() - 0.5
 }

@@ -7,20 +7,77 @@ use glam::DVec3;
 use super::background::view;
 use super::error_estimate::ErrorEstimate;
 use super::frame::FrameReference;
+use super::kind::ReferenceKind;
 use super::local_scene::LocalScene;
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
+use super::samples::{PairwiseSum, SampleSums, shift};
 use super::scene_light::{PixelSample, RenderedPixels};
+use crate::error::{Error, Result};
+use crate::model::light::Light;
+use crate::model::material::Brdf;
 use crate::model::scene::Scene;
+use crate::model::surface::Surface;
+use crate::reference::Blob;
 use crate::reference::parallel::parallel_map;
 use crate::reference::transport::{
-    BlobMedium, Lights, PathLight, Ray, Scatterer, Solids, Stream, TransportScene,
+    BlobMedium, Lights, N_LAYERS, PathLight, Ray, Scatterer, Solids, Stream, TransportScene,
 };
 use crate::reference::view::View;
 use crate::reference::{place, terrain};
 
 /// Pixels of one piece of work.
 const PIXELS_A_JOB: usize = 64;
+
+/// What a scene's light meets, relative to the lighting origin, and the view.
+#[derive(Debug, Clone)]
+pub struct TransportParts {
+    /// The camera's view.
+    pub view: View,
+    /// Blobs.
+    pub blobs: Vec<Blob>,
+    /// What scatters in each blob, by its index in `scatterers`.
+    pub i_scatterer: Vec<u32>,
+    /// What scatters.
+    pub scatterers: Vec<Scatterer>,
+    /// Rectangles: corner and sides, and the index of the material. The front faces u × v.
+    pub rectangles: Vec<([DVec3; 3], u32)>,
+    /// The ground's triangles, alike.
+    pub triangles: Vec<([DVec3; 3], u32)>,
+    /// Materials of rectangles and ground.
+    pub brdfs: Vec<Brdf>,
+    /// Lights.
+    pub lights: Vec<Light>,
+    /// Angular radius of directional lights, radians.
+    pub sun_radius: f64,
+}
+
+impl TransportParts {
+    /// Takes the scene's blobs, surfaces, ground and lights at `time_s`.
+    ///
+    /// # Errors
+    /// The camera has no direction at that time, or an animation cannot be read.
+    pub fn new(scene: &Scene, time_s: f64) -> Result<TransportParts> {
+        Ok(TransportParts::of_frame(scene, &FrameReference::unlit(scene, time_s)?))
+    }
+
+    fn of_frame(scene: &Scene, frame: &FrameReference) -> TransportParts {
+        let local = LocalScene::new(scene, frame.state.light_origin, frame.state.time_s);
+        let (i_scatterer, scatterers) = scatterers(scene, frame);
+        let [rectangles, triangles] = flats(scene, &local);
+        TransportParts {
+            view: view(scene, frame),
+            blobs: frame.blobs.clone(),
+            i_scatterer,
+            scatterers,
+            rectangles,
+            triangles,
+            brdfs: local.solid_brdfs().to_vec(),
+            lights: local.lights,
+            sun_radius: scene.lighting.sun_radius,
+        }
+    }
+}
 
 /// A scene as light sees it, and the view.
 pub(super) struct TransportPicture {
@@ -31,11 +88,13 @@ pub(super) struct TransportPicture {
 impl TransportPicture {
     /// Takes the scene's blobs, surfaces, ground and lights.
     pub fn new(scene: &Scene, frame: &FrameReference) -> TransportPicture {
-        let local = LocalScene::new(scene, frame.state.light_origin, frame.state.time_s);
-        let lights = Lights::new(&local.lights, scene.lighting.sun_radius);
-        let of =
-            TransportScene { medium: medium(scene, frame), solids: solids(scene, &local), lights };
-        TransportPicture { of, view: view(scene, frame) }
+        let parts = TransportParts::of_frame(scene, frame);
+        let of = TransportScene {
+            medium: BlobMedium::new(&parts.blobs, &parts.i_scatterer, parts.scatterers),
+            solids: Solids::new(&parts.rectangles, &parts.triangles, parts.brdfs),
+            lights: Lights::new(&parts.lights, parts.sun_radius),
+        };
+        TransportPicture { of, view: parts.view }
     }
 
     /// Follows one path through each pixel.
@@ -75,16 +134,75 @@ impl TransportPicture {
     }
 }
 
-/// Returns the blobs with what scatters in them: their cloud's material, in their own colour.
-fn medium(scene: &Scene, frame: &FrameReference) -> BlobMedium {
+/// Numbers of a pixel in the sums of layers: R, G, B, A; the layers' RGB; the squares of R, G, B.
+const N_LAYER_VALUES: usize = 4 + 3 * N_LAYERS + 3;
+
+/// A picture by how often its light was scattered, and by what shone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TransportLayers {
+    /// Premultiplied linear RGBA, row 0 at the top: the same as without layers.
+    pub rgba: Vec<[f64; 4]>,
+    /// Radiance of each layer: scattered once by suns and lamps, once by the sky, twice, more.
+    pub layers: Vec<[DVec3; N_LAYERS]>,
+    /// Standard error of R, G and B; 0 of a single sample.
+    pub error: Vec<DVec3>,
+}
+
+/// Draws `scene` by `n_samples` random paths a pixel, with its layers.
+///
+/// # Errors
+/// As [`super::sums`] of "transport", or there are no samples.
+pub fn transport_layers(
+    scene: &Scene,
+    time_s: f64,
+    n_samples: u32,
+    on_progress: OnProgress,
+) -> Result<TransportLayers> {
+    ReferenceKind::Transport.check(scene, time_s)?;
+    let picture = TransportPicture::new(scene, &FrameReference::unlit(scene, time_s)?);
+    let pixels = Pixels::all(scene.film.width, scene.film.height);
+    let mut pairs = PairwiseSum::default();
+    for i in 0..n_samples {
+        let values = parallel_map(pixels.at.len(), |k| {
+            let number = pixels.number(k) as u32;
+            let light = picture.path(pixels.at[k], number, PixelSample { i, shift: shift(i) });
+            let all = light.radiance();
+            let mut values = [0.0; N_LAYER_VALUES];
+            values[..4].copy_from_slice(&all.extend(light.alpha).to_array());
+            for (place, layer) in values[4..].chunks_exact_mut(3).zip(light.layers) {
+                place.copy_from_slice(&layer.to_array());
+            }
+            values[N_LAYER_VALUES - 3..].copy_from_slice(&(all * all).to_array());
+            values
+        });
+        pairs.push(SampleSums { n_samples: 1, values: values.concat() });
+        on_progress(RenderStage::Sampling, n_samples as usize);
+    }
+    let sums = pairs.finish().ok_or_else(|| Error::usage("no samples: expected at least one"))?;
+    let n = f64::from(n_samples);
+    let pixels = || sums.values.chunks_exact(N_LAYER_VALUES);
+    let rgb = |v: &[f64]| DVec3::new(v[0], v[1], v[2]) / n;
+    let layers = |v: &[f64]| std::array::from_fn(|k| rgb(&v[4 + 3 * k..]));
+    let error = |v: &[f64]| {
+        let variance = rgb(&v[N_LAYER_VALUES - 3..]) - rgb(v) * rgb(v);
+        (variance.max(DVec3::ZERO) / (n - 1.0).max(1.0)).map(f64::sqrt)
+    };
+    Ok(TransportLayers {
+        rgba: pixels().map(|v| [v[0] / n, v[1] / n, v[2] / n, v[3] / n]).collect(),
+        layers: pixels().map(layers).collect(),
+        error: pixels().map(error).collect(),
+    })
+}
+
+/// Returns what scatters in each blob: its cloud's material, in its own colour.
+fn scatterers(scene: &Scene, frame: &FrameReference) -> (Vec<u32>, Vec<Scatterer>) {
     let forward = scene.lighting.forward;
     let (mut scatterers, mut numbers) = (Vec::new(), HashMap::new());
     let mut i_scatterer = Vec::with_capacity(frame.blobs.len());
     for (i_cloud, color) in place::regions(&frame.groups).into_iter().zip(&frame.colors) {
-        let i_cloud = i_cloud as usize;
         let key = (i_cloud, color.to_array().map(f64::to_bits));
         let number = *numbers.entry(key).or_insert_with(|| {
-            let material = &scene.materials[scene.clouds[i_cloud].i_material];
+            let material = &scene.materials[scene.clouds[i_cloud as usize].i_material];
             let kd = material.at(frame.state.time_s).kd * *color;
             let (albedo, phase) = material.scattering.of(kd, forward);
             // A given albedo is that of white particles.
@@ -97,29 +215,22 @@ fn medium(scene: &Scene, frame: &FrameReference) -> BlobMedium {
         });
         i_scatterer.push(number);
     }
-    BlobMedium::new(&frame.blobs, &i_scatterer, scatterers)
+    (i_scatterer, scatterers)
 }
 
-fn solids(scene: &Scene, local: &LocalScene) -> Solids {
-    let rectangles: Vec<_> = local
-        .surfaces
-        .iter()
-        .enumerate()
-        .map(|(i, s)| ([s.center - s.u - s.v, 2.0 * s.u, 2.0 * s.v], i as u32))
-        .collect();
-    let n_surfaces = scene.surfaces.len();
-    let origin = local.origin;
-    let triangles: Vec<_> = scene
-        .terrains
-        .iter()
-        .enumerate()
-        .flat_map(|(i, t)| {
-            let of = move |p: [DVec3; 3]| {
-                let [corner, u, v] = p.map(|p| p - origin);
-                ([corner, u - corner, v - corner], (n_surfaces + i) as u32)
-            };
-            terrain::triangles(t).map(of)
+/// A corner and two sides, and the index of a material.
+type Flat = ([DVec3; 3], u32);
+
+/// Returns the rectangles, and the ground's triangles.
+fn flats(scene: &Scene, local: &LocalScene) -> [Vec<Flat>; 2] {
+    let rectangle = |(s, i): (&Surface, u32)| ([s.center - s.u - s.v, 2.0 * s.u, 2.0 * s.v], i);
+    let rectangles = local.surfaces.iter().zip(0u32..).map(rectangle).collect();
+    let of_ground = scene.terrains.iter().zip(scene.surfaces.len() as u32..);
+    let triangles = of_ground.flat_map(|(terrain, i)| {
+        terrain::triangles(terrain).map(move |points| {
+            let [corner, u, v] = points.map(|p| p - local.origin);
+            ([corner, u - corner, v - corner], i)
         })
-        .collect();
-    Solids::new(&rectangles, &triangles, local.solid_brdfs().to_vec())
+    });
+    [rectangles, triangles.collect()]
 }

@@ -87,6 +87,9 @@ impl Lights {
     /// direction `toward`, by whichever light.
     pub fn density(&self, p: DVec3, toward: DVec3) -> f64 {
         let all = self.all(p);
+        if all == 0.0 {
+            return 0.0;
+        }
         let of_sky = self.sky_strength() / all * self.sky_density(toward);
         let shown = self.suns.iter().filter(|sun| sun.shows(toward));
         of_sky + shown.map(|sun| sun.strength() / all / (TAU * sun.width)).sum::<f64>()

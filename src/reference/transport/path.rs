@@ -16,7 +16,7 @@ pub const N_LAYERS: usize = 6;
 
 /// Number of scatterings from which on a path may end by chance.
 const ROULETTE_FROM: u32 = 8;
-/// Share of the paths that go on, at most, from [`LONG`] scatterings on: between black walls and in
+/// Share of the paths that go on, at most, from [`LONG`] scatterings on: between white walls and in
 /// a medium that absorbs nothing a path need not end by itself.
 const GO_ON: f64 = 0.999;
 /// Number of scatterings of a long path.

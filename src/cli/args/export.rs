@@ -1,0 +1,38 @@
+//! The arguments of `nimbus export`.
+
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+use super::scene::SceneArgs;
+use super::values::{parse_positive, parse_samples};
+
+/// Arguments of `nimbus export`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "A scene for Mitsuba 3, on a grid of four cells a sigma:\n  \
+    nimbus export scenes/study-cloud.toml --size 160x120 --mitsuba cloud\n\n\
+    The same picture by both programs:\n  \
+    nimbus render scenes/study-cloud.toml --size 160x120 --reference transport -o nimbus.exr\n  \
+    mitsuba -m scalar_rgb cloud/scene.xml")]
+pub struct ExportArgs {
+    /// Scene file
+    pub scene: PathBuf,
+    /// Folder for scene.xml and the files that it names, for Mitsuba 3
+    #[arg(long, value_name = "DIR")]
+    pub mitsuba: PathBuf,
+    /// Width of the grid's cells, scene units [default: a quarter of the least sigma]
+    #[arg(long, value_name = "UNITS", value_parser = parse_positive)]
+    pub step: Option<f64>,
+    /// Frame number
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub frame: u32,
+    /// Samples of a pixel that the scene file asks for
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = parse_samples)]
+    pub samples: u32,
+    /// Replace an earlier export
+    #[arg(long)]
+    pub force: bool,
+    /// Arguments of every command with a scene.
+    #[command(flatten)]
+    pub options: SceneArgs,
+}

@@ -47,8 +47,8 @@ fn an_export_has_the_mass_of_all_blobs() {
     assert_eq!((&grid[..4], word(&grid, 4), word(&grid, 20)), (&b"VOL\x03"[..], 1, 1));
     let n = [8, 12, 16].map(|at| word(&grid, at) as usize);
     let of = |k: usize| number(&grid, 24 + 4 * k);
-    for axis in 0..3 {
-        assert!((of(axis + 3) - of(axis) - 0.1 * n[axis] as f64).abs() < 1e-5);
+    for (axis, cells) in n.iter().enumerate() {
+        assert!((of(axis + 3) - of(axis) - 0.1 * *cells as f64).abs() < 1e-5);
     }
     assert_eq!(grid.len(), 48 + 4 * n.iter().product::<usize>());
     let sum: f64 = (0..n.iter().product()).map(|k| number(&grid, 48 + 4 * k)).sum();
@@ -138,10 +138,10 @@ fn layers_of_transport_add_up() {
     }
     let mut n_lit = 0;
     for channel in ["R", "G", "B"] {
-        for k in 0..24 * 18 {
+        for (k, all) in layers[channel].iter().enumerate() {
             let names = ["once_sun", "once_sky", "twice_sun", "twice_sky", "more_sun", "more_sky"];
             let parts = names.map(|name| layers[&format!("{name}.{channel}")][k]);
-            let (sum, all) = (parts.iter().sum::<f32>(), layers[channel][k]);
+            let sum = parts.iter().sum::<f32>();
             assert!((sum - all).abs() <= 1e-6 * all.max(1e-3), "{channel} {k}: {sum} {all}");
             let error = layers[&format!("error.{channel}")][k];
             assert!(error >= 0.0 && error <= 1.001 * all, "{channel} {k}: {error} {all}");

@@ -71,8 +71,9 @@ pub(super) fn extinction(
 ) -> Result<(Grid, Option<Grid>)> {
     let [low, high] = bounds(&parts.blobs, shown);
     let cells = ((high - low) / step).ceil().max(DVec3::splat(2.0));
-    if !(cells.x * cells.y * cells.z <= MOST_CELLS) {
-        let fits = step * (cells.x * cells.y * cells.z / MOST_CELLS).cbrt();
+    let n_cells = cells.x * cells.y * cells.z;
+    if n_cells.is_nan() || n_cells > MOST_CELLS {
+        let fits = step * (n_cells / MOST_CELLS).cbrt();
         return Err(Error::usage(format!(
             "a grid of {:.0} x {:.0} x {:.0} cells of {step} is too large; expected --step {fits:.4} \
              or more",

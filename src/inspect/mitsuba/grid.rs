@@ -75,8 +75,8 @@ pub(super) fn extinction(
     if n_cells.is_nan() || n_cells > MOST_CELLS {
         let fits = step * (n_cells / MOST_CELLS).cbrt();
         return Err(Error::usage(format!(
-            "a grid of {:.0} x {:.0} x {:.0} cells of {step} is too large; expected --step {fits:.4} \
-             or more",
+            "a grid of {:.0} x {:.0} x {:.0} cells of {step} is too large; expected --step \
+             {fits:.4} or more",
             cells.x, cells.y, cells.z
         )));
     }

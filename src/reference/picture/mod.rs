@@ -26,6 +26,7 @@ mod scene_light;
 mod shares;
 mod sprites;
 mod transport;
+mod transport_layers;
 
 pub use background::view;
 pub use error_estimate::ErrorEstimate;
@@ -45,4 +46,5 @@ pub use samples::{
 };
 pub use scene_light::{BlobModel, PixelSample, RenderedPixels, render_lit_scene};
 pub use shares::{Emitters, PixelShares, drawn_by_settings, pixel_shares};
-pub use transport::{TransportLayers, TransportParts, transport_layers};
+pub use transport::TransportParts;
+pub use transport_layers::{TransportLayers, transport_layers};

@@ -7,13 +7,11 @@ use glam::DVec3;
 use super::background::view;
 use super::error_estimate::ErrorEstimate;
 use super::frame::FrameReference;
-use super::kind::ReferenceKind;
 use super::local_scene::LocalScene;
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
-use super::samples::{PairwiseSum, SampleSums, shift};
 use super::scene_light::{PixelSample, RenderedPixels};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::light::Light;
 use crate::model::material::Brdf;
 use crate::model::scene::Scene;
@@ -21,7 +19,7 @@ use crate::model::surface::Surface;
 use crate::reference::Blob;
 use crate::reference::parallel::parallel_map;
 use crate::reference::transport::{
-    BlobMedium, Lights, N_LAYERS, PathLight, Ray, Scatterer, Solids, Stream, TransportScene,
+    BlobMedium, Lights, PathLight, Ray, Scatterer, Solids, Stream, TransportScene,
 };
 use crate::reference::view::View;
 use crate::reference::{place, terrain};
@@ -125,73 +123,13 @@ impl TransportPicture {
     }
 
     /// Follows the path of one sample through pixel [column, row]; `number` tells pixels apart.
-    fn path(&self, [i, j]: [u32; 2], number: u32, sample: PixelSample) -> PathLight {
+    pub fn path(&self, [i, j]: [u32; 2], number: u32, sample: PixelSample) -> PathLight {
         let view = View { shift: sample.shift, ..self.view };
         let ray = view.ray(i, j);
         let origin = view.pose.position + view.near * ray;
         let ray = Ray { origin, direction: ray.normalize() };
         self.of.follow(ray, &mut Stream::new(number, sample.i))
     }
-}
-
-/// Numbers of a pixel in the sums of layers: R, G, B, A; the layers' RGB; the squares of R, G, B.
-const N_LAYER_VALUES: usize = 4 + 3 * N_LAYERS + 3;
-
-/// A picture by how often its light was scattered, and by what shone.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TransportLayers {
-    /// Premultiplied linear RGBA, row 0 at the top: the same as without layers.
-    pub rgba: Vec<[f64; 4]>,
-    /// Radiance of each layer: scattered once by suns and lamps, once by the sky, twice, more.
-    pub layers: Vec<[DVec3; N_LAYERS]>,
-    /// Standard error of R, G and B; 0 of a single sample.
-    pub error: Vec<DVec3>,
-}
-
-/// Draws `scene` by `n_samples` random paths a pixel, with its layers.
-///
-/// # Errors
-/// As [`super::sums`] of "transport", or there are no samples.
-pub fn transport_layers(
-    scene: &Scene,
-    time_s: f64,
-    n_samples: u32,
-    on_progress: OnProgress,
-) -> Result<TransportLayers> {
-    ReferenceKind::Transport.check(scene, time_s)?;
-    let picture = TransportPicture::new(scene, &FrameReference::unlit(scene, time_s)?);
-    let pixels = Pixels::all(scene.film.width, scene.film.height);
-    let mut pairs = PairwiseSum::default();
-    for i in 0..n_samples {
-        let values = parallel_map(pixels.at.len(), |k| {
-            let number = pixels.number(k) as u32;
-            let light = picture.path(pixels.at[k], number, PixelSample { i, shift: shift(i) });
-            let all = light.radiance();
-            let mut values = [0.0; N_LAYER_VALUES];
-            values[..4].copy_from_slice(&all.extend(light.alpha).to_array());
-            for (place, layer) in values[4..].chunks_exact_mut(3).zip(light.layers) {
-                place.copy_from_slice(&layer.to_array());
-            }
-            values[N_LAYER_VALUES - 3..].copy_from_slice(&(all * all).to_array());
-            values
-        });
-        pairs.push(SampleSums { n_samples: 1, values: values.concat() });
-        on_progress(RenderStage::Sampling, n_samples as usize);
-    }
-    let sums = pairs.finish().ok_or_else(|| Error::usage("no samples: expected at least one"))?;
-    let n = f64::from(n_samples);
-    let pixels = || sums.values.chunks_exact(N_LAYER_VALUES);
-    let rgb = |v: &[f64]| DVec3::new(v[0], v[1], v[2]) / n;
-    let layers = |v: &[f64]| std::array::from_fn(|k| rgb(&v[4 + 3 * k..]));
-    let error = |v: &[f64]| {
-        let variance = rgb(&v[N_LAYER_VALUES - 3..]) - rgb(v) * rgb(v);
-        (variance.max(DVec3::ZERO) / (n - 1.0).max(1.0)).map(f64::sqrt)
-    };
-    Ok(TransportLayers {
-        rgba: pixels().map(|v| [v[0] / n, v[1] / n, v[2] / n, v[3] / n]).collect(),
-        layers: pixels().map(layers).collect(),
-        error: pixels().map(error).collect(),
-    })
 }
 
 /// Returns what scatters in each blob: its cloud's material, in its own colour.

@@ -10,10 +10,10 @@ use super::values::{parse_positive, parse_samples};
 /// Arguments of `nimbus export`.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "A scene for Mitsuba 3, on a grid of four cells a sigma:\n  \
-    nimbus export scenes/study-cloud.toml --size 160x120 --mitsuba cloud\n\n\
-    The same picture by both programs:\n  \
-    nimbus render scenes/study-cloud.toml --size 160x120 --reference transport -o nimbus.exr\n  \
-    mitsuba -m scalar_rgb cloud/scene.xml")]
+    nimbus export scenes/study-cloud.toml --size 80x60 --mitsuba cloud\n\n\
+    The same picture by nimbus, for Mitsuba's of cloud/scene.xml:\n  \
+    nimbus render scenes/study-cloud.toml --size 80x60 --reference transport \\\n      \
+    -o transport.exr")]
 pub struct ExportArgs {
     /// Scene file
     pub scene: PathBuf,

@@ -110,6 +110,25 @@ fn what_mitsuba_has_not_is_refused_and_nothing_written() {
     let output = run(&["export", &scene, "--mitsuba", &out, "--step", "0.0001"]);
     let text = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(2) && text.contains("--step"), "{text}");
+    // An export takes no device.
+    let output = run(&["export", &scene, "--mitsuba", &out, "--validation"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(!Path::new(&out).exists());
+}
+
+/// Layers have more numbers than a picture: they are refused before anything is allocated where the
+/// picture alone would fit.
+#[test]
+fn layers_that_no_memory_holds_are_refused() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let scene = scene(dir.path(), "");
+    let picture = path(&dir, "layers.exr");
+    let all = ["render", &scene, "--reference", "transport", "--layers", "-q", "-o", &picture];
+    let output = run(&[&all[..], &["--size", "2000x1000", "--samples", "64"]].concat());
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(text.contains("MiB") && text.contains("expected fewer pixels"), "{text}");
+    assert!(!Path::new(&picture).exists());
 }
 
 /// The layers add up to the picture, which has the bytes of one without layers.

@@ -174,8 +174,9 @@ fn a_bin_of_all_splats_keeps_the_last_ones() {
     assert!((alpha - (1.0 - (-8f64).exp())).abs() < 1e-5, "{alpha}");
 }
 
-/// A picture of floats takes the exact functions, whether thin or not: those of fewer bits are some
-/// ten times worse, which is less than the bound allows at a sprite's edge.
+/// A picture of floats takes the exact functions, whether thin or not. The functions of fewer bits
+/// are some ten times worse. The bound of a whole picture cannot tell: it has to hold at the
+/// sprites' edges, where the position errs most.
 #[test]
 fn pictures_of_floats_have_exact_functions() {
     let mut gpu = Gpu::new();

@@ -54,6 +54,11 @@ float erf_approx(float x) {
     return sign(x) * (1.0 - 1.0 / d);
 }
 
+// Returns 2^n p for whole n and p from 1/2 to 2, where that is a normal number.
+float times_power_of_two(float p, float n) {
+    return intBitsToFloat(floatBitsToInt(p) + (int(n) << 23));
+}
+
 // Returns 2^x for |x| <= 125 with a relative error below 3e-7. The built-in exp2 promises 3 + 2|x|
 // ulp and takes some 10 operations more for all x. The polynomial of degree 5 errs by 7.5e-8 of 2^f
 // on [-1/2, 1/2] (minimax).
@@ -63,7 +68,7 @@ float power_of_two(float x) {
     float p = 0.00132764718749 * f + 0.00967554133354;
     p = ((p * f + 0.0555071327386) * f + 0.240221197239) * f + 0.693146967065;
     p = p * f + 1.00000007166;
-    return intBitsToFloat(floatBitsToInt(p) + (int(n) << 23));
+    return times_power_of_two(p, n);
 }
 
 // Returns 1 - e^-t for t in [0, 1/8]: t times the cubic through (1 - e^-t)/t at Chebyshev's points,
@@ -72,6 +77,12 @@ float thin_opacity(float t) {
     return t
            * ((0.999999984752 - t * 0.499996093888)
               + t * t * (0.166509869621 - t * 0.039641773912));
+}
+
+// Returns 1 - 2^n (1 + d) for whole n from -126 to 0; nothing cancels where n is 0.
+float one_minus_power(float n, float d) {
+    float scale = intBitsToFloat((int(n) + 127) << 23);
+    return (1.0 - scale) - scale * d;
 }
 
 // Returns 1 - e^-t for t >= 0 with a relative error below 3.5e-7. Here e^-t = 2^n (1 + f p(f)), n a
@@ -84,8 +95,7 @@ float one_minus_exp(float t) {
     float f = x - n;
     float p = (0.000154035126507 * f + 0.00133907354775) * f + 0.00961823749407;
     p = ((p * f + 0.0555035743364) * f + 0.24022649795) * f + 0.693147187927;
-    float scale = intBitsToFloat((int(n) + 127) << 23);
-    return (1.0 - scale) - scale * (f * p);
+    return one_minus_power(n, f * p);
 }
 
 // The next three serve pictures of 16 bits a channel or fewer, which round by up to 2^-11 of a
@@ -97,7 +107,7 @@ float power_of_two_16(float x) {
     float f = x - n;
     float p = 0.00957010191116 * f + 0.0559178603194;
     p = ((p * f + 0.240247448279) * f + 0.693121814737) * f + 0.999999261446;
-    return intBitsToFloat(floatBitsToInt(p) + (int(n) << 23));
+    return times_power_of_two(p, n);
 }
 
 // thin_opacity() with a relative error below 3e-6. The polynomial errs by 2.5e-6.
@@ -112,8 +122,7 @@ float one_minus_exp_16(float t) {
     float f = x - n;
     float p = 0.00961811077637 * f + 0.0558372882603;
     p = (p * f + 0.24023252162) * f + 0.69313685778;
-    float scale = intBitsToFloat((int(n) + 127) << 23);
-    return (1.0 - scale) - scale * (f * p);
+    return one_minus_power(n, f * p);
 }
 
 // Returns the unit vector along o, and 0 where o is 0.

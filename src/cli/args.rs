@@ -70,8 +70,9 @@ pub enum Command {
     /// device by arithmetic alone. "slices" draws the same blobs composed by slices (draw.overlap).
     /// "volume" integrates light through the overlapping blobs, to about a millionth of the
     /// brightest. "model" also computes the light on the blobs by the model itself, and the light
-    /// on surfaces pixel by pixel. "reflections=K" computes K reflections. "transport" follows
-    /// random paths of light through the blobs as a medium (docs/explanation/transport.md).
+    /// on surfaces pixel by pixel. "reflections=K" computes K reflections. "transport" traces
+    /// random paths of light through the blobs (docs/explanation/transport.md).
+    ///
     /// --samples takes the mean over each pixel's area, and more random paths, instead of the value
     /// at its centre.
     Render(RenderArgs),

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::args::ExportArgs;
 use super::progress::spinner;
-use super::scene::{check_time, load};
+use super::scene::{check_time, load, print_sizes};
 use crate::error::{Error, Result};
 use crate::inspect::mitsuba::{ALBEDO, EXTINCTION, Exported, GROUND, SCENE, SKY_PICTURE, export};
 use crate::io::console::say;
@@ -30,6 +30,9 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     check_time(&scene, time_s)?;
     let scene = &scene.exact().into_owned();
     ReferenceKind::Transport.check(scene, time_s)?;
+    if args.options.verbose {
+        print_sizes(scene, None);
+    }
     let planned = [SCENE, EXTINCTION, ALBEDO, SKY_PICTURE, GROUND, RECORD].map(str::to_owned);
     let existing = Existing::new(args.force);
     let mut folder = ResultFolder::open(&args.mitsuba, "mitsuba", existing, &planned)?;

@@ -83,7 +83,7 @@ fn cut(args: &PlanArgs, set: &[String], loaded: &LoadedScene) -> Result<Cut> {
         let request = ReferenceDivision {
             of,
             i_frame: args.frame,
-            n_samples: args.samples,
+            n_samples: args.samples.unwrap_or(of.usual_samples()),
             tile: args.tile,
             range: args.shard_samples,
             format: format(ImageKind::Exr),

@@ -36,7 +36,7 @@ pub fn check(args: &RenderArgs) -> Result<()> {
 
 /// Channels of the layers of "transport": the picture, its light by how often it was scattered and
 /// what it came from, and the standard error.
-pub const TRANSPORT_CHANNELS: [&str; 25] = [
+pub const TRANSPORT_CHANNELS: [&str; 4 + 3 * N_LAYERS + 3] = [
     "R",
     "G",
     "B",

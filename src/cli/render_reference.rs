@@ -18,9 +18,6 @@ use crate::reference::picture::{
     ReferenceRequest, check_memory, drawn_as_set, layers_as_set, transport_layers,
 };
 
-/// Random paths of a pixel where nothing says how many.
-const PATHS: u32 = 64;
-
 /// A picture in f64 and the JSON keys that only its kind has.
 struct Computed {
     rgba: Vec<[f64; 4]>,
@@ -34,10 +31,9 @@ struct Computed {
 pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -> Result<()> {
     let film = scene.film;
     let n_pixels = u64::from(film.width) * u64::from(film.height);
-    let is_random = kind == ReferenceKind::Transport;
-    let n_samples = args.samples.unwrap_or(if is_random { PATHS } else { 1 });
+    let n_samples = args.samples.unwrap_or(kind.usual_samples());
     check_memory(n_pixels, n_samples, scene.n_particles())?;
-    if args.error.is_some() && !is_random {
+    if args.error.is_some() && !kind.is_random() {
         return Err(Error::usage(format!(
             "--error: only \"transport\" is random; expected --samples with --reference {kind}"
         )));
@@ -51,7 +47,7 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
         _ => None,
     };
     if args.layers {
-        return match is_random {
+        return match kind.is_random() {
             true => with_transport_layers(args, n_samples, scene, time_s),
             false => with_layers(args, scene, time_s),
         };
@@ -180,13 +176,17 @@ fn sampled(
 ) -> Result<Computed> {
     let (film, never) = (scene.film, AtomicBool::new(false));
     let pixels = Pixels::all(film.width, film.height);
+    let n_pixels = pixels.at.len() as u64;
     let shown = ReferenceProgress::new(args.options.quiet);
     let subject = ReferenceRequest { kind, scene, time_s };
     let listener = &|work, n| shown.advance(work, n);
     let sums = match args.error {
         Some(error) => {
             let is_enough = &|mean: &MeanPicture| mean.relative_error <= error;
-            let enough = Enough { least: 2, most: MAX_SAMPLES, is_enough };
+            // More samples take more memory.
+            let fits = |n: &u32| check_memory(n_pixels, *n, scene.n_particles()).is_ok();
+            let most = (1..=MAX_SAMPLES.ilog2()).rev().map(|k| 1 << k).find(fits).unwrap_or(2);
+            let enough = Enough { least: 2, most, is_enough };
             picture::sums_until(&subject, &pixels, false, &enough, (&never, listener))?
         }
         None => picture::sums(&subject, &pixels, 0..n_samples, &never, listener)?,

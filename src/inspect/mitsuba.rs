@@ -222,27 +222,27 @@ fn scene_file(
 
 fn lights(text: &mut String, parts: &TransportParts, has_sky: bool) -> std::fmt::Result {
     for light in &parts.lights {
-        match light {
-            Light::Directional { direction, irradiance } => writeln!(
-                text,
-                r#"  <emitter type="directional">
-    <vector name="direction" value="{}"/>
-    <rgb name="irradiance" value="{}"/>
+        let (kind, place, strength) = match light {
+            Light::Directional { direction, irradiance } => {
+                ("directional", ("vector", "direction", *direction), ("irradiance", *irradiance))
+            }
+            Light::Point { position, intensity, .. } => {
+                ("point", ("point", "position", *position), ("intensity", *intensity))
+            }
+            // The sky is the picture, and scenes with spots are refused.
+            Light::Spot { .. } | Light::Sky { .. } => continue,
+        };
+        let (tag, name, value) = place;
+        writeln!(
+            text,
+            r#"  <emitter type="{kind}">
+    <{tag} name="{name}" value="{}"/>
+    <rgb name="{}" value="{}"/>
   </emitter>"#,
-                list(*direction),
-                list(*irradiance)
-            )?,
-            Light::Point { position, intensity, .. } => writeln!(
-                text,
-                r#"  <emitter type="point">
-    <point name="position" value="{}"/>
-    <rgb name="intensity" value="{}"/>
-  </emitter>"#,
-                list(*position),
-                list(*intensity)
-            )?,
-            Light::Spot { .. } | Light::Sky { .. } => (),
-        }
+            list(value),
+            strength.0,
+            list(strength.1)
+        )?;
     }
     if has_sky {
         writeln!(

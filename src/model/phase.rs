@@ -1,4 +1,4 @@
-//! What a cloud's medium does to light: its phase function and its albedo of single scattering
+//! Scattering in a cloud's medium: the phase function and the albedo of single scattering
 //! (transport.md).
 
 use std::f64::consts::PI;
@@ -95,20 +95,20 @@ impl Phase {
         }
     }
 
-    /// Draws a cosine with the density 2π p. `draw` returns independent numbers, uniform in (0, 1).
-    pub fn draw(&self, mut draw: impl FnMut() -> f64) -> f64 {
+    /// Draws a cosine with the density 2π p. `uniform` returns independent numbers in (0, 1).
+    pub fn sample(&self, mut uniform: impl FnMut() -> f64) -> f64 {
         match *self {
-            Phase::HenyeyGreenstein { g } => draw_henyey_greenstein(g, draw()),
-            Phase::Droplets { mixture: m } if draw() < m.share => {
+            Phase::HenyeyGreenstein { g } => sample_henyey_greenstein(g, uniform()),
+            Phase::Droplets { mixture: m } if uniform() < m.share => {
                 // Draine's is Henyey and Greenstein's times 1 + α cos², which is at most 1 + α.
                 loop {
-                    let cosine = draw_henyey_greenstein(m.g_draine, draw());
-                    if draw() * (1.0 + m.alpha) <= 1.0 + m.alpha * cosine * cosine {
+                    let cosine = sample_henyey_greenstein(m.g_draine, uniform());
+                    if uniform() * (1.0 + m.alpha) <= 1.0 + m.alpha * cosine * cosine {
                         return cosine;
                     }
                 }
             }
-            Phase::Droplets { mixture: m } => draw_henyey_greenstein(m.g, draw()),
+            Phase::Droplets { mixture: m } => sample_henyey_greenstein(m.g, uniform()),
         }
     }
 }
@@ -125,7 +125,7 @@ fn draine(g: f64, alpha: f64, cosine: f64) -> f64 {
         / (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0)
 }
 
-fn draw_henyey_greenstein(g: f64, u: f64) -> f64 {
+fn sample_henyey_greenstein(g: f64, u: f64) -> f64 {
     if g.abs() < 1e-6 {
         // To first order in g.
         let x = 2.0 * u - 1.0;
@@ -135,10 +135,12 @@ fn draw_henyey_greenstein(g: f64, u: f64) -> f64 {
     ((1.0 + g * g - s * s) / (2.0 * g)).clamp(-1.0, 1.0)
 }
 
-/// Returns the albedo ϖ of single scattering with which a half space of the mean cosine `g`
-/// reflects the share `reflected` of diffuse light. *Source*: the inverse of van de Hulst's
-/// R = (1 − s)(1 − 0.139 s)/(1 + 1.17 s) with s² = (1 − ϖ)/(1 − gϖ) (1980, §11.2), each channel by
-/// itself. A share of 1 and above has the albedo 1, and 0 has 0.
+/// Returns the single-scattering albedo ϖ of a half space that reflects the share `reflected` of
+/// diffuse light, each channel by itself. `g` is the mean cosine of its phase function. A share of 1
+/// and above has the albedo 1, and 0 has 0.
+///
+/// *Source*: the inverse of van de Hulst's R = (1 − s)(1 − 0.139 s)/(1 + 1.17 s) with
+/// s² = (1 − ϖ)/(1 − gϖ) (1980).
 pub fn albedo_of(reflected: DVec3, g: f64) -> DVec3 {
     DVec3::from(reflected.to_array().map(|r| {
         let r = r.clamp(0.0, 1.0);
@@ -216,7 +218,7 @@ mod tests {
                 (f64::from(word) + 0.5) / 2f64.powi(32)
             };
             let n = 100_000;
-            let drawn: Vec<f64> = (0..n).map(|_| phase.draw(&mut uniform)).collect();
+            let drawn: Vec<f64> = (0..n).map(|_| phase.sample(&mut uniform)).collect();
             // Moments of c and c²; the standard error of a mean in [−1, 1] is at most 1/√n.
             for power in [1, 2] {
                 let expected = integral(|c| 2.0 * PI * c.powi(power) * phase.at(c));

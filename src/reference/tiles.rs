@@ -12,9 +12,9 @@ use super::slices;
 use super::view::View;
 use crate::model::film::FilmFormat;
 
-/// Returns the relative error of an opacity in tiles beyond that of the exact functions: a picture
-/// of 16 bits a channel or fewer takes a power of two within 3e-6 and 1 − e^{−τ} within 1.6e-5
-/// (passes.md "tiles"). A relative error of τ is none greater of 1 − e^{−τ}.
+/// Returns the relative error of an opacity in tiles beyond the errors of the exact functions. A
+/// picture of 16 bits a channel or fewer takes a power of two within 3e-6, and 1 − e^{−τ} within
+/// 1.6e-5 (passes.md "tiles"). The relative error of 1 − e^{−τ} is at most that of τ.
 pub fn off_alpha(format: FilmFormat) -> f64 {
     if format == FilmFormat::Rgba32f { 0.0 } else { 3e-6 + 1.6e-5 }
 }

@@ -29,8 +29,8 @@ pub const FAULTS: &[Fault] = &[
     (
         "1 - exp(-t) evaluated where it cancels",
         "include/functions.glsl",
-        "return (1.0 - scale) - scale * (f * p);",
-        "return 1.0 - (scale + scale * (f * p));",
+        "return (1.0 - scale) - scale * d;",
+        "return 1.0 - (scale + scale * d);",
         "functions/one-minus-exp",
     ),
     (

@@ -198,6 +198,6 @@ fn a_bare_floor_reflects_as_its_material_says() {
     radiance(&scene, eye, 20_000).assert_is("floor", 2.0 * 0.5 * 0.8 / PI, 1e-3);
     // From below it is black, and hides the sun.
     let below = ray(DVec3::new(1.0, -3.0, 2.0), DVec3::new(0.0, -1.2, 0.0));
-    let light = scene.follow(below, &mut Stream::new(0, 0));
+    let light = scene.trace(below, &mut Stream::new(0, 0));
     assert_eq!((light.radiance(), light.alpha), (DVec3::ZERO, 1.0));
 }

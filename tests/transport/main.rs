@@ -13,7 +13,7 @@ mod wrong;
 use glam::DVec3;
 use nimbus::reference::parallel::parallel_map;
 use nimbus::reference::transport::{
-    Estimator, Medium, N_LAYERS, PathLight, Ray, Stream, TransportScene, Unbiased,
+    Estimator, Medium, PathLight, Ray, Stream, TransportScene, Unbiased,
 };
 
 /// Mean of a channel over paths, with its standard error.
@@ -66,7 +66,7 @@ fn paths<M: Medium, E: Estimator>(
     // Rays share no random numbers.
     let bits = ray.origin.to_array().map(|x| x.to_bits() ^ (x.to_bits() >> 32));
     let number = bits.into_iter().fold(0u64, |a, b| a.wrapping_mul(0x9e37_79b9).wrapping_add(b));
-    Mean::of(n, |i| of(&scene.follow_by::<E>(ray, &mut Stream::new(number as u32, i as u32))))
+    Mean::of(n, |i| of(&scene.trace_by::<E>(ray, &mut Stream::new(number as u32, i as u32))))
 }
 
 /// Returns the mean green radiance along one ray by as many paths as it takes for a standard error
@@ -109,12 +109,4 @@ impl Medium for Vacuum {
     ) -> Option<nimbus::reference::transport::Collision> {
         None
     }
-}
-
-#[test]
-fn layers_are_six() {
-    assert_eq!(
-        PathLight { layers: [DVec3::ONE; N_LAYERS], alpha: 0.0 }.radiance(),
-        DVec3::splat(6.0)
-    );
 }

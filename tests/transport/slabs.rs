@@ -123,7 +123,7 @@ fn energy_is_conserved() {
                 let cosine = ((i as f64 + 0.5) / 200_000.0).sqrt();
                 let ray = toward(2.0, from_above, cosine);
                 let mut stream = nimbus::reference::transport::Stream::new(7, i as u32);
-                let light = scene.follow(ray, &mut stream);
+                let light = scene.trace(ray, &mut stream);
                 // What passes straight through is not in the radiance.
                 let straight = if from_above { 0.0 } else { 1.0 - light.alpha };
                 light.radiance().y + straight

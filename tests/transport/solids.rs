@@ -137,7 +137,7 @@ fn a_cloud_in_a_room_takes_nothing_away() {
             normal[axis] = -sign;
             // The radiance that a wall sends is ρ/π of what it receives.
             let eye = Ray { origin: target + 1e-6 * normal, direction: -normal };
-            scene.follow(eye, &mut stream).radiance().y * PI / rho
+            scene.trace(eye, &mut stream).radiance().y * PI / rho
         })
     };
     let (bare, cloudy) = (flux(0.0), flux(3.0));

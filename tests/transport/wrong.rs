@@ -93,12 +93,12 @@ fn wrong_estimators_are_found() {
         }
     });
     wrong!(Twice, "light that both ways count fully", {
-        fn share(_: f64, _: f64) -> f64 {
+        fn mis_weight(_: f64, _: f64) -> f64 {
             1.0
         }
     });
     wrong!(Roulette, "roulette without a weight", {
-        fn survivor(_: f64) -> f64 {
+        fn roulette_weight(_: f64) -> f64 {
             1.0
         }
     });

@@ -37,15 +37,14 @@ pub struct PlanArgs {
     /// Frame of the reference
     #[arg(long, value_name = "N", default_value_t = 0, requires = "reference")]
     pub frame: u32,
-    /// Samples of every pixel of the reference
+    /// Samples of every pixel of the reference [default: 1, and 64 random paths of "transport"]
     #[arg(
         long,
         value_name = "N",
-        default_value_t = 1,
         requires = "reference",
         value_parser = super::values::parse_samples
     )]
-    pub samples: u32,
+    pub samples: Option<u32>,
     /// Size of the reference's tiles, pixels [default: 256x256, or by --model]
     #[arg(long, value_name = "WxH", requires = "reference", value_parser = parse_size)]
     pub tile: Option<(u32, u32)>,

@@ -48,8 +48,8 @@ pub struct RenderArgs {
     /// it [default: 1, and 64 random paths of "transport"]
     #[arg(long, value_name = "N", requires = "reference", value_parser = parse_samples)]
     pub samples: Option<u32>,
-    /// Follow random paths of "transport" until the standard error of the picture's mean is this
-    /// share of it
+    /// Trace random paths of "transport" until the standard error of the picture's mean is this
+    /// share of it. A pixel has at most 2^20 of them, or as many as fit in memory
     #[arg(
         long,
         value_name = "SHARE",
@@ -59,7 +59,8 @@ pub struct RenderArgs {
     )]
     pub error: Option<f64>,
     /// Write named layers to the EXR file, too: depth, optical depth, number of particles, and the
-    /// picture of each reflection alone (docs/reference/files.md)
+    /// picture of each reflection alone; of "transport" its light by how often it was scattered,
+    /// and its standard error (docs/reference/files.md)
     #[arg(long)]
     pub layers: bool,
     /// Have RenderDoc capture the frame; nimbus must have been started under RenderDoc

@@ -30,11 +30,11 @@ keys! { MATERIAL: fn material(s) -> Material { Material;
 }}
 
 keys! { SCATTERING: fn scattering(s) -> Scattering { Scattering;
-    /// Albedo of single scattering in a cloud, linear RGB, for the reference "transport". "derived"
-    /// is that of a thick cloud that reflects `kd`.
+    /// Albedo of single scattering in a cloud, linear RGB, for the reference "transport". With
+    /// "derived", a thick cloud reflects `kd`.
     albedo: one_of("derived", [("derived".into(), None)], Some(vector([1.0; 3], SHARE).map(Some)));
-    /// Phase function of a cloud, for the reference "transport": the mean cosine g of Henyey and
-    /// Greenstein's, "mie" for droplets of water, or "derived", which is g = `lighting.forward`.
+    /// Phase function of a cloud, for the reference "transport". A number is the mean cosine g of
+    /// Henyey and Greenstein's, "derived" is g = `lighting.forward`, and "mie" is that of droplets.
     phase: one_of("derived", [("derived".into(), Shape::Derived), ("mie".into(), Shape::Droplets)],
         Some(number(0.85, COSINE).map(Shape::MeanCosine))) => |shape| read_phase(s, &shape);
 }}

@@ -104,6 +104,16 @@ impl ReferenceKind {
         Scene { draw, ..scene.clone() }
     }
 
+    /// Returns whether every sample is a random path: a single one then tells nothing of its error.
+    pub fn is_random(self) -> bool {
+        self == ReferenceKind::Transport
+    }
+
+    /// Returns the number of samples of a pixel where nothing says how many.
+    pub fn usual_samples(self) -> u32 {
+        if self.is_random() { 64 } else { 1 }
+    }
+
     /// Returns the number of reflections that the picture of a scene has.
     pub(super) fn n_reflections(self, scene: &Scene) -> u32 {
         if let ReferenceKind::Reflections(k) = self { k } else { n_reflections(scene) }
@@ -112,7 +122,7 @@ impl ReferenceKind {
     /// Describes what the estimate of this reference's own error consists of, for a mean of
     /// `n_samples` samples.
     pub fn accuracy_text(self, scene: &Scene, n_samples: u32) -> String {
-        if self == ReferenceKind::Transport {
+        if self.is_random() {
             return format!("{n_samples} random paths a pixel: one standard error");
         }
         let mut parts = vec![match self {

@@ -17,9 +17,19 @@ const PARTICLE_BYTES: u64 = 320;
 /// # Errors
 /// Fails if it does not; the error says what it takes and what would fit.
 pub fn check_memory(n_pixels: u64, n_samples: u32, n_particles: u64) -> Result<()> {
+    check_sums(n_pixels, n_samples, n_particles, SUM_BYTES)
+}
+
+/// Checks the same of partial sums that have `sum_bytes` bytes for each pixel.
+pub(super) fn check_sums(
+    n_pixels: u64,
+    n_samples: u32,
+    n_particles: u64,
+    sum_bytes: u64,
+) -> Result<()> {
     // Sums are joined in pairs, so that there is one for each binary digit of the number.
     let n_sums = if n_samples > 1 { u64::from(n_samples.ilog2()) + 1 } else { 0 };
-    let of_pixels = n_pixels.saturating_mul(PIXEL_BYTES + n_sums * SUM_BYTES);
+    let of_pixels = n_pixels.saturating_mul(PIXEL_BYTES + n_sums * sum_bytes);
     let of_particles = n_particles.saturating_mul(PARTICLE_BYTES);
     let bytes = of_pixels.saturating_add(of_particles);
     if bytes <= MOST_BYTES {

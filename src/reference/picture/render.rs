@@ -48,8 +48,9 @@ impl ReferenceKind {
         on_progress: OnProgress,
     ) -> Result<Reference> {
         let begin = Instant::now();
-        if self == ReferenceKind::Transport {
-            return self.render_paths(scene, time_s, pixels, on_progress);
+        if self.is_random() {
+            let request = ReferenceRequest { kind: self, scene, time_s };
+            return render_paths(&request, pixels, on_progress);
         }
         self.check(scene, time_s)?;
         let scene = &self.without_approximations(scene);
@@ -73,28 +74,23 @@ impl ReferenceKind {
     }
 }
 
-impl ReferenceKind {
-    /// Draws `scene` by as many random paths through the centre of each pixel as it takes.
-    fn render_paths(
-        self,
-        scene: &Scene,
-        time_s: f64,
-        pixels: &Pixels,
-        on_progress: OnProgress,
-    ) -> Result<Reference> {
-        let begin = Instant::now();
-        let request = ReferenceRequest { kind: self, scene, time_s };
-        let never = AtomicBool::new(false);
-        let found = sums_until(&request, pixels, true, &PATHS, (&never, on_progress))?;
-        let (mean, seconds) = (found.mean(), begin.elapsed().as_secs_f64());
-        Ok(Reference {
-            own_error: mean.random_error,
-            rgba: mean.rgba,
-            accuracy: self.accuracy_text(scene, found.n_samples),
-            seconds,
-            pixels_s: seconds,
-        })
-    }
+/// Draws a scene by as many random paths through the centre of each pixel as it takes.
+fn render_paths(
+    request: &ReferenceRequest<'_>,
+    pixels: &Pixels,
+    on_progress: OnProgress,
+) -> Result<Reference> {
+    let begin = Instant::now();
+    let never = AtomicBool::new(false);
+    let found = sums_until(request, pixels, true, &PATHS, (&never, on_progress))?;
+    let (mean, seconds) = (found.mean(), begin.elapsed().as_secs_f64());
+    Ok(Reference {
+        own_error: mean.random_error,
+        rgba: mean.rgba,
+        accuracy: request.kind.accuracy_text(request.scene, found.n_samples),
+        seconds,
+        pixels_s: seconds,
+    })
 }
 
 /// Paths of a reference at its pixels: until the error of a pixel is a hundredth of the picture, or

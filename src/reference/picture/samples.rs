@@ -9,6 +9,7 @@ use glam::DVec2;
 
 use super::error_estimate::root_mean_square;
 use super::kind::ReferenceKind;
+use super::limits::check_memory;
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
 use super::renderer::with_renderer;
@@ -80,6 +81,49 @@ pub fn sums(
     stop: &AtomicBool,
     on_progress: OnProgress,
 ) -> Result<SampleSums> {
+    draw(request, pixels, (samples, shift), (stop, on_progress), |_| false)
+}
+
+/// The number of samples that a random picture takes.
+pub struct Enough<'a> {
+    /// Least number of samples: a spread takes two.
+    pub least: u32,
+    /// Greatest number of samples.
+    pub most: u32,
+    /// Returns whether a mean is accurate enough.
+    pub is_enough: &'a (dyn Fn(&MeanPicture) -> bool + Sync),
+}
+
+/// Draws samples at `pixels`, through their centres if `at_centers`, until a number that is a power
+/// of two is enough.
+///
+/// # Errors
+/// As for [`sums`], or the greatest number does not fit in memory.
+pub fn sums_until(
+    request: &ReferenceRequest<'_>,
+    pixels: &Pixels,
+    at_centers: bool,
+    enough: &Enough<'_>,
+    watched: (&AtomicBool, OnProgress),
+) -> Result<SampleSums> {
+    let Enough { least, most, is_enough } = *enough;
+    check_memory(pixels.at.len() as u64, most, request.scene.n_particles())?;
+    let place = if at_centers { |_| DVec2::ZERO } else { shift };
+    draw(request, pixels, (0..most, place), watched, |pairs| {
+        let is_last = |sums: &SampleSums| sums.n_samples >= least && is_enough(&sums.mean());
+        pairs.whole().is_some_and(is_last)
+    })
+}
+
+/// Draws `samples`, each through its `place` in every pixel, until `is_last` says that their sum is
+/// the last.
+fn draw(
+    request: &ReferenceRequest<'_>,
+    pixels: &Pixels,
+    (samples, place): (Range<u32>, fn(u32) -> DVec2),
+    (stop, on_progress): (&AtomicBool, OnProgress),
+    is_last: impl Fn(&PairwiseSum) -> bool,
+) -> Result<SampleSums> {
     let ReferenceRequest { kind, scene, time_s } = *request;
     kind.check(scene, time_s)?;
     let n = samples.len();
@@ -92,54 +136,12 @@ pub fn sums(
             if stop.load(Ordering::Relaxed) {
                 return Err(Error::Interrupted);
             }
-            pairs.push(SampleSums::of_one(&render(PixelSample { i, shift: shift(i) })));
+            pairs.push(SampleSums::of_one(&render(PixelSample { i, shift: place(i) })));
             if n > 1 {
                 on_progress(RenderStage::Sampling, n);
             }
-        }
-        pairs.finish().ok_or_else(|| Error::usage("no samples: expected at least one"))
-    })
-}
-
-/// How many random samples a picture takes.
-pub struct Enough<'a> {
-    /// The least number of samples, from 2 on, so that their spread is known.
-    pub least: u32,
-    /// The greatest number.
-    pub most: u32,
-    /// Whether a mean is good enough.
-    pub is_enough: &'a (dyn Fn(&MeanPicture) -> bool + Sync),
-}
-
-/// Draws samples at `pixels`, through their centres if `at_centers`, until a number that is a power
-/// of two is enough.
-///
-/// # Errors
-/// As for [`sums`].
-pub fn sums_until(
-    request: &ReferenceRequest<'_>,
-    pixels: &Pixels,
-    at_centers: bool,
-    enough: &Enough<'_>,
-    (stop, on_progress): (&AtomicBool, OnProgress),
-) -> Result<SampleSums> {
-    let ReferenceRequest { kind, scene, time_s } = *request;
-    kind.check(scene, time_s)?;
-    with_renderer(kind, (scene, time_s), pixels, &|_, _| (), |render| {
-        let mut pairs = PairwiseSum::default();
-        for i in 0..enough.most {
-            if stop.load(Ordering::Relaxed) {
-                return Err(Error::Interrupted);
-            }
-            let shift = if at_centers { DVec2::ZERO } else { shift(i) };
-            pairs.push(SampleSums::of_one(&render(PixelSample { i, shift })));
-            on_progress(RenderStage::Sampling, enough.most as usize);
-            let n = i + 1;
-            if n >= enough.least && n.is_power_of_two() {
-                let is_last = |sums: &SampleSums| (enough.is_enough)(&sums.mean());
-                if pairs.whole().is_some_and(is_last) {
-                    break;
-                }
+            if is_last(&pairs) {
+                break;
             }
         }
         pairs.finish().ok_or_else(|| Error::usage("no samples: expected at least one"))
@@ -225,7 +227,7 @@ impl PairwiseSum {
         self.open.push(next);
     }
 
-    /// Returns the sum of all ranges if it is one complete tree.
+    /// Returns the sum of all ranges if their number is a power of two: one complete tree.
     pub fn whole(&self) -> Option<&SampleSums> {
         if let [whole] = &self.open[..] { Some(whole) } else { None }
     }

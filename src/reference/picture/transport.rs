@@ -27,16 +27,16 @@ use crate::reference::{place, terrain};
 /// Pixels of one piece of work.
 const PIXELS_A_JOB: usize = 64;
 
-/// What a scene's light meets, relative to the lighting origin, and the view.
+/// The blobs, surfaces, ground, lights and view of a scene, relative to the lighting origin.
 #[derive(Debug, Clone)]
 pub struct TransportParts {
     /// The camera's view.
     pub view: View,
     /// Blobs.
     pub blobs: Vec<Blob>,
-    /// What scatters in each blob, by its index in `scatterers`.
+    /// Index of each blob's scattering in `scatterers`.
     pub i_scatterer: Vec<u32>,
-    /// What scatters.
+    /// The different scatterings.
     pub scatterers: Vec<Scatterer>,
     /// Rectangles: corner and sides, and the index of the material. The front faces u × v.
     pub rectangles: Vec<([DVec3; 3], u32)>,
@@ -95,7 +95,7 @@ impl TransportPicture {
         TransportPicture { of, view: parts.view }
     }
 
-    /// Follows one path through each pixel.
+    /// Traces one path through each pixel.
     pub fn draw(
         &self,
         pixels: &Pixels,
@@ -122,17 +122,18 @@ impl TransportPicture {
         light.radiance().extend(light.alpha).to_array()
     }
 
-    /// Follows the path of one sample through pixel [column, row]; `number` tells pixels apart.
+    /// Traces the path of one sample through pixel [column, row]; `number` tells pixels apart.
     pub fn path(&self, [i, j]: [u32; 2], number: u32, sample: PixelSample) -> PathLight {
         let view = View { shift: sample.shift, ..self.view };
         let ray = view.ray(i, j);
         let origin = view.pose.position + view.near * ray;
         let ray = Ray { origin, direction: ray.normalize() };
-        self.of.follow(ray, &mut Stream::new(number, sample.i))
+        self.of.trace(ray, &mut Stream::new(number, sample.i))
     }
 }
 
-/// Returns what scatters in each blob: its cloud's material, in its own colour.
+/// Returns the scattering of each blob, by its cloud's material and its own colour, as an index
+/// into the list of all.
 fn scatterers(scene: &Scene, frame: &FrameReference) -> (Vec<u32>, Vec<Scatterer>) {
     let forward = scene.lighting.forward;
     let (mut scatterers, mut numbers) = (Vec::new(), HashMap::new());

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::frame::FrameReference;
 use super::kind::ReferenceKind;
+use super::limits::check_sums;
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
 use super::samples::{PairwiseSum, SampleSums, shift};
@@ -39,6 +40,8 @@ pub fn transport_layers(
     on_progress: OnProgress,
 ) -> Result<TransportLayers> {
     ReferenceKind::Transport.check(scene, time_s)?;
+    let n_pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
+    check_sums(n_pixels, n_samples, scene.n_particles(), 8 * N_LAYER_VALUES as u64)?;
     let picture = TransportPicture::new(scene, &FrameReference::unlit(scene, time_s)?);
     let pixels = Pixels::all(scene.film.width, scene.film.height);
     let mut pairs = PairwiseSum::default();

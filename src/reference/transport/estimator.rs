@@ -19,19 +19,20 @@ pub trait Estimator {
         of(cosine)
     }
 
-    /// Returns the share that a way of drawing a direction has in the estimate, where it draws it
-    /// with the density `own` and the other way with `other`: the balance heuristic (Veach 1997).
-    fn share(own: f64, other: f64) -> f64 {
+    /// Returns the weight of a direction in multiple importance sampling, by the balance heuristic
+    /// (Veach 1997). `own` is the density by which it was sampled, and `other` that of the other
+    /// strategy.
+    fn mis_weight(own: f64, other: f64) -> f64 {
         own / (own + other)
     }
 
-    /// Returns the light of a direction drawn toward it: the radiance over the density.
+    /// Returns the light of a sampled direction: the radiance over the density.
     fn drawn(light: DVec3, density: f64) -> DVec3 {
         light / density
     }
 
-    /// Returns the factor of a path that goes on with that chance.
-    fn survivor(chance: f64) -> f64 {
+    /// Returns the factor of a path that Russian roulette lets go on with that chance.
+    fn roulette_weight(chance: f64) -> f64 {
         1.0 / chance
     }
 

@@ -1,4 +1,4 @@
-//! What shines: suns with an angular radius, the sky, and lamps (transport.md, "Light").
+//! Emitters: suns with an angular radius, the sky, and lamps (transport.md, "Light").
 
 use std::f64::consts::{PI, TAU};
 
@@ -28,9 +28,9 @@ pub struct Lights {
     lamps: Vec<Light>,
 }
 
-/// Light toward a point from a drawn direction.
+/// A sampled direction from a point to a light.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Received {
+pub struct LightSample {
     /// Unit vector toward the light.
     pub toward: DVec3,
     /// Distance up to which it can be hidden; infinite for suns and the sky.
@@ -38,8 +38,8 @@ pub struct Received {
     /// Radiance of suns, and of the sky. In place of a sun's, a lamp has its irradiance across
     /// `toward` over the chance of the lamp.
     pub light: [DVec3; 2],
-    /// Density per solid angle by which the direction was drawn; `None` for a lamp, which no
-    /// direction meets by chance.
+    /// Density per solid angle of the direction; `None` for a lamp, which no direction meets by
+    /// chance.
     pub density: Option<f64>,
 }
 
@@ -76,17 +76,17 @@ impl Lights {
         self.suns.is_empty() && self.lamps.is_empty() && self.sky == [DVec3::ZERO; 2]
     }
 
-    /// Returns the radiance that arrives along the unit vector `toward` from beyond everything: of
-    /// the suns, and of the sky.
-    pub fn beyond(&self, toward: DVec3) -> [DVec3; 2] {
+    /// Returns the radiance along the unit vector `toward` from outside of the scene: of the suns,
+    /// and of the sky.
+    pub fn environment(&self, toward: DVec3) -> [DVec3; 2] {
         let of_suns = self.suns.iter().filter(|sun| sun.shows(toward)).map(|sun| sun.radiance);
         [of_suns.sum(), self.sky[usize::from(toward.dot(UP) < 0.0)]]
     }
 
-    /// Returns the density per solid angle with which [`Lights::receive`] at `p` draws the
-    /// direction `toward`, by whichever light.
+    /// Returns the density per solid angle with which [`Lights::sample`] at `p` samples the
+    /// direction `toward`, by any light.
     pub fn density(&self, p: DVec3, toward: DVec3) -> f64 {
-        let all = self.all(p);
+        let all = self.all_strength(p);
         if all == 0.0 {
             return 0.0;
         }
@@ -95,24 +95,24 @@ impl Lights {
         of_sky + shown.map(|sun| sun.strength() / all / (TAU * sun.width)).sum::<f64>()
     }
 
-    /// Draws a direction from `p` to a light; lights are drawn by their unobstructed irradiance.
+    /// Samples a direction from `p` to a light. Lights are chosen by their unobstructed irradiance.
     /// `None` if nothing shines there.
-    pub fn receive(&self, p: DVec3, stream: &mut Stream) -> Option<Received> {
-        let all = self.all(p);
+    pub fn sample(&self, p: DVec3, stream: &mut Stream) -> Option<LightSample> {
+        let all = self.all_strength(p);
         if all == 0.0 {
             return None;
         }
         let mut left = stream.uniform() * all - self.sky_strength();
         if left < 0.0 {
-            let toward = self.draw_sky(stream);
-            return Some(self.toward_beyond(p, toward));
+            let toward = self.sample_sky(stream);
+            return Some(self.to_environment(p, toward));
         }
         for sun in &self.suns {
             left -= sun.strength();
             if left < 0.0 {
                 let cosine = 1.0 - sun.width * stream.uniform();
                 let toward = around(sun.toward, cosine, stream.uniform());
-                return Some(self.toward_beyond(p, toward));
+                return Some(self.to_environment(p, toward));
             }
         }
         for lamp in &self.lamps {
@@ -120,7 +120,7 @@ impl Lights {
             left -= strength;
             if left < 0.0 {
                 let arrival = lamp.arrival(p);
-                return Some(Received {
+                return Some(LightSample {
                     toward: arrival.toward,
                     distance: arrival.distance,
                     light: [lamp.energy() * (arrival.falloff * all / strength), DVec3::ZERO],
@@ -132,13 +132,13 @@ impl Lights {
         None
     }
 
-    fn toward_beyond(&self, p: DVec3, toward: DVec3) -> Received {
+    fn to_environment(&self, p: DVec3, toward: DVec3) -> LightSample {
         let density = Some(self.density(p, toward));
-        Received { toward, distance: f64::INFINITY, light: self.beyond(toward), density }
+        LightSample { toward, distance: f64::INFINITY, light: self.environment(toward), density }
     }
 
-    /// Returns the sum of the lights' strengths at `p`, by which they are drawn.
-    fn all(&self, p: DVec3) -> f64 {
+    /// Returns the sum of the lights' strengths at `p`, by which they are chosen.
+    fn all_strength(&self, p: DVec3) -> f64 {
         let suns: f64 = self.suns.iter().map(Sun::strength).sum();
         self.sky_strength() + suns + self.lamps.iter().map(|lamp| irradiance(lamp, p)).sum::<f64>()
     }
@@ -159,7 +159,7 @@ impl Lights {
         self.sky[1] == DVec3::ZERO
     }
 
-    fn draw_sky(&self, stream: &mut Stream) -> DVec3 {
+    fn sample_sky(&self, stream: &mut Stream) -> DVec3 {
         let u = stream.uniform();
         let cosine = if self.is_above_only() { u } else { 2.0 * u - 1.0 };
         around(UP, cosine, stream.uniform())

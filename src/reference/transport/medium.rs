@@ -1,4 +1,4 @@
-//! What a medium tells a path.
+//! The interface of a participating medium.
 
 use glam::DVec3;
 
@@ -6,7 +6,7 @@ use super::ray::Ray;
 use super::stream::Stream;
 use crate::model::phase::Phase;
 
-/// What scatters light at a collision.
+/// The scattering at a collision.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scatterer {
     /// Albedo ϖ of single scattering, linear RGB.
@@ -20,7 +20,7 @@ pub struct Scatterer {
 pub struct Collision {
     /// Distance along the ray.
     pub distance: f64,
-    /// What is met.
+    /// The scattering there.
     pub scatterer: Scatterer,
 }
 
@@ -29,7 +29,7 @@ pub trait Medium: Sync {
     /// Returns the optical depth along `ray` up to the distance `end`, which may be infinite.
     fn depth(&self, ray: &Ray, end: f64) -> f64;
 
-    /// Draws a free flight: the distance at which the optical depth reaches an exponential number
-    /// of mean 1, and what is met there. `None` if that is beyond `end`.
+    /// Samples a free flight: the collision where the optical depth reaches an exponential number
+    /// of mean 1. `None` if it lies beyond `end`.
     fn collide(&self, ray: &Ray, end: f64, stream: &mut Stream) -> Option<Collision>;
 }

@@ -1,9 +1,11 @@
 //! Radiative transfer in clouds of Gaussian blobs, with surfaces and ground, by random paths in f64
-//! (transport.md): what light in a cloud does, without the model's facets and reflections.
+//! (transport.md), without the model's facets and reflections.
 //!
-//! - [`BlobMedium`] has the blobs: optical depths in closed form, and free flights without a grid.
-//! - [`Solids`] has rectangles and ground, [`Lights`] what shines.
-//! - [`TransportScene`] puts them together and follows paths from the eye.
+//! - [`BlobMedium`] has the blobs: optical depths in closed form, free flights without a grid.
+//!
+//! - [`Solids`] has rectangles and ground, and [`Lights`] the emitters.
+//!
+//! - [`TransportScene`] puts them together and traces paths from the eye.
 //!
 //! A path's random numbers depend on its pixel and sample alone.
 

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::estimator::{Estimator, Unbiased};
-use super::lights::{Lights, Received};
+use super::lights::{LightSample, Lights};
 use super::medium::{Collision, Medium};
 use super::ray::{Ray, around};
 use super::solids::{SolidHit, Solids};
@@ -22,7 +22,7 @@ const GO_ON: f64 = 0.999;
 /// Number of scatterings of a long path.
 const LONG: u32 = 4096;
 
-/// What one path brings to the eye.
+/// The light that one path carries to the eye.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PathLight {
     /// Radiance by layer: scattered once by suns and lamps, once by the sky, twice, …
@@ -43,9 +43,9 @@ impl PathLight {
 pub struct TransportScene<M> {
     /// The medium.
     pub medium: M,
-    /// What is opaque.
+    /// Surfaces and ground.
     pub solids: Solids,
-    /// What shines.
+    /// Emitters.
     pub lights: Lights,
 }
 
@@ -56,17 +56,17 @@ enum Vertex {
 }
 
 impl<M: Medium> TransportScene<M> {
-    /// Follows one path along `ray`. What shines is not seen itself: where nothing scatters, the
-    /// path brings nothing.
-    pub fn follow(&self, ray: Ray, stream: &mut Stream) -> PathLight {
-        self.follow_by::<Unbiased>(ray, stream)
+    /// Traces one path along `ray`. Emitters are not seen themselves: a path that scatters nowhere
+    /// carries no light.
+    pub fn trace(&self, ray: Ray, stream: &mut Stream) -> PathLight {
+        self.trace_by::<Unbiased>(ray, stream)
     }
 
-    /// Follows one path by the laws of `E`.
-    pub fn follow_by<E: Estimator>(&self, ray: Ray, stream: &mut Stream) -> PathLight {
+    /// Traces one path by the laws of `E`.
+    pub fn trace_by<E: Estimator>(&self, ray: Ray, stream: &mut Stream) -> PathLight {
         let mut light = PathLight { layers: [DVec3::ZERO; N_LAYERS], alpha: 0.0 };
         let mut ray = ray;
-        let mut weight = DVec3::ONE;
+        let mut throughput = DVec3::ONE;
         // Density with which the ray's direction was drawn; there is none for the eye's ray.
         let mut drawn_by: Option<f64> = None;
         for n in 1.. {
@@ -80,56 +80,57 @@ impl<M: Medium> TransportScene<M> {
             let end = met.map_or(f64::INFINITY, |hit| hit.distance);
             let vertex = match (self.medium.collide(&ray, end, stream), met) {
                 (Some(collision), _) => {
-                    weight = E::scattered(weight, collision.scatterer.albedo);
+                    throughput = E::scattered(throughput, collision.scatterer.albedo);
                     Vertex::Cloud(collision)
                 }
                 (None, Some(hit)) if hit.is_front => Vertex::Solid(hit),
                 (None, Some(_)) => break,
                 (None, None) => {
                     if let Some(own) = drawn_by {
-                        // The other way to the same light.
-                        let share = E::share(own, self.lights.density(ray.origin, ray.direction));
-                        let beyond = self.lights.beyond(ray.direction);
-                        add(&mut light, n - 1, beyond.map(|l| weight * l * share));
+                        // The other strategy for the same light.
+                        let share =
+                            E::mis_weight(own, self.lights.density(ray.origin, ray.direction));
+                        let beyond = self.lights.environment(ray.direction);
+                        add(&mut light, n - 1, beyond.map(|l| throughput * l * share));
                     }
                     break;
                 }
             };
-            if !survives::<E>(&mut weight, n, stream) {
+            if !survives::<E>(&mut throughput, n, stream) {
                 break;
             }
             let (position, toward_eye) = (ray.at(vertex.distance()), -ray.direction);
-            if let Some(received) = self.lights.receive(position, stream) {
-                let seen = self.seen::<E>(&vertex, position, toward_eye, &received);
-                add(&mut light, n, seen.map(|l| weight * l));
+            if let Some(sample) = self.lights.sample(position, stream) {
+                let seen = self.seen::<E>(&vertex, position, toward_eye, &sample);
+                add(&mut light, n, seen.map(|l| throughput * l));
             }
-            let Some((direction, factor, density)) = vertex.scatter::<E>(toward_eye, stream) else {
+            let Some((direction, factor, density)) = vertex.sample::<E>(toward_eye, stream) else {
                 break;
             };
-            weight *= factor;
+            throughput *= factor;
             ray = Ray { origin: position, direction };
             drawn_by = Some(density);
         }
         light
     }
 
-    /// Returns the light that `received` sends to the eye by a scattering, of suns and of the sky.
+    /// Returns the light of `sample` that scatters to the eye: of suns, and of the sky.
     fn seen<E: Estimator>(
         &self,
         vertex: &Vertex,
         position: DVec3,
         toward_eye: DVec3,
-        received: &Received,
+        sample: &LightSample,
     ) -> [DVec3; 2] {
-        let Received { toward, distance, light, density } = *received;
-        let (factor, own) = vertex.reflect::<E>(toward_eye, toward);
+        let LightSample { toward, distance, light, density } = *sample;
+        let (factor, own) = vertex.evaluate::<E>(toward_eye, toward);
         let ray = Ray { origin: position, direction: toward };
         if factor == DVec3::ZERO || !E::arrives(self.solids.hides(&ray, distance)) {
             return [DVec3::ZERO; 2];
         }
         let through = E::transmittance(self.medium.depth(&ray, distance));
         let of = |light: DVec3| match density {
-            Some(density) => E::drawn(light, density) * E::share(density, own),
+            Some(density) => E::drawn(light, density) * E::mis_weight(density, own),
             None => light,
         };
         light.map(|l| factor * of(l) * through)
@@ -143,9 +144,9 @@ fn add(light: &mut PathLight, n: u32, [of_suns, of_sky]: [DVec3; 2]) {
     light.layers[i + 1] += of_sky;
 }
 
-/// Lets paths of little weight end by chance, and gives the others the weight of those.
-fn survives<E: Estimator>(weight: &mut DVec3, n: u32, stream: &mut Stream) -> bool {
-    let most = weight.max_element();
+/// Lets paths of little throughput end by chance, and gives the others the throughput of those.
+fn survives<E: Estimator>(throughput: &mut DVec3, n: u32, stream: &mut Stream) -> bool {
+    let most = throughput.max_element();
     if n < ROULETTE_FROM {
         return most > 0.0;
     }
@@ -156,7 +157,7 @@ fn survives<E: Estimator>(weight: &mut DVec3, n: u32, stream: &mut Stream) -> bo
     if stream.uniform() >= chance {
         return false;
     }
-    *weight *= E::survivor(chance);
+    *throughput *= E::roulette_weight(chance);
     true
 }
 
@@ -168,9 +169,9 @@ impl Vertex {
         }
     }
 
-    /// Returns f cos θ of light from the unit vector `from` toward the eye, and the density with
-    /// which [`Vertex::scatter`] draws `from`.
-    fn reflect<E: Estimator>(&self, toward_eye: DVec3, from: DVec3) -> (DVec3, f64) {
+    /// Returns f cos θ of light from the unit vector `from` toward the eye, and the density by
+    /// which [`Vertex::sample`] samples `from`.
+    fn evaluate<E: Estimator>(&self, toward_eye: DVec3, from: DVec3) -> (DVec3, f64) {
         match self {
             Vertex::Cloud(Collision { scatterer, .. }) => {
                 let p = E::phase(|cosine| scatterer.phase.at(cosine), -from.dot(toward_eye));
@@ -187,23 +188,23 @@ impl Vertex {
         }
     }
 
-    /// Draws the direction that light came from; returns it with f cos θ over its density, and the
-    /// density.
-    fn scatter<E: Estimator>(
+    /// Samples the direction that light comes from. Returns it with f cos θ over its density, and
+    /// with the density.
+    fn sample<E: Estimator>(
         &self,
         toward_eye: DVec3,
         stream: &mut Stream,
     ) -> Option<(DVec3, DVec3, f64)> {
         match self {
             Vertex::Cloud(Collision { scatterer, .. }) => {
-                let cosine = scatterer.phase.draw(|| stream.uniform());
+                let cosine = scatterer.phase.sample(|| stream.uniform());
                 let direction = around(-toward_eye, cosine, stream.uniform());
                 Some((direction, DVec3::ONE, scatterer.phase.at(cosine)))
             }
             Vertex::Solid(hit) => {
                 let u = [stream.uniform(), stream.uniform(), stream.uniform(), 0.0];
                 let direction = brdf::direction(&hit.brdf, hit.normal, toward_eye, u);
-                let (factor, density) = self.reflect::<E>(toward_eye, direction);
+                let (factor, density) = self.evaluate::<E>(toward_eye, direction);
                 (density > 0.0).then(|| (direction, factor / density, density))
             }
         }

@@ -1,4 +1,4 @@
-//! What is opaque: rectangles and ground.
+//! Opaque rectangles and ground.
 
 use glam::DVec3;
 

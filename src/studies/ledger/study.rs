@@ -201,7 +201,7 @@ impl LedgerStudy<'_> {
         let request = ReferenceRequest { kind, scene, time_s: self.frames.time_s };
         let mean = match sums_until(&request, self.pixels, true, &enough, (self.stop, listener)) {
             Ok(sums) => sums.mean(),
-            // What is finished counts.
+            // The rows that are finished count.
             Err(Error::Interrupted) => return Ok(()),
             Err(error) => return Err(error),
         };

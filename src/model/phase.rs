@@ -136,8 +136,8 @@ fn sample_henyey_greenstein(g: f64, u: f64) -> f64 {
 }
 
 /// Returns the single-scattering albedo ϖ of a half space that reflects the share `reflected` of
-/// diffuse light, each channel by itself. `g` is the mean cosine of its phase function. A share of 1
-/// and above has the albedo 1, and 0 has 0.
+/// diffuse light, each channel by itself. `g` is the mean cosine of its phase function. A share of
+/// 1 and above has the albedo 1, and 0 has 0.
 ///
 /// *Source*: the inverse of van de Hulst's R = (1 − s)(1 − 0.139 s)/(1 + 1.17 s) with
 /// s² = (1 − ϖ)/(1 − gϖ) (1980).

@@ -39,7 +39,7 @@ fn in_parts(subject: &ReferenceRequest<'_>, n: u32, [columns, rows]: [u32; 2]) -
             (0..n)
                 .step_by(2)
                 .for_each(|first| pairs.push(of(subject, &pixels, first..n.min(first + 2))));
-            let found = pairs.finish().expect("a range");
+            let found = pairs.total().expect("a range");
             for (at, value) in pixels.at.iter().zip(found.values.chunks_exact(N_VALUES)) {
                 values[N_VALUES * whole.index(*at)..][..N_VALUES].copy_from_slice(value);
             }

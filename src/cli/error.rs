@@ -21,7 +21,7 @@ use crate::io::result_folder::Existing;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;
 use crate::model::scene::Scene;
-use crate::reference::picture::Pixels;
+use crate::reference::picture::{PathLimits, Pixels, ReferenceRequest};
 use crate::report::charts::{self, Chart};
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::design::{best_within, settings};
@@ -30,7 +30,7 @@ use crate::studies::error::files::{self, REFERENCE_FILE};
 use crate::studies::error::records::{Budget, Configuration, Study};
 use crate::studies::error::study::{ErrorStudy, Event, StudyPlan, StudyResults};
 use crate::studies::provenance::{Provenance, ReferenceRecord};
-use crate::studies::reference_cache::{self, CachedReference};
+use crate::studies::reference_cache::{self, CachedReference, Making};
 use crate::timing::json::ResultFile;
 use crate::timing::limits::check_study;
 use crate::timing::names::Setting;
@@ -193,8 +193,10 @@ fn reference(
 ) -> Result<CachedReference> {
     let shown = ReferenceProgress::new(args.options.quiet);
     let folder = reference_cache::default_folder();
-    let listener = &|work, n| shown.advance(work, n);
-    reference_cache::reference(args.against, scene, time_s, pixels, folder.as_deref(), listener)
+    let limits = PathLimits { error: args.reference_error, most: args.paths };
+    let how = Making { folder: folder.as_deref(), limits, stop: graceful_stop() };
+    let request = ReferenceRequest { kind: args.against, scene, time_s };
+    reference_cache::reference(&request, pixels, &how, &|work, n| shown.advance(work, n))
         .map_err(|error| with_texture_hint(error, ", or --against thin or slices"))
 }
 

@@ -42,8 +42,8 @@ struct Kept {
     save: Save,
 }
 
-/// The phrase of a command that keeps finished frames or other steps.
-const KEEPS: &str = "finishes this frame and keeps what is done";
+/// The phrase of a command that keeps finished steps, such as frames.
+const KEEPS: &str = "finishes the present step and keeps what is done";
 
 /// A line about what is kept when Ctrl-C ends the command before it keeps anything.
 static NOTE: Mutex<Option<&'static str>> = Mutex::new(None);

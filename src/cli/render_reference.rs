@@ -1,10 +1,12 @@
 //! `nimbus render SCENE --reference WHICH -o FILE`: the frame in f64, without a device.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
 
 use super::args::RenderArgs;
+use super::interrupt::{self, PATIENCE, graceful_stop};
 use super::progress::ReferenceProgress;
 use super::scene::print_sizes;
 use super::{output, render_layers};
@@ -14,9 +16,11 @@ use crate::io::image::{self, image_hash};
 use crate::io::layers::{self, CHANNELS};
 use crate::model::scene::{Draw, Scene};
 use crate::reference::picture::{
-    self, BlobModel, DrawnPicture, Enough, MAX_SAMPLES, MeanPicture, Pixels, ReferenceKind,
-    ReferenceRequest, check_memory, drawn_as_set, layers_as_set, transport_layers,
+    self, BlobModel, DrawnPicture, Enough, Grown, MAX_SAMPLES, MeanPicture, Pixels, ReferenceKind,
+    ReferenceRequest, SampleSums, check_memory, drawn_as_set, layers_as_set, transport_layers,
 };
+use crate::studies::kept_paths::{KeptPaths, PathSums};
+use crate::studies::reference_cache;
 
 /// A picture in f64 and the JSON keys that only its kind has.
 struct Computed {
@@ -91,9 +95,12 @@ fn with_transport_layers(
     scene: &Scene,
     time_s: f64,
 ) -> Result<()> {
-    let shown = ReferenceProgress::new(args.options.quiet);
-    let drawn = transport_layers(scene, time_s, n_samples, &|work, n| shown.advance(work, n))?;
-    drop(shown);
+    let pixels = Pixels::all(scene.film.width, scene.film.height);
+    let subject = ReferenceRequest { kind: ReferenceKind::Transport, scene, time_s };
+    let of = (&pixels, PathSums::Layers);
+    let (drawn, n_kept) = kept_paths(args, &subject, of, Some(n_samples), |grown| {
+        transport_layers(scene, time_s, n_samples, grown)
+    })?;
     let channels = render_layers::of_transport(&drawn);
     let n_bad = channels.iter().flatten().filter(|v| !v.is_finite()).count();
     warn_of_bad(args, n_bad, channels.iter().map(Vec::len).sum());
@@ -101,7 +108,7 @@ fn with_transport_layers(
     let size = [scene.film.width, scene.film.height];
     layers::write_channels(&args.output, size, names.into_iter().zip(channels))?;
     let hash = image_hash(&picture::to_f32(&drawn.rgba));
-    let keys = json!({ "channels": names, "samples": n_samples });
+    let keys = json!({ "channels": names, "samples": n_samples, "samples_kept": n_kept });
     tell(args, (ReferenceKind::Transport, scene, time_s), (hash, n_bad), keys)
 }
 
@@ -176,23 +183,16 @@ fn sampled(
 ) -> Result<Computed> {
     let (film, never) = (scene.film, AtomicBool::new(false));
     let pixels = Pixels::all(film.width, film.height);
-    let n_pixels = pixels.at.len() as u64;
-    let shown = ReferenceProgress::new(args.options.quiet);
     let subject = ReferenceRequest { kind, scene, time_s };
-    let listener = &|work, n| shown.advance(work, n);
-    let sums = match args.error {
-        Some(error) => {
-            let is_enough = &|mean: &MeanPicture| mean.relative_error <= error;
-            // More samples take more memory.
-            let fits = |n: &u32| check_memory(n_pixels, *n, scene.n_particles()).is_ok();
-            let most = (1..=MAX_SAMPLES.ilog2()).rev().map(|k| 1 << k).find(fits).unwrap_or(2);
-            let enough = Enough { least: 2, most, is_enough };
-            picture::sums_until(&subject, &pixels, false, &enough, (&never, listener))?
-        }
-        None => picture::sums(&subject, &pixels, 0..n_samples, &never, listener)?,
+    let (sums, n_kept) = if kind.is_random() {
+        let (sums, n_kept) = paths(args, n_samples, &subject, &pixels)?;
+        (sums, Some(n_kept))
+    } else {
+        let shown = ReferenceProgress::new(args.options.quiet);
+        let listener = &|work, n| shown.advance(work, n);
+        (picture::sums(&subject, &pixels, 0..n_samples, &never, listener)?, None)
     };
     let (n_samples, mean) = (sums.n_samples, sums.mean());
-    drop(shown);
     let accuracy = kind.accuracy_text(scene, n_samples);
     if args.options.verbose {
         say!(
@@ -202,8 +202,77 @@ fn sampled(
         say!("the mean of all pixels is known to {:.1e} of it", mean.relative_error);
     }
     let keys = json!({
-        "samples": n_samples, "own_error": mean.own_error, "accuracy": accuracy,
-        "relative_error": mean.relative_error,
+        "samples": n_samples, "samples_kept": n_kept, "own_error": mean.own_error,
+        "accuracy": accuracy, "relative_error": mean.relative_error,
     });
     Ok(Computed { rgba: mean.rgba, keys })
+}
+
+/// Traces random paths, as many as asked for. Returns their sums, and how many paths of a pixel an
+/// earlier run had kept.
+fn paths(
+    args: &RenderArgs,
+    n_samples: u32,
+    subject: &ReferenceRequest<'_>,
+    pixels: &Pixels,
+) -> Result<(SampleSums, u32)> {
+    let Some(error) = args.error else {
+        let enough = Enough { least: n_samples, most: n_samples, is_enough: &|_| false };
+        return kept_paths(args, subject, (pixels, PathSums::Spread), Some(n_samples), |grown| {
+            picture::sums_until(subject, pixels, false, &enough, grown)
+        });
+    };
+    let is_enough = &|mean: &MeanPicture| mean.relative_error <= error;
+    let n_pixels = pixels.at.len() as u64;
+    // More samples take more memory.
+    let fits = |n: &u32| check_memory(n_pixels, *n, subject.scene.n_particles()).is_ok();
+    let most = (1..=MAX_SAMPLES.ilog2()).rev().map(|k| 1 << k).find(fits).unwrap_or(2);
+    let enough = Enough { least: 2, most, is_enough };
+    kept_paths(args, subject, (pixels, PathSums::Spread), None, |grown| {
+        picture::sums_until(subject, pixels, false, &enough, grown)
+    })
+}
+
+/// Adds random paths to those that an earlier run has kept, unless there are more than `at_most`,
+/// and keeps them, after Ctrl-C too. Returns what `add` returns, and how many paths of a pixel were
+/// kept before.
+fn kept_paths<T>(
+    args: &RenderArgs,
+    subject: &ReferenceRequest<'_>,
+    (pixels, of): (&Pixels, PathSums),
+    at_most: Option<u32>,
+    add: impl FnOnce(&Grown<'_>) -> Result<T>,
+) -> Result<(T, u32)> {
+    let folder = reference_cache::default_folder();
+    let kept = Arc::new(KeptPaths::open(folder.as_deref(), subject, pixels, of, at_most));
+    let n_before = kept.n_before();
+    if n_before > 0 && args.options.verbose {
+        say!("goes on from {n_before} paths a pixel that an earlier run kept");
+    }
+    let stop = graceful_stop();
+    let mut keeping = {
+        let kept = kept.clone();
+        interrupt::keep(PATIENCE, move || cut_short(&kept))
+    };
+    let shown = ReferenceProgress::new(args.options.quiet);
+    let added = kept.grow(stop, &|work, n| shown.advance(work, n), add);
+    keeping.finish();
+    drop(shown);
+    match added {
+        Err(Error::Interrupted) => Err(cut_short(&kept)),
+        added => {
+            kept.keep();
+            Ok((added?, n_before))
+        }
+    }
+}
+
+/// Keeps the paths that are traced, and says how many. Returns the error that the program ends
+/// with.
+fn cut_short(kept: &KeptPaths) -> Error {
+    match kept.keep() {
+        Some(n) => say!("{n} paths a pixel are kept; the same command goes on from them"),
+        None => say!("no path is kept"),
+    }
+    Error::Interrupted
 }

@@ -2,12 +2,14 @@
 //!
 //! An [`error`] study draws and times every setting of a scene's knobs. A [`ledger`] lists the
 //! error of every approximation, each against the next better picture. Both measure pictures by
-//! [`picture_error`] against references in f64, which [`reference_cache`] keeps between runs, and
-//! begin their records with [`provenance`]. A [`check`] compares the pictures that a bench timed.
+//! [`picture_error`] against references in f64, which [`reference_cache`] keeps between runs by
+//! [`reference_hash`] and refines by [`kept_paths`], and begin their records with [`provenance`]. A [`check`] compares the pictures that a bench timed.
 
 pub mod check;
 pub mod error;
+pub mod kept_paths;
 pub mod ledger;
 pub mod picture_error;
 pub mod provenance;
 pub mod reference_cache;
+pub mod reference_hash;

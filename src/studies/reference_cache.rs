@@ -1,22 +1,22 @@
-//! A cache of references on disk. The key is the hash of everything that a reference depends on:
-//! the code, the relevant keys of the scene, the time, the pixels and the kind of reference.
+//! A cache of references on disk, by the hash of everything that they depend on. Those of random
+//! paths are refined, others are read back.
 
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
+use super::kept_paths::{KeptPaths, PathSums};
+use super::reference_hash::{digest, hash_of};
 use crate::error::Result;
 use crate::gpu::cache_folder;
 use crate::io::atomic::write_atomic;
 use crate::io::input_file;
-use crate::model::basis::Sampling;
-use crate::model::film::{Film, FilmFormat, ToneMap};
-use crate::model::scene::{Gather, Lighting, Pairs, Scene, Simulate, Threading, Threads};
-use crate::model::sums::Sums;
-use crate::reference::picture::{OnProgress, Pixels, Reference, ReferenceKind};
+use crate::reference::picture::{
+    Grown, OnProgress, PathLimits, Pixels, Reference, ReferenceRequest, render_paths,
+};
 
 /// Largest file of the cache: 32 bytes for each pixel of the largest picture of a study.
 const LARGEST_FILE: u64 = 512 << 20;
@@ -50,27 +50,41 @@ pub fn default_folder() -> Option<PathBuf> {
     cache_folder("references")
 }
 
-/// Returns the reference from the cache in `folder`, or computes it and stores it there.
+/// How a reference is made.
+#[derive(Debug, Clone, Copy)]
+pub struct Making<'a> {
+    /// Folder of references that are kept.
+    pub folder: Option<&'a Path>,
+    /// Random paths of a reference that has them.
+    pub limits: PathLimits,
+    /// Ends random paths early once it is set; they are kept.
+    pub stop: &'a AtomicBool,
+}
+
+/// Returns the reference from the cache, or computes it and stores it there. One of random paths
+/// goes on from the paths that the cache has.
 ///
 /// # Errors
-/// Fails if the scene has no such reference, or computing it fails. A cache that cannot be written
-/// is not an error.
+/// Fails if the scene has no such reference, or computing it fails or was stopped. A cache that
+/// cannot be written is not an error.
 pub fn reference(
-    against: ReferenceKind,
-    scene: &Scene,
-    time_s: f64,
+    request: &ReferenceRequest<'_>,
     pixels: &Pixels,
-    folder: Option<&Path>,
+    how: &Making<'_>,
     listener: OnProgress,
 ) -> Result<CachedReference> {
-    against.check(scene, time_s)?;
-    let hash = hash_of(against, scene, time_s, pixels);
-    let path = folder.map(|folder| folder.join(format!("{hash}.f64")));
+    let ReferenceRequest { kind, scene, time_s } = *request;
+    kind.check(scene, time_s)?;
+    if kind.is_random() {
+        return refined(request, pixels, how, listener);
+    }
+    let hash = hash_of(kind, scene, time_s, pixels);
+    let path = how.folder.map(|folder| folder.join(format!("{hash}.f64")));
     // A damaged file is computed again.
     if let Some(reference) = path.as_ref().and_then(|path| read(path, &hash, pixels.at.len())) {
         return Ok(CachedReference { reference, hash, from_cache: true });
     }
-    let reference = against.render(scene, time_s, pixels, listener)?;
+    let reference = kind.render(scene, time_s, pixels, listener)?;
     if let Some(path) = path {
         // A cache that cannot be written only costs time.
         let _ = path.parent().map(fs::create_dir_all);
@@ -79,69 +93,21 @@ pub fn reference(
     Ok(CachedReference { reference, hash, from_cache: false })
 }
 
-/// Returns whether two scenes have the same reference at every time.
-pub fn is_same(against: ReferenceKind, a: &Scene, b: &Scene) -> bool {
-    relevant(a, against) == relevant(b, against)
-}
-
-/// Returns the hash of everything that a reference depends on.
-pub(super) fn hash_of(
-    against: ReferenceKind,
-    scene: &Scene,
-    time_s: f64,
+/// Adds random paths to those in the cache until the reference is within its limits.
+fn refined(
+    request: &ReferenceRequest<'_>,
     pixels: &Pixels,
-) -> String {
-    let mut hasher = Sha256::new();
-    let pixels = (pixels.width, pixels.height, pixels.tile, pixels.cell);
-    hasher.update(format!(
-        "{}\n{against}\n{:x}\n{pixels:?}\n",
-        env!("NIMBUS_REFERENCE_CODE"),
-        time_s.to_bits()
-    ));
-    // Debug prints the shortest digits that read back as the same numbers, so that two different
-    // scenes have different texts.
-    hasher.update(format!("{:?}", relevant(scene, against)));
-    format!("{:x}", hasher.finalize())
-}
-
-/// Returns `scene` with every setting that this kind of reference ignores at a fixed value.
-fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
-    let scene = against.without_approximations(scene);
-    let Lighting { mode, grid, step, forward, facets_per_cloud, sun_radius, .. } = scene.lighting;
-    let by_model = matches!(
-        against,
-        ReferenceKind::Model | ReferenceKind::Reflections(_) | ReferenceKind::Transport
-    );
-    let (grid, step, facets_per_cloud) =
-        if by_model { (1, 1.0, None) } else { (grid, step, facets_per_cloud) };
-    let lighting = Lighting {
-        mode,
-        grid,
-        step,
-        forward,
-        facets_per_cloud,
-        bases: 1,
-        sampling: Sampling::Log,
-        exponents: [1.0, 1.0],
-        gather: Gather::Exact,
-        theta: 0.0,
-        pairs: Pairs { size: 1.0, levels: 0, steps: 1 },
-        sums: Sums::default(),
-        sun_radius,
-    };
-    let film = Film {
-        format: FilmFormat::Rgba32f,
-        background: glam::DVec3::ZERO,
-        exposure: 1.0,
-        tone_map: ToneMap::Clip,
-        ..scene.film
-    };
-    let threads = Threads { mode: Threading::Serial, simulate: Simulate::Gpu };
-    let mut relevant = Scene { title: String::new(), film, lighting, threads, ..scene.clone() };
-    if by_model {
-        relevant.surfaces.iter_mut().for_each(|s| s.subdivide = [1, 1]);
-    }
-    relevant
+    how: &Making<'_>,
+    listener: OnProgress,
+) -> Result<CachedReference> {
+    let kept = KeptPaths::open(how.folder, request, pixels, PathSums::Centers, None);
+    let add = |grown: &Grown<'_>| render_paths(request, pixels, &how.limits, grown);
+    let reference = kept.grow(how.stop, listener, add);
+    kept.keep();
+    let from_cache = kept.n_samples() == kept.n_before();
+    let (hash, seconds) = (kept.hash().to_owned(), kept.seconds());
+    let reference = Reference { seconds, pixels_s: seconds, ..reference? };
+    Ok(CachedReference { reference, hash, from_cache })
 }
 
 fn read(path: &Path, hash: &str, n_pixels: usize) -> Option<Reference> {
@@ -181,11 +147,6 @@ fn write(path: &Path, hash: &str, reference: &Reference) -> Result<()> {
         file.write_all(b"\n")?;
         file.write_all(&numbers)
     })
-}
-
-/// Returns the SHA-256 of `bytes` in hex.
-pub(super) fn digest(bytes: &[u8]) -> String {
-    format!("{:x}", Sha256::digest(bytes))
 }
 
 #[cfg(test)]

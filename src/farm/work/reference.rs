@@ -121,7 +121,7 @@ impl ReferenceWork {
             if samples.end < self.n_samples {
                 continue;
             }
-            let Some(of_tile) = std::mem::take(&mut pairs).finish() else { continue };
+            let Some(of_tile) = std::mem::take(&mut pairs).total() else { continue };
             let found = of_tile.values.chunks_exact(N_VALUES);
             for (at, found) in pixels.at.iter().zip(found) {
                 let first = N_VALUES * whole.index(*at);

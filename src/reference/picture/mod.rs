@@ -21,6 +21,7 @@ mod pixels;
 mod progress;
 mod render;
 mod renderer;
+mod sample_sums;
 mod samples;
 mod scene_light;
 mod shares;
@@ -38,13 +39,11 @@ pub use limits::check_memory;
 pub use model_picture::ModelDrawing;
 pub use pixels::{Pixels, Tile};
 pub use progress::{OnProgress, RenderStage};
-pub use render::{DrawnPicture, Reference, drawn_as_set};
+pub use render::{DrawnPicture, PathLimits, Reference, drawn_as_set, render_paths};
 pub use renderer::render_model;
-pub use samples::{
-    Enough, MAX_SAMPLES, MeanPicture, N_VALUES, PairwiseSum, ReferenceRequest, SampleSums, sums,
-    sums_until, to_f32,
-};
+pub use sample_sums::{MeanPicture, N_VALUES, PairwiseSum, SampleSums};
+pub use samples::{Enough, Grown, MAX_SAMPLES, ReferenceRequest, sums, sums_until, to_f32};
 pub use scene_light::{BlobModel, PixelSample, RenderedPixels, render_lit_scene};
 pub use shares::{Emitters, PixelShares, drawn_by_settings, pixel_shares};
 pub use transport::TransportParts;
-pub use transport_layers::{TransportLayers, transport_layers};
+pub use transport_layers::{N_LAYER_VALUES, TransportLayers, transport_layers};

@@ -11,7 +11,8 @@ use super::kind::ReferenceKind;
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
 use super::renderer::{check_scene, with_renderer};
-use super::samples::{Enough, ReferenceRequest, sums_until};
+use super::sample_sums::MeanPicture;
+use super::samples::{Enough, Grown, ReferenceRequest, sums_until};
 use super::scene_light::{BlobModel, PixelSample, brightest, render_lit_scene};
 use super::sprites::{drawn_blobs, with_textures};
 use crate::error::Result;
@@ -50,7 +51,9 @@ impl ReferenceKind {
         let begin = Instant::now();
         if self.is_random() {
             let request = ReferenceRequest { kind: self, scene, time_s };
-            return render_paths(&request, pixels, on_progress);
+            let never = AtomicBool::new(false);
+            let grown = Grown::from_nothing(&never, on_progress);
+            return render_paths(&request, pixels, &PathLimits::USUAL, &grown);
         }
         self.check(scene, time_s)?;
         let scene = &self.without_approximations(scene);
@@ -74,15 +77,40 @@ impl ReferenceKind {
     }
 }
 
-/// Draws a scene by as many random paths through the centre of each pixel as it takes.
-fn render_paths(
+/// How many random paths a reference takes at its pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathLimits {
+    /// Paths end where the error of a pixel is this share of the picture's root mean square.
+    pub error: f64,
+    /// Greatest number of paths of a pixel.
+    pub most: u32,
+}
+
+impl PathLimits {
+    /// A hundredth of the picture, or as many paths as take some minutes at two thousand pixels.
+    pub const USUAL: PathLimits = PathLimits { error: 0.01, most: 4096 };
+}
+
+/// Draws a scene by as many random paths through the centre of each pixel as it takes. They add to
+/// those in `grown`.
+///
+/// # Errors
+/// As [`super::sums`].
+pub fn render_paths(
     request: &ReferenceRequest<'_>,
     pixels: &Pixels,
-    on_progress: OnProgress,
+    limits: &PathLimits,
+    grown: &Grown<'_>,
 ) -> Result<Reference> {
+    /// Fewer paths do not tell their own error.
+    const LEAST: u32 = 64;
     let begin = Instant::now();
-    let never = AtomicBool::new(false);
-    let found = sums_until(request, pixels, true, &PATHS, (&never, on_progress))?;
+    let is_enough = &|mean: &MeanPicture| {
+        let magnitude = root_mean_square(mean.rgba.iter().flatten().copied());
+        mean.random_error <= limits.error * magnitude
+    };
+    let enough = Enough { least: LEAST.min(limits.most), most: limits.most, is_enough };
+    let found = sums_until(request, pixels, true, &enough, grown)?;
     let (mean, seconds) = (found.mean(), begin.elapsed().as_secs_f64());
     Ok(Reference {
         own_error: mean.random_error,
@@ -92,16 +120,6 @@ fn render_paths(
         pixels_s: seconds,
     })
 }
-
-/// Paths of a reference at its pixels: until the error of a pixel is a hundredth of the picture, or
-/// as many as take some minutes at two thousand pixels.
-const PATHS: Enough<'static> = Enough {
-    least: 64,
-    most: 4096,
-    is_enough: &|mean| {
-        mean.random_error <= 0.01 * root_mean_square(mean.rgba.iter().flatten().copied())
-    },
-};
 
 /// A whole picture drawn in f64 with the scene's own drawing settings.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,34 +4,22 @@
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::DVec2;
 
-use super::error_estimate::root_mean_square;
 use super::kind::ReferenceKind;
 use super::limits::check_memory;
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
 use super::renderer::with_renderer;
-use super::scene_light::{PixelSample, RenderedPixels};
+use super::sample_sums::{MeanPicture, PairwiseSum, SampleSums};
+use super::scene_light::PixelSample;
 use crate::error::{Error, Result};
 use crate::model::scene::Scene;
 
 /// Greatest number of samples: the low digits of their numbers still tell places in a pixel apart.
 pub const MAX_SAMPLES: u32 = 1 << 20;
-
-/// Number of values of a pixel in [`SampleSums`]: premultiplied linear R, G, B, A; the sum of their
-/// squares; the quadrature error; the squared standard error of the random paths.
-pub const N_VALUES: usize = 7;
-
-/// Sums over samples. *Shape*: [pixel][[`N_VALUES`]].
-#[derive(Debug, Clone, PartialEq)]
-pub struct SampleSums {
-    /// Number of samples summed.
-    pub n_samples: u32,
-    /// The sums.
-    pub values: Vec<f64>,
-}
 
 /// Which picture is drawn.
 #[derive(Debug, Clone, Copy)]
@@ -42,22 +30,6 @@ pub struct ReferenceRequest<'a> {
     pub scene: &'a Scene,
     /// Time of the frame.
     pub time_s: f64,
-}
-
-/// A mean over samples.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MeanPicture {
-    /// Premultiplied linear RGBA, in the order of the pixels.
-    pub rgba: Vec<[f64; 4]>,
-    /// Root mean square of the pixels' error estimates: quadrature, and one standard error of the
-    /// mean.
-    pub own_error: f64,
-    /// Root mean square of the standard errors of all channels of all pixels, were the samples
-    /// random: what they add to a picture's RMSE.
-    pub random_error: f64,
-    /// Standard error of the mean over all pixels, were the samples random, as a share of it; 0 of
-    /// a black picture.
-    pub relative_error: f64,
 }
 
 /// Returns where in a pixel sample `i` lies, off its centre, in pixels. The first sample is the
@@ -81,7 +53,7 @@ pub fn sums(
     stop: &AtomicBool,
     on_progress: OnProgress,
 ) -> Result<SampleSums> {
-    draw(request, pixels, (samples, shift), (stop, on_progress), |_| false)
+    draw(request, pixels, (samples, shift), &Grown::from_nothing(stop, on_progress), |_| false)
 }
 
 /// The number of samples that a random picture takes.
@@ -94,8 +66,65 @@ pub struct Enough<'a> {
     pub is_enough: &'a (dyn Fn(&MeanPicture) -> bool + Sync),
 }
 
-/// Draws samples at `pixels`, through their centres if `at_centers`, until a number that is a power
-/// of two is enough.
+/// A sum that samples are added to, one by one from the number that it has, and who watches.
+pub struct Grown<'a> {
+    /// The sum of the first samples. Other threads may look at it.
+    pub sum: Arc<Mutex<PairwiseSum>>,
+    /// Called with the sum after each sample.
+    pub on_sample: &'a (dyn Fn(&PairwiseSum) + Sync),
+    /// Ends the samples early once it is set.
+    pub stop: &'a AtomicBool,
+    /// Called for each finished step.
+    pub on_progress: OnProgress<'a>,
+}
+
+impl<'a> Grown<'a> {
+    /// Begins without samples.
+    pub fn from_nothing(stop: &'a AtomicBool, on_progress: OnProgress<'a>) -> Grown<'a> {
+        Grown { sum: Arc::default(), on_sample: &|_| (), stop, on_progress }
+    }
+
+    /// Adds samples until there are `samples.len()`, or `is_last` says that their sum is the last.
+    /// `draw` draws the sample of a number.
+    pub(super) fn grow(
+        &self,
+        samples: Range<u32>,
+        is_last: impl Fn(&PairwiseSum) -> bool,
+        mut draw: impl FnMut(u32) -> SampleSums,
+    ) -> Result<SampleSums> {
+        let (n, n_before) = (samples.len(), lock(&self.sum).n_samples());
+        let mut is_enough = n_before > 0 && is_last(&lock(&self.sum));
+        for i in samples.skip(n_before as usize) {
+            if is_enough {
+                break;
+            }
+            // A sample that is finished counts, so the check comes before.
+            if self.stop.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
+            let drawn = draw(i);
+            let mut sum = lock(&self.sum);
+            sum.push(drawn);
+            (self.on_sample)(&sum);
+            is_enough = is_last(&sum);
+            drop(sum);
+            // A single sample reports progress by its parts, several samples report whole samples.
+            if n > 1 {
+                (self.on_progress)(RenderStage::Sampling, n - n_before as usize);
+            }
+        }
+        let sum = lock(&self.sum).total();
+        sum.ok_or_else(|| Error::usage("no samples: expected at least one"))
+    }
+}
+
+/// Locks a sum. A panic elsewhere leaves whole samples in it.
+fn lock(sum: &Mutex<PairwiseSum>) -> MutexGuard<'_, PairwiseSum> {
+    sum.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Adds samples at `pixels` to `grown`, through their centres if `at_centers`, until a number that
+/// is a power of two is enough.
 ///
 /// # Errors
 /// As for [`sums`], or the greatest number does not fit in memory.
@@ -104,12 +133,12 @@ pub fn sums_until(
     pixels: &Pixels,
     at_centers: bool,
     enough: &Enough<'_>,
-    watched: (&AtomicBool, OnProgress),
+    grown: &Grown<'_>,
 ) -> Result<SampleSums> {
     let Enough { least, most, is_enough } = *enough;
     check_memory(pixels.at.len() as u64, most, request.scene.n_particles())?;
     let place = if at_centers { |_| DVec2::ZERO } else { shift };
-    draw(request, pixels, (0..most, place), watched, |pairs| {
+    draw(request, pixels, (0..most, place), grown, |pairs| {
         let is_last = |sums: &SampleSums| sums.n_samples >= least && is_enough(&sums.mean());
         pairs.whole().is_some_and(is_last)
     })
@@ -121,30 +150,16 @@ fn draw(
     request: &ReferenceRequest<'_>,
     pixels: &Pixels,
     (samples, place): (Range<u32>, fn(u32) -> DVec2),
-    (stop, on_progress): (&AtomicBool, OnProgress),
+    grown: &Grown<'_>,
     is_last: impl Fn(&PairwiseSum) -> bool,
 ) -> Result<SampleSums> {
     let ReferenceRequest { kind, scene, time_s } = *request;
     kind.check(scene, time_s)?;
-    let n = samples.len();
-    // A single sample reports progress by its parts, several samples report whole samples.
-    let inner: OnProgress = if n > 1 { &|_, _| () } else { on_progress };
+    let inner: OnProgress = if samples.len() > 1 { &|_, _| () } else { grown.on_progress };
     with_renderer(kind, (scene, time_s), pixels, inner, |render| {
-        let mut pairs = PairwiseSum::default();
-        for i in samples {
-            // A sample that is finished counts, so the check comes before.
-            if stop.load(Ordering::Relaxed) {
-                return Err(Error::Interrupted);
-            }
-            pairs.push(SampleSums::of_one(&render(PixelSample { i, shift: place(i) })));
-            if n > 1 {
-                on_progress(RenderStage::Sampling, n);
-            }
-            if is_last(&pairs) {
-                break;
-            }
-        }
-        pairs.finish().ok_or_else(|| Error::usage("no samples: expected at least one"))
+        grown.grow(samples, is_last, |i| {
+            SampleSums::of_one(&render(PixelSample { i, shift: place(i) }))
+        })
     })
 }
 
@@ -153,134 +168,9 @@ pub fn to_f32(rgba: &[[f64; 4]]) -> Vec<f32> {
     rgba.iter().flatten().map(|v| *v as f32).collect()
 }
 
-impl SampleSums {
-    fn of_one(drawn: &RenderedPixels) -> SampleSums {
-        let mut values = Vec::with_capacity(N_VALUES * drawn.rgba.len());
-        for (rgba, error) in drawn.rgba.iter().zip(&drawn.errors) {
-            let squares = rgba.iter().map(|v| v * v).sum();
-            values.extend_from_slice(rgba);
-            values.extend([squares, error.quadrature, error.chance * error.chance]);
-        }
-        SampleSums { n_samples: 1, values }
-    }
-
-    fn add(mut self, other: &SampleSums) -> SampleSums {
-        self.values.iter_mut().zip(&other.values).for_each(|(a, b)| *a += b);
-        self.n_samples += other.n_samples;
-        self
-    }
-
-    /// Returns the mean of the samples with its error estimate.
-    pub fn mean(&self) -> MeanPicture {
-        let n = f64::from(self.n_samples);
-        let rgba = |v: &[f64]| [v[0] / n, v[1] / n, v[2] / n, v[3] / n];
-        // The spread of all channels together bounds that of each. Samples are spread more evenly
-        // than random ones, so the mean is more accurate than this.
-        let spread = |v: &[f64]| {
-            let of_mean: f64 = rgba(v).iter().map(|c| c * c).sum();
-            ((v[4] / n - of_mean).max(0.0) / (n - 1.0).max(1.0)).sqrt()
-        };
-        let error = |v: &[f64]| v[5] / n + spread(v).max(v[6].sqrt() / n);
-        let pixels = || self.values.chunks_exact(N_VALUES);
-        let sum = |k: usize| pixels().map(|v| v[k] / n).sum::<f64>();
-        let all = (0..4).map(|k| sum(k).powi(2)).sum::<f64>().sqrt();
-        let off = pixels().map(|v| spread(v).powi(2)).sum::<f64>().sqrt();
-        MeanPicture {
-            rgba: pixels().map(rgba).collect(),
-            own_error: root_mean_square(pixels().map(error)),
-            random_error: root_mean_square(pixels().map(|v| 0.5 * spread(v))),
-            relative_error: if all > 0.0 { off / all } else { 0.0 },
-        }
-    }
-
-    /// Returns the values as f64 in little-endian order.
-    pub fn bytes(&self) -> Vec<u8> {
-        self.values.iter().flat_map(|v| v.to_le_bytes()).collect()
-    }
-
-    /// Reads sums from [`SampleSums::bytes`]; `None` if the length does not match.
-    pub fn from_bytes(bytes: &[u8], n_pixels: usize, n_samples: u32) -> Option<SampleSums> {
-        let value = |b: &[u8]| b.try_into().map(f64::from_le_bytes).ok();
-        let is_whole = bytes.len() == 8 * N_VALUES * n_pixels;
-        let values =
-            is_whole.then(|| bytes.chunks_exact(8).map(value).collect::<Option<Vec<f64>>>())??;
-        Some(SampleSums { n_samples, values })
-    }
-}
-
-/// Sum of neighbouring ranges of samples as one fixed tree of pairs: (0 + 1) + (2 + 3), and so on.
-/// Ranges whose length is a power of two, and that begin at a multiple of it, are nodes of that
-/// tree. A sum put together from ranges in order therefore has the same bits as one that was never
-/// cut. Rounding grows with the tree's height, not with the number of samples.
-#[derive(Debug, Default)]
-pub struct PairwiseSum {
-    /// Sums of complete subtrees, each shorter than the one before it.
-    open: Vec<SampleSums>,
-}
-
-impl PairwiseSum {
-    /// Adds the next range. All ranges have one length, a power of two; the last may be shorter.
-    pub fn push(&mut self, mut next: SampleSums) {
-        while let Some(last) = self.open.pop_if(|last| last.n_samples == next.n_samples) {
-            next = last.add(&next);
-        }
-        self.open.push(next);
-    }
-
-    /// Returns the sum of all ranges if their number is a power of two: one complete tree.
-    pub fn whole(&self) -> Option<&SampleSums> {
-        if let [whole] = &self.open[..] { Some(whole) } else { None }
-    }
-
-    /// Returns the sum of all ranges; `None` if there were none.
-    pub fn finish(mut self) -> Option<SampleSums> {
-        let mut all = self.open.pop()?;
-        while let Some(before) = self.open.pop() {
-            all = before.add(&all);
-        }
-        Some(all)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::philox::{philox4x32_10, uniform};
-
-    fn sample(i: u32) -> SampleSums {
-        // Of magnitudes so different that another order of additions shows.
-        let words = philox4x32_10([7, 7], [i, 0, 0, 0]).map(uniform);
-        let values = (0..N_VALUES)
-            .map(|k| (words[k % 4] - 0.5) * 10f64.powi((words[(k + 1) % 4] * 17.0) as i32));
-        SampleSums { n_samples: 1, values: values.collect() }
-    }
-
-    fn summed(parts: impl Iterator<Item = SampleSums>) -> SampleSums {
-        let mut pairs = PairwiseSum::default();
-        parts.for_each(|part| pairs.push(part));
-        pairs.finish().unwrap()
-    }
-
-    #[test]
-    fn ranges_of_a_power_of_two_sum_to_the_bits_of_the_whole() {
-        let mut n_differ = 0;
-        for n in 1..=70u32 {
-            let whole = summed((0..n).map(sample));
-            for length in [1u32, 2, 4, 8, 16, 32, 64, 128] {
-                let range = |k: u32| summed((k * length..n.min((k + 1) * length)).map(sample));
-                assert_eq!(
-                    summed((0..n.div_ceil(length)).map(range)),
-                    whole,
-                    "{n} in ranges of {length}"
-                );
-            }
-            // One after another they are not the same bits, and neither are ranges of three.
-            let in_turn = (0..n).map(sample).reduce(|a, b| a.add(&b)).unwrap();
-            n_differ += usize::from(in_turn != whole);
-            assert_eq!(in_turn.n_samples, whole.n_samples);
-        }
-        assert!(n_differ > 50, "{n_differ}");
-    }
 
     #[test]
     fn places_in_a_pixel_are_spread_evenly() {
@@ -298,34 +188,5 @@ mod tests {
             all.iter().for_each(|s| counts[(cell(s.y) * cells + cell(s.x)) as usize] += 1);
             assert!(counts.iter().all(|c| (1..=8).contains(c)), "{n}: {counts:?}");
         }
-    }
-
-    #[test]
-    fn means_and_their_errors_by_hand() {
-        // Red 1 and 3: mean 2, squares 10, variance of the mean ((10/2) - 4)/1 = 1. Quadrature
-        // 0.25.
-        let of = |red: f64, chance: f64| SampleSums {
-            n_samples: 1,
-            values: vec![red, 0.0, 0.0, 0.0, red * red, 0.25, chance * chance],
-        };
-        let two = of(1.0, 0.0).add(&of(3.0, 0.0));
-        let mean = MeanPicture {
-            rgba: vec![[2.0, 0.0, 0.0, 0.0]],
-            own_error: 1.25,
-            random_error: 0.5,
-            relative_error: 0.5,
-        };
-        assert_eq!(two.mean(), mean);
-        // One sample has its own standard error alone; equal ones have what their paths say:
-        // sqrt(0.5)/2 · 0.6.
-        assert_eq!(of(1.0, 0.5).mean().own_error, 0.75);
-        let equal = of(1.0, 0.6).add(&of(1.0, 0.6)).mean().own_error;
-        assert!((equal - 0.25 - 0.6 / 2f64.sqrt()).abs() < 1e-15, "{equal}");
-        let bytes = two.bytes();
-        assert_eq!(SampleSums::from_bytes(&bytes, 1, 2), Some(two));
-        assert_eq!(
-            (SampleSums::from_bytes(&bytes, 2, 2), SampleSums::from_bytes(&bytes[1..], 1, 2)),
-            (None, None)
-        );
     }
 }

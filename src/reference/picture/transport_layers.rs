@@ -6,17 +6,17 @@ use super::frame::FrameReference;
 use super::kind::ReferenceKind;
 use super::limits::check_sums;
 use super::pixels::Pixels;
-use super::progress::{OnProgress, RenderStage};
-use super::samples::{PairwiseSum, SampleSums, shift};
+use super::sample_sums::SampleSums;
+use super::samples::{Grown, shift};
 use super::scene_light::PixelSample;
 use super::transport::TransportPicture;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::scene::Scene;
 use crate::reference::parallel::parallel_map;
 use crate::reference::transport::N_LAYERS;
 
 /// Numbers of a pixel in the sums of layers: R, G, B, A; the layers' RGB; the squares of R, G, B.
-const N_LAYER_VALUES: usize = 4 + 3 * N_LAYERS + 3;
+pub const N_LAYER_VALUES: usize = 4 + 3 * N_LAYERS + 3;
 
 /// A picture by how often its light was scattered, and by what shone.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +29,8 @@ pub struct TransportLayers {
     pub error: Vec<DVec3>,
 }
 
-/// Draws `scene` by `n_samples` random paths a pixel, with its layers.
+/// Draws `scene` by `n_samples` random paths a pixel, with its layers. The paths add to the sums in
+/// `grown`, whose pixels have [`N_LAYER_VALUES`] numbers.
 ///
 /// # Errors
 /// As [`super::sums`] of "transport", or there are no samples.
@@ -37,31 +38,32 @@ pub fn transport_layers(
     scene: &Scene,
     time_s: f64,
     n_samples: u32,
-    on_progress: OnProgress,
+    grown: &Grown<'_>,
 ) -> Result<TransportLayers> {
     ReferenceKind::Transport.check(scene, time_s)?;
     let n_pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
     check_sums(n_pixels, n_samples, scene.n_particles(), 8 * N_LAYER_VALUES as u64)?;
     let picture = TransportPicture::new(scene, &FrameReference::unlit(scene, time_s)?);
     let pixels = Pixels::all(scene.film.width, scene.film.height);
-    let mut pairs = PairwiseSum::default();
-    for i in 0..n_samples {
-        let values = parallel_map(pixels.at.len(), |k| {
-            let number = pixels.number(k) as u32;
-            let light = picture.path(pixels.at[k], number, PixelSample { i, shift: shift(i) });
-            let all = light.radiance();
-            let mut values = [0.0; N_LAYER_VALUES];
-            values[..4].copy_from_slice(&all.extend(light.alpha).to_array());
-            for (place, layer) in values[4..].chunks_exact_mut(3).zip(light.layers) {
-                place.copy_from_slice(&layer.to_array());
-            }
-            values[N_LAYER_VALUES - 3..].copy_from_slice(&(all * all).to_array());
-            values
-        });
-        pairs.push(SampleSums { n_samples: 1, values: values.concat() });
-        on_progress(RenderStage::Sampling, n_samples as usize);
-    }
-    let sums = pairs.finish().ok_or_else(|| Error::usage("no samples: expected at least one"))?;
+    let sums = grown.grow(
+        0..n_samples,
+        |_| false,
+        |i| {
+            let values = parallel_map(pixels.at.len(), |k| {
+                let number = pixels.number(k) as u32;
+                let light = picture.path(pixels.at[k], number, PixelSample { i, shift: shift(i) });
+                let all = light.radiance();
+                let mut values = [0.0; N_LAYER_VALUES];
+                values[..4].copy_from_slice(&all.extend(light.alpha).to_array());
+                for (place, layer) in values[4..].chunks_exact_mut(3).zip(light.layers) {
+                    place.copy_from_slice(&layer.to_array());
+                }
+                values[N_LAYER_VALUES - 3..].copy_from_slice(&(all * all).to_array());
+                values
+            });
+            SampleSums { n_samples: 1, values: values.concat() }
+        },
+    )?;
     let n = f64::from(n_samples);
     let pixels = || sums.values.chunks_exact(N_LAYER_VALUES);
     let rgb = |v: &[f64]| DVec3::new(v[0], v[1], v[2]) / n;

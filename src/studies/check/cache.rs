@@ -12,7 +12,7 @@ use crate::io::atomic::write_atomic;
 use crate::io::input_file;
 use crate::model::scene::Scene;
 use crate::reference::picture::{Pixels, ReferenceKind};
-use crate::studies::reference_cache::{digest, hash_of};
+use crate::studies::reference_hash::{digest, hash_of};
 
 /// Largest file: 24 bytes a facet and 40 a second reflection.
 const LARGEST_FILE: u64 = 512 << 20;

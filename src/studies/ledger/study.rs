@@ -21,8 +21,10 @@ use crate::reference::picture::{
 use crate::studies::error::blocks::TimedBlock;
 use crate::studies::error::device_runner::{DeviceRunner, FrameChoice};
 use crate::studies::error::study::Runner;
+use crate::studies::kept_paths::{KeptPaths, PathSums};
 use crate::studies::picture_error::{RESOLVED, magnitude, picture_error, sampled};
 use crate::studies::provenance::Provenance;
+use crate::studies::reference_cache;
 
 /// Least number of random paths of a pixel: fewer do not tell their own error.
 const LEAST_PATHS: u32 = 32;
@@ -199,7 +201,14 @@ impl LedgerStudy<'_> {
         let enough = Enough { least: LEAST_PATHS, most: self.n_paths, is_enough: &is_enough };
         let kind = ReferenceKind::Transport;
         let request = ReferenceRequest { kind, scene, time_s: self.frames.time_s };
-        let mean = match sums_until(&request, self.pixels, true, &enough, (self.stop, listener)) {
+        let folder = reference_cache::default_folder();
+        let kept =
+            KeptPaths::open(folder.as_deref(), &request, self.pixels, PathSums::Centers, None);
+        let sums = kept.grow(self.stop, listener, |grown| {
+            sums_until(&request, self.pixels, true, &enough, grown)
+        });
+        kept.keep();
+        let mean = match sums {
             Ok(sums) => sums.mean(),
             // The rows that are finished count.
             Err(Error::Interrupted) => return Ok(()),

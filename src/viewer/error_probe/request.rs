@@ -9,7 +9,7 @@ use crate::model::film::Film;
 use crate::model::scene::Scene;
 use crate::reference::picture::{Pixels, Reference, ReferenceKind};
 use crate::studies::picture_error::{PictureError, picture_error};
-use crate::studies::reference_cache;
+use crate::studies::reference_hash;
 
 /// A view of a scene, and the kind of reference that measures it.
 #[derive(Debug, Clone)]
@@ -56,7 +56,7 @@ impl ProbeRequest {
         };
         view(self) == view(other)
             && (Arc::ptr_eq(&self.scene, &other.scene)
-                || reference_cache::is_same(self.kind, &self.exact_scene(), &other.exact_scene()))
+                || reference_hash::is_same(self.kind, &self.exact_scene(), &other.exact_scene()))
     }
 }
 

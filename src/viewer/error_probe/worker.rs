@@ -3,7 +3,7 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -12,8 +12,8 @@ use rayon::ThreadPool;
 use super::request::{ProbeRequest, ReferencePicture};
 use crate::error::Result;
 use crate::model::scene::Scene;
-use crate::reference::picture::{Pixels, Reference, RenderStage};
-use crate::studies::reference_cache::{self, CachedReference};
+use crate::reference::picture::{PathLimits, Pixels, Reference, ReferenceRequest, RenderStage};
+use crate::studies::reference_cache::{self, CachedReference, Making};
 use crate::viewer::sync::lock;
 
 /// Progress of the reference that is being computed.
@@ -186,10 +186,13 @@ impl Worker {
             let n_done = before.map_or(1, |p| p.n_done + 1);
             state.status.progress = Some(Progress { work, n_done, n, n_pixels });
         };
-        let (request, folder) = (job.request.clone(), self.cache_folder.as_deref());
-        let (kind, time_s) = (request.kind, request.time_s);
+        let request = job.request.clone();
+        let (kind, time_s, scene) = (request.kind, request.time_s, &job.scene);
+        let (never, limits) = (AtomicBool::new(false), PathLimits::USUAL);
+        let how = Making { folder: self.cache_folder.as_deref(), limits, stop: &never };
         let CachedReference { reference, from_cache, .. } = self.pool.install(|| {
-            reference_cache::reference(kind, &job.scene, time_s, &pixels, folder, &on_progress)
+            let of = ReferenceRequest { kind, scene, time_s };
+            reference_cache::reference(&of, &pixels, &how, &on_progress)
         })?;
         let picture = Arc::new(ReferencePicture { request, pixels, reference, from_cache });
         let mut state = self.lock_current(job);

@@ -18,7 +18,7 @@ use nimbus::model::scene::Scene;
 use nimbus::reference::picture::{
     Enough, Grown, Pixels, ReferenceKind, ReferenceRequest, SampleSums, sums, sums_until,
 };
-use nimbus::studies::kept_paths::{KeptPaths, PathSums};
+use nimbus::studies::kept_paths::{KeptPaths, OnDisk, PathSums};
 use program::{nimbus, path};
 use serde_json::Value;
 
@@ -132,8 +132,9 @@ fn a_smaller_error_goes_on_from_the_paths_of_a_greater_one() {
     let [coarse, again, fine, last] = ["0.4", "0.4", "0.15", "0.4"].map(study);
     assert!(coarse.1 == "false" && again.1 == "true" && fine.1 == "false" && last.1 == "true");
     assert_eq!(coarse.0, again.0);
-    assert!(fine.0 != coarse.0 && last.0 == fine.0, "{coarse:?} {fine:?} {last:?}");
-    assert!([&again, &fine, &last].iter().all(|r| r.2 == coarse.2));
+    // The finer one goes on; who asks for the coarse one gets it, whatever others have added.
+    assert!(fine.0 != coarse.0 && fine.2 != coarse.2, "{coarse:?} {fine:?}");
+    assert!(again == last && (&last.0, &last.2) == (&coarse.0, &coarse.2), "{coarse:?} {last:?}");
 }
 
 /// The scene of the tests of files, and some of its pixels.
@@ -151,10 +152,10 @@ fn grown(folder: &Path, n: u32) -> (u32, SampleSums) {
     let (scene, pixels) = scene();
     let request = ReferenceRequest { kind: ReferenceKind::Transport, scene: &scene, time_s: 0.0 };
     let kept = KeptPaths::open(Some(folder), &request, &pixels, PathSums::Spread, Some(n));
+    let kept = kept.expect("a frame");
     let enough = Enough { least: n, most: n, is_enough: &|_| false };
     let add = |grown: &Grown<'_>| sums_until(&request, &pixels, false, &enough, grown);
     let found = kept.grow(&AtomicBool::new(false), &|_, _| (), add).expect("sums");
-    kept.keep();
     (kept.n_before(), found)
 }
 
@@ -190,6 +191,7 @@ fn damaged_files_are_made_anew() {
         whole[..head].to_vec(),
         Vec::new(),
         with_head("[32,8]", "[32,7]"),
+        [&whole[..], &[0]].concat(),
         with_head("[32,8]", "[32,4]"),
         with_head("[32,8]", "[8,32]"),
         with_head("[32,8]", "[32,8,4]"),
@@ -200,17 +202,52 @@ fn damaged_files_are_made_anew() {
         assert_eq!(grown(folder, 41), (0, at_once(41)));
         assert_eq!(grown(folder, 42).0, 41);
     }
-    // Another scene, time or kind of sums has another file.
+    // Another scene, pixels or kind of sums has another file. Settings that no path depends on
+    // have the same.
     let (scene, pixels) = scene();
-    let open = |scene: &Scene, time_s: f64, of: PathSums| {
-        let request = ReferenceRequest { kind: ReferenceKind::Transport, scene, time_s };
-        KeptPaths::open(Some(folder), &request, &pixels, of, None).n_before()
+    let open = |scene: &Scene, pixels: &Pixels, of: PathSums| {
+        let request = ReferenceRequest { kind: ReferenceKind::Transport, scene, time_s: 0.0 };
+        KeptPaths::open(Some(folder), &request, pixels, of, None).expect("a frame").n_before()
     };
-    let mut other = scene.clone();
-    other.lighting.forward = 0.5;
-    assert_eq!(open(&scene, 0.0, PathSums::Spread), 42);
-    assert_eq!(open(&other, 0.0, PathSums::Spread), 0);
-    assert_eq!(open(&scene, 1.0, PathSums::Spread), 0);
-    assert_eq!(open(&scene, 0.0, PathSums::Centers), 0);
-    assert_eq!(open(&scene, 0.0, PathSums::Layers), 0);
+    let with = |change: fn(&mut Scene)| {
+        let mut other = scene.clone();
+        change(&mut other);
+        open(&other, &pixels, PathSums::Spread)
+    };
+    assert_eq!(open(&scene, &pixels, PathSums::Spread), 42);
+    assert_eq!(with(|s| s.lighting.grid = 32), 42);
+    assert_eq!(with(|s| s.time.n_frames += 1), 42);
+    assert_eq!(with(|s| s.film.exposure = 2.0), 42);
+    assert_eq!(with(|s| s.lighting.forward = 0.5), 0);
+    assert_eq!(with(|s| s.clouds[0].seed += 1), 0);
+    assert_eq!(with(|s| s.camera.fov_y_rad *= 1.01), 0);
+    assert_eq!(open(&scene, &Pixels::sample(64, 48, 200), PathSums::Spread), 0);
+    assert_eq!(open(&scene, &pixels, PathSums::Centers), 0);
+    assert_eq!(open(&scene, &pixels, PathSums::Layers), 0);
+}
+
+/// Two runs at once: the one with fewer paths takes nothing from the other.
+#[test]
+fn the_run_with_more_paths_stays() {
+    let dir = temp();
+    let (scene, pixels) = scene();
+    let request = ReferenceRequest { kind: ReferenceKind::Transport, scene: &scene, time_s: 0.0 };
+    let open = || {
+        KeptPaths::open(Some(dir.path()), &request, &pixels, PathSums::Spread, None)
+            .expect("a frame")
+    };
+    let add = |kept: &KeptPaths, n: u32| {
+        let enough = Enough { least: n, most: n, is_enough: &|_| false };
+        kept.grow(&AtomicBool::new(false), &|_, _| (), |grown| {
+            sums_until(&request, &pixels, false, &enough, grown).expect("sums")
+        })
+    };
+    let (few, many) = (open(), open());
+    assert_eq!(few.keep(), OnDisk::Nothing);
+    add(&many, 9);
+    assert_eq!(many.keep(), OnDisk::These(9));
+    add(&few, 3);
+    assert_eq!(few.keep(), OnDisk::Others(9));
+    drop(few);
+    assert_eq!(open().n_before(), 9);
 }

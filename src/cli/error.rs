@@ -29,6 +29,7 @@ use crate::studies::error::device_runner::{DeviceRunner, FrameChoice};
 use crate::studies::error::files::{self, REFERENCE_FILE};
 use crate::studies::error::records::{Budget, Configuration, Study};
 use crate::studies::error::study::{ErrorStudy, Event, StudyPlan, StudyResults};
+use crate::studies::kept_paths::Traced;
 use crate::studies::provenance::{Provenance, ReferenceRecord};
 use crate::studies::reference_cache::{self, CachedReference, Making};
 use crate::timing::json::ResultFile;
@@ -48,6 +49,13 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     let StudyScene { options, loaded, scene, time_s } =
         load_study(&args.scene, &args.options, args.plain, args.frame)?;
     let film = scene.film;
+    if (args.reference_error.is_some() || args.paths.is_some()) && !args.against.is_random() {
+        return Err(Error::usage(format!(
+            "--reference-error and --paths: only \"transport\" is random; expected neither with \
+             --against {}",
+            args.against
+        )));
+    }
     let axes = axes(args, &options, &scene)?;
     let (gpu, clocks) = open_for_study(&options, &scene, time_s)?;
     if args.options.verbose {
@@ -67,15 +75,19 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     let existing = if args.resume { Existing::Extend } else { Existing::new(args.force) };
     let stop = graceful_stop();
     let folder = SharedFolder::default();
-    let last_round = LastRound::default();
+    let (last_round, traced) = (LastRound::default(), Traced::default());
     let mut keeping = {
-        let (args, folder, last_round) = (args.clone(), folder.clone(), last_round.clone());
-        interrupt::keep(PATIENCE, move || cut_short(&args, color, &folder, &last_round))
+        let (args, folder) = (args.clone(), folder.clone());
+        let (last_round, traced) = (last_round.clone(), traced.clone());
+        interrupt::keep(PATIENCE, move || {
+            output::kept_paths(traced.keep());
+            cut_short(&args, color, &folder, &last_round)
+        })
     };
     // Claimed before the reference is computed, which may take minutes.
     let open = |out| files::open(out, existing, n_configurations(args, &plan));
     *lock_folder(&folder) = args.out.as_deref().map(open).transpose()?;
-    let cached = reference(args, &scene, time_s, &pixels)?;
+    let cached = reference(args, (&scene, time_s), &pixels, &traced)?;
     let mut study = Study {
         made: Provenance::now(Study::SCHEMA, &args.scene, &loaded, gpu.device.info(), clocks),
         reference: ReferenceRecord::of(&cached, args.against, &pixels, args.frame, time_s),
@@ -163,7 +175,7 @@ fn cut_short(
             "the step under way was cut short; {} has the rounds before it, and --resume goes on",
             at.display()
         ),
-        None => say!("the step under way was cut short; no file is kept"),
+        None => say!("the step under way was cut short; no result is kept"),
     }
     drop(folder.take());
     printed.err().unwrap_or(Error::Interrupted)
@@ -187,16 +199,25 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
 /// Returns the reference, from the cache if it is there.
 fn reference(
     args: &ErrorArgs,
-    scene: &Scene,
-    time_s: f64,
+    (scene, time_s): (&Scene, f64),
     pixels: &Pixels,
+    traced: &Traced,
 ) -> Result<CachedReference> {
     let shown = ReferenceProgress::new(args.options.quiet);
     let folder = reference_cache::default_folder();
-    let limits = PathLimits { error: args.reference_error, most: args.paths };
-    let how = Making { folder: folder.as_deref(), limits, stop: graceful_stop() };
+    let usual = PathLimits::USUAL;
+    let limits = PathLimits {
+        error: args.reference_error.unwrap_or(usual.error),
+        most: args.paths.unwrap_or(usual.most),
+    };
+    let how = Making { folder: folder.as_deref(), limits, stop: graceful_stop(), traced };
     let request = ReferenceRequest { kind: args.against, scene, time_s };
     reference_cache::reference(&request, pixels, &how, &|work, n| shown.advance(work, n))
+        .inspect_err(|error| {
+            if matches!(error, Error::Interrupted) {
+                output::kept_paths(traced.keep());
+            }
+        })
         .map_err(|error| with_texture_hint(error, ", or --against thin or slices"))
 }
 

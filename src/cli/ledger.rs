@@ -17,6 +17,7 @@ use crate::model::scene::LightingMode;
 use crate::reference::picture::{Pixels, ReferenceKind, n_reflections};
 use crate::report::charts;
 use crate::studies::error::device_runner::FrameChoice;
+use crate::studies::kept_paths::Traced;
 use crate::studies::ledger::records::{Ledger, Row};
 use crate::studies::ledger::study::{LedgerParts, LedgerStudy, lock};
 use crate::studies::provenance::Provenance;
@@ -58,11 +59,15 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
         FrameChoice { i_frame: args.frame, time_s, n_frames: args.frames, as_played: false };
     let pixels = pixels(scene, args.pixels)?;
     let parts = Arc::new(Mutex::new(LedgerParts::default()));
-    let folder = SharedFolder::default();
+    let (folder, traced) = (SharedFolder::default(), Traced::default());
     let mut keeping = {
         let (args, made, pixels, parts, folder) =
             (args.clone(), made.clone(), pixels.clone(), parts.clone(), folder.clone());
-        interrupt::keep(PATIENCE, move || cut_short(&args, &folder, made, frames, &pixels, &parts))
+        let traced = traced.clone();
+        interrupt::keep(PATIENCE, move || {
+            output::kept_paths(traced.keep());
+            cut_short(&args, &folder, made, frames, &pixels, &parts)
+        })
     };
     let (existing, planned) = (Existing::new(args.force), FILES.map(str::to_owned));
     let open = |out| ResultFolder::open(out, "ledger", existing, &planned);
@@ -76,6 +81,7 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
         n_reflections: args.reflections,
         n_paths: args.paths,
         stop,
+        traced: &traced,
         parts: &parts,
     };
     announce(args, &study)?;
@@ -86,6 +92,7 @@ pub fn run(args: &LedgerArgs) -> Result<()> {
     deliver(args, &folder, &ledger)?;
     gpu.close()?;
     if ledger.interrupted {
+        output::kept_paths(traced.keep());
         return Err(Error::Interrupted);
     }
     if !ledger.holds {

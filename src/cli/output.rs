@@ -16,6 +16,7 @@ use crate::io::plain_text::{plain, plain_json};
 use crate::io::result_folder::ResultFolder;
 use crate::measure::figure::Figure;
 use crate::report::charts::Chart;
+use crate::studies::kept_paths::OnDisk;
 
 /// Prints `error: …` to stderr.
 pub fn error(error: &Error, color: ColorChoice) {
@@ -163,6 +164,20 @@ pub fn wrote(place: &Path, what: &str, quiet: bool) {
 /// Says on stderr that a command has written a picture.
 pub fn wrote_picture(path: &Path, width: u32, height: u32, quiet: bool) {
     wrote(path, &format!("{width} × {height} pixels"), quiet);
+}
+
+/// Says on stderr what the disk has of the random paths of a command that ended early.
+pub fn kept_paths(on_disk: Option<OnDisk>) {
+    match on_disk {
+        Some(OnDisk::These(n)) => {
+            say!("{n} paths a pixel are kept; the same command goes on from them");
+        }
+        Some(OnDisk::Others(n)) => {
+            say!("another run has kept {n} paths a pixel; those of this run are not kept");
+        }
+        Some(OnDisk::Nothing) => say!("no path is kept"),
+        None => {}
+    }
 }
 
 /// Says on stderr where the results of a run are. A run that ended early may have kept its results

@@ -98,7 +98,7 @@ fn with_transport_layers(
     let pixels = Pixels::all(scene.film.width, scene.film.height);
     let subject = ReferenceRequest { kind: ReferenceKind::Transport, scene, time_s };
     let of = (&pixels, PathSums::Layers);
-    let (drawn, n_kept) = kept_paths(args, &subject, of, Some(n_samples), |grown| {
+    let (drawn, n_kept) = with_kept(args, &subject, of, Some(n_samples), |_, grown| {
         transport_layers(scene, time_s, n_samples, grown)
     })?;
     let channels = render_layers::of_transport(&drawn);
@@ -216,9 +216,10 @@ fn paths(
     subject: &ReferenceRequest<'_>,
     pixels: &Pixels,
 ) -> Result<(SampleSums, u32)> {
+    let of = (pixels, PathSums::Spread);
     let Some(error) = args.error else {
         let enough = Enough { least: n_samples, most: n_samples, is_enough: &|_| false };
-        return kept_paths(args, subject, (pixels, PathSums::Spread), Some(n_samples), |grown| {
+        return with_kept(args, subject, of, Some(n_samples), |_, grown| {
             picture::sums_until(subject, pixels, false, &enough, grown)
         });
     };
@@ -228,23 +229,24 @@ fn paths(
     let fits = |n: &u32| check_memory(n_pixels, *n, subject.scene.n_particles()).is_ok();
     let most = (1..=MAX_SAMPLES.ilog2()).rev().map(|k| 1 << k).find(fits).unwrap_or(2);
     let enough = Enough { least: 2, most, is_enough };
-    kept_paths(args, subject, (pixels, PathSums::Spread), None, |grown| {
-        picture::sums_until(subject, pixels, false, &enough, grown)
+    with_kept(args, subject, of, None, |kept, grown| {
+        let sums = kept.total().filter(|sums| enough.holds(sums));
+        sums.map_or_else(|| picture::sums_until(subject, pixels, false, &enough, grown), Ok)
     })
 }
 
 /// Adds random paths to those that an earlier run has kept, unless there are more than `at_most`,
 /// and keeps them, after Ctrl-C too. Returns what `add` returns, and how many paths of a pixel were
 /// kept before.
-fn kept_paths<T>(
+fn with_kept<T>(
     args: &RenderArgs,
     subject: &ReferenceRequest<'_>,
     (pixels, of): (&Pixels, PathSums),
     at_most: Option<u32>,
-    add: impl FnOnce(&Grown<'_>) -> Result<T>,
+    add: impl FnOnce(&KeptPaths, &Grown<'_>) -> Result<T>,
 ) -> Result<(T, u32)> {
     let folder = reference_cache::default_folder();
-    let kept = Arc::new(KeptPaths::open(folder.as_deref(), subject, pixels, of, at_most));
+    let kept = Arc::new(KeptPaths::open(folder.as_deref(), subject, pixels, of, at_most)?);
     let n_before = kept.n_before();
     if n_before > 0 && args.options.verbose {
         say!("goes on from {n_before} paths a pixel that an earlier run kept");
@@ -255,24 +257,19 @@ fn kept_paths<T>(
         interrupt::keep(PATIENCE, move || cut_short(&kept))
     };
     let shown = ReferenceProgress::new(args.options.quiet);
-    let added = kept.grow(stop, &|work, n| shown.advance(work, n), add);
+    let listener = &|work, n| shown.advance(work, n);
+    let added = kept.grow(stop, listener, |grown| add(&kept, grown));
     keeping.finish();
     drop(shown);
     match added {
         Err(Error::Interrupted) => Err(cut_short(&kept)),
-        added => {
-            kept.keep();
-            Ok((added?, n_before))
-        }
+        added => Ok((added?, n_before)),
     }
 }
 
 /// Keeps the paths that are traced, and says how many. Returns the error that the program ends
 /// with.
 fn cut_short(kept: &KeptPaths) -> Error {
-    match kept.keep() {
-        Some(n) => say!("{n} paths a pixel are kept; the same command goes on from them"),
-        None => say!("no path is kept"),
-    }
+    output::kept_paths(Some(kept.keep()));
     Error::Interrupted
 }

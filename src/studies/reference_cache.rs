@@ -8,14 +8,14 @@ use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
-use super::kept_paths::{KeptPaths, PathSums};
+use super::kept_paths::{KeptPaths, Traced};
 use super::reference_hash::{digest, hash_of};
 use crate::error::Result;
 use crate::gpu::cache_folder;
 use crate::io::atomic::write_atomic;
 use crate::io::input_file;
 use crate::reference::picture::{
-    Grown, OnProgress, PathLimits, Pixels, Reference, ReferenceRequest, render_paths,
+    Grown, MeanPicture, OnProgress, PathLimits, Pixels, Reference, ReferenceRequest, render_paths,
 };
 
 /// Largest file of the cache: 32 bytes for each pixel of the largest picture of a study.
@@ -51,7 +51,7 @@ pub fn default_folder() -> Option<PathBuf> {
 }
 
 /// How a reference is made.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Making<'a> {
     /// Folder of references that are kept.
     pub folder: Option<&'a Path>,
@@ -59,6 +59,8 @@ pub struct Making<'a> {
     pub limits: PathLimits,
     /// Ends random paths early once it is set; they are kept.
     pub stop: &'a AtomicBool,
+    /// Gets the random paths while they are traced.
+    pub traced: &'a Traced,
 }
 
 /// Returns the reference from the cache, or computes it and stores it there. One of random paths
@@ -100,13 +102,15 @@ fn refined(
     how: &Making<'_>,
     listener: OnProgress,
 ) -> Result<CachedReference> {
-    let kept = KeptPaths::open(how.folder, request, pixels, PathSums::Centers, None);
-    let add = |grown: &Grown<'_>| render_paths(request, pixels, &how.limits, grown);
-    let reference = kept.grow(how.stop, listener, add);
-    kept.keep();
+    let is_enough = |mean: &MeanPicture| how.limits.hold(mean);
+    let enough = how.limits.enough(&is_enough);
+    let kept = how.traced.begin(KeptPaths::open_study(how.folder, request, pixels, &enough)?);
+    let add = |grown: &Grown<'_>| render_paths(request, pixels, &enough, grown);
+    let reference = kept.grow(how.stop, listener, add)?;
+    how.traced.end();
     let from_cache = kept.n_samples() == kept.n_before();
-    let (hash, seconds) = (kept.hash().to_owned(), kept.seconds());
-    let reference = Reference { seconds, pixels_s: seconds, ..reference? };
+    let (hash, seconds) = (kept.hash(), kept.seconds());
+    let reference = Reference { seconds, pixels_s: seconds, ..reference };
     Ok(CachedReference { reference, hash, from_cache })
 }
 

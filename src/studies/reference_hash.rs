@@ -3,13 +3,13 @@
 
 use sha2::{Digest, Sha256};
 
+use crate::error::Result;
 use crate::model::basis::Sampling;
+use crate::model::cloud::CloudSource;
 use crate::model::film::{Film, FilmFormat, ToneMap};
-use crate::model::scene::{
-    Gather, Lighting, LightingMode, Pairs, Scene, Simulate, Threading, Threads,
-};
+use crate::model::scene::{Gather, Lighting, Pairs, Scene, Simulate, Threading, Threads};
 use crate::model::sums::Sums;
-use crate::reference::picture::{Pixels, ReferenceKind};
+use crate::reference::picture::{Pixels, ReferenceKind, TransportParts};
 
 /// Returns whether two scenes have the same reference at every time.
 pub fn is_same(against: ReferenceKind, a: &Scene, b: &Scene) -> bool {
@@ -33,15 +33,31 @@ pub(super) fn hash_of(
     // Debug prints the shortest digits that read back as the same numbers, so that two different
     // scenes have different texts.
     hasher.update(format!("{:?}", relevant(scene, against)));
+    for cloud in &scene.clouds {
+        // The text of an animation does not have its file's particles. One that cannot be read
+        // has no reference either.
+        if let CloudSource::Animated(moving) = &cloud.source {
+            hasher.update(format!("{:?}", moving.animation.at(time_s).map_err(|e| e.to_string())));
+        }
+    }
     format!("{:x}", hasher.finalize())
+}
+
+/// Returns the hash of everything that random paths depend on but their number and places.
+///
+/// # Errors
+/// The frame cannot be computed.
+pub(super) fn hash_of_paths(scene: &Scene, time_s: f64, pixels: &Pixels) -> Result<String> {
+    let parts = TransportParts::new(scene, time_s)?;
+    let pixels = (pixels.width, pixels.height, pixels.tile, pixels.cell);
+    let code = env!("NIMBUS_REFERENCE_CODE");
+    Ok(digest(format!("{code}\n{pixels:?}\n{parts:?}").as_bytes()))
 }
 
 /// Returns `scene` with every setting that this kind of reference ignores at a fixed value.
 fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
     let scene = against.without_approximations(scene);
     let Lighting { mode, grid, step, forward, facets_per_cloud, sun_radius, .. } = scene.lighting;
-    // Paths know no modes.
-    let mode = if against.is_random() { LightingMode::First } else { mode };
     let by_model = matches!(
         against,
         ReferenceKind::Model | ReferenceKind::Reflections(_) | ReferenceKind::Transport

@@ -49,7 +49,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", requires = "reference", value_parser = parse_samples)]
     pub samples: Option<u32>,
     /// Trace random paths of "transport" until the standard error of the picture's mean is this
-    /// share of it. A pixel has at most 2^20 of them, or as many as fit in memory
+    /// share of it. A pixel has at most 2^20 of them, or as many as fit in memory. Paths are kept
+    /// in references/ of NIMBUS_CACHE_DIR, at most 256 MiB a picture, and counted again here
     #[arg(
         long,
         value_name = "SHARE",

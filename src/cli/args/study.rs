@@ -7,7 +7,7 @@ use clap::Args as ClapArgs;
 use super::farm_plan::{Span, parse_span};
 use super::scene::SceneArgs;
 use super::values::{parse_block, parse_positive, parse_rounds};
-use crate::reference::picture::{MAX_SAMPLES, PathLimits, ReferenceKind};
+use crate::reference::picture::{MAX_SAMPLES, ReferenceKind};
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::front::Metric;
 
@@ -38,25 +38,18 @@ pub struct ErrorArgs {
     #[arg(long, value_name = "WHAT", default_value = "model", help_heading = "Error")]
     pub against: ReferenceKind,
     /// Trace random paths for --against transport until the error of a pixel of the reference is
-    /// this share of the picture's root mean square. Paths are kept, so that a smaller share goes
-    /// on from them
-    #[arg(
-        long,
-        value_name = "SHARE",
-        default_value_t = PathLimits::USUAL.error,
-        value_parser = parse_positive,
-        help_heading = "Error"
-    )]
-    pub reference_error: f64,
-    /// Most random paths of a pixel for --against transport
+    /// this share of the picture's root mean square [default: 0.01]. Paths are kept with the other
+    /// references, and a smaller share goes on from them
+    #[arg(long, value_name = "SHARE", value_parser = parse_positive, help_heading = "Error")]
+    pub reference_error: Option<f64>,
+    /// Most random paths of a pixel for --against transport [default: 4096]
     #[arg(
         long,
         value_name = "N",
-        default_value_t = PathLimits::USUAL.most,
         value_parser = clap::value_parser!(u32).range(2..=i64::from(MAX_SAMPLES)),
         help_heading = "Error"
     )]
-    pub paths: u32,
+    pub paths: Option<u32>,
     /// Draw every cloud without its texture, which the references but thin and slices do not have
     #[arg(long, help_heading = "Error")]
     pub plain: bool,

@@ -53,7 +53,8 @@ impl ReferenceKind {
             let request = ReferenceRequest { kind: self, scene, time_s };
             let never = AtomicBool::new(false);
             let grown = Grown::from_nothing(&never, on_progress);
-            return render_paths(&request, pixels, &PathLimits::USUAL, &grown);
+            let is_enough = |mean: &MeanPicture| PathLimits::USUAL.hold(mean);
+            return render_paths(&request, pixels, &PathLimits::USUAL.enough(&is_enough), &grown);
         }
         self.check(scene, time_s)?;
         let scene = &self.without_approximations(scene);
@@ -89,28 +90,34 @@ pub struct PathLimits {
 impl PathLimits {
     /// A hundredth of the picture, or as many paths as take some minutes at two thousand pixels.
     pub const USUAL: PathLimits = PathLimits { error: 0.01, most: 4096 };
+
+    /// Returns whether a mean is accurate enough.
+    pub fn hold(&self, mean: &MeanPicture) -> bool {
+        let magnitude = root_mean_square(mean.rgba.iter().flatten().copied());
+        mean.random_error <= self.error * magnitude
+    }
+
+    /// Returns the number of paths by these limits; `is_enough` is [`PathLimits::hold`].
+    pub fn enough<'a>(&self, is_enough: &'a (dyn Fn(&MeanPicture) -> bool + Sync)) -> Enough<'a> {
+        /// Fewer paths do not tell their own error.
+        const LEAST: u32 = 64;
+        Enough { least: LEAST.min(self.most), most: self.most, is_enough }
+    }
 }
 
-/// Draws a scene by as many random paths through the centre of each pixel as it takes. They add to
-/// those in `grown`.
+/// Draws a scene by random paths through the centre of each pixel until there are enough. They add
+/// to those in `grown`.
 ///
 /// # Errors
 /// As [`super::sums`].
 pub fn render_paths(
     request: &ReferenceRequest<'_>,
     pixels: &Pixels,
-    limits: &PathLimits,
+    enough: &Enough<'_>,
     grown: &Grown<'_>,
 ) -> Result<Reference> {
-    /// Fewer paths do not tell their own error.
-    const LEAST: u32 = 64;
     let begin = Instant::now();
-    let is_enough = &|mean: &MeanPicture| {
-        let magnitude = root_mean_square(mean.rgba.iter().flatten().copied());
-        mean.random_error <= limits.error * magnitude
-    };
-    let enough = Enough { least: LEAST.min(limits.most), most: limits.most, is_enough };
-    let found = sums_until(request, pixels, true, &enough, grown)?;
+    let found = sums_until(request, pixels, true, enough, grown)?;
     let (mean, seconds) = (found.mean(), begin.elapsed().as_secs_f64());
     Ok(Reference {
         own_error: mean.random_error,

@@ -137,7 +137,7 @@ impl PairwiseSum {
     pub fn total(&self) -> Option<SampleSums> {
         let mut parts = self.open.iter().rev();
         let last = parts.next()?.clone();
-        Some(parts.fold(last, |all, before| before.clone().add(&all)))
+        Some(parts.fold(last, SampleSums::add))
     }
 }
 

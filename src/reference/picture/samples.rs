@@ -66,6 +66,13 @@ pub struct Enough<'a> {
     pub is_enough: &'a (dyn Fn(&MeanPicture) -> bool + Sync),
 }
 
+impl Enough<'_> {
+    /// Returns whether no more samples are needed.
+    pub fn holds(&self, sums: &SampleSums) -> bool {
+        sums.n_samples >= self.least && (self.is_enough)(&sums.mean())
+    }
+}
+
 /// A sum that samples are added to, one by one from the number that it has, and who watches.
 pub struct Grown<'a> {
     /// The sum of the first samples. Other threads may look at it.
@@ -135,13 +142,11 @@ pub fn sums_until(
     enough: &Enough<'_>,
     grown: &Grown<'_>,
 ) -> Result<SampleSums> {
-    let Enough { least, most, is_enough } = *enough;
+    let most = enough.most;
     check_memory(pixels.at.len() as u64, most, request.scene.n_particles())?;
     let place = if at_centers { |_| DVec2::ZERO } else { shift };
-    draw(request, pixels, (0..most, place), grown, |pairs| {
-        let is_last = |sums: &SampleSums| sums.n_samples >= least && is_enough(&sums.mean());
-        pairs.whole().is_some_and(is_last)
-    })
+    let is_last = |pairs: &PairwiseSum| pairs.whole().is_some_and(|sums| enough.holds(sums));
+    draw(request, pixels, (0..most, place), grown, is_last)
 }
 
 /// Draws `samples`, each through its `place` in every pixel, until `is_last` says that their sum is

@@ -21,7 +21,7 @@ use crate::reference::picture::{
 use crate::studies::error::blocks::TimedBlock;
 use crate::studies::error::device_runner::{DeviceRunner, FrameChoice};
 use crate::studies::error::study::Runner;
-use crate::studies::kept_paths::{KeptPaths, PathSums};
+use crate::studies::kept_paths::{KeptPaths, Traced};
 use crate::studies::picture_error::{RESOLVED, magnitude, picture_error, sampled};
 use crate::studies::provenance::Provenance;
 use crate::studies::reference_cache;
@@ -47,6 +47,8 @@ pub struct LedgerStudy<'a> {
     pub n_paths: u32,
     /// Ends the study early once it is set.
     pub stop: &'a AtomicBool,
+    /// Gets the random paths while they are traced.
+    pub traced: &'a Traced,
     /// The finished parts, which other threads may look at.
     pub parts: &'a Mutex<LedgerParts>,
 }
@@ -202,12 +204,11 @@ impl LedgerStudy<'_> {
         let kind = ReferenceKind::Transport;
         let request = ReferenceRequest { kind, scene, time_s: self.frames.time_s };
         let folder = reference_cache::default_folder();
-        let kept =
-            KeptPaths::open(folder.as_deref(), &request, self.pixels, PathSums::Centers, None);
+        let kept = KeptPaths::open_study(folder.as_deref(), &request, self.pixels, &enough)?;
+        let kept = self.traced.begin(kept);
         let sums = kept.grow(self.stop, listener, |grown| {
             sums_until(&request, self.pixels, true, &enough, grown)
         });
-        kept.keep();
         let mean = match sums {
             Ok(sums) => sums.mean(),
             // The rows that are finished count.
@@ -218,6 +219,7 @@ impl LedgerStudy<'_> {
             1 => "one reflection".to_owned(),
             n => format!("{n} reflections"),
         };
+        self.traced.end();
         let chain = &mut lock(self.parts).chain;
         chain.links.push(Link::new("model", &from, "transport"));
         chain.pictures.push(ChainPicture { rgba: mean.rgba, own_error: mean.random_error });

@@ -13,6 +13,7 @@ use super::request::{ProbeRequest, ReferencePicture};
 use crate::error::Result;
 use crate::model::scene::Scene;
 use crate::reference::picture::{PathLimits, Pixels, Reference, ReferenceRequest, RenderStage};
+use crate::studies::kept_paths::Traced;
 use crate::studies::reference_cache::{self, CachedReference, Making};
 use crate::viewer::sync::lock;
 
@@ -189,7 +190,8 @@ impl Worker {
         let request = job.request.clone();
         let (kind, time_s, scene) = (request.kind, request.time_s, &job.scene);
         let (never, limits) = (AtomicBool::new(false), PathLimits::USUAL);
-        let how = Making { folder: self.cache_folder.as_deref(), limits, stop: &never };
+        let (folder, traced) = (self.cache_folder.as_deref(), &Traced::default());
+        let how = Making { folder, limits, stop: &never, traced };
         let CachedReference { reference, from_cache, .. } = self.pool.install(|| {
             let of = ReferenceRequest { kind, scene, time_s };
             reference_cache::reference(&of, &pixels, &how, &on_progress)

@@ -1,6 +1,6 @@
 //! Random paths are kept between runs: after Ctrl-C, after a kill, and where a reference is asked
-//! for again with a smaller error. What goes on from them has the bytes of a run that was never
-//! ended.
+//! for again with a smaller error. A run that goes on from them has the bytes of a run that was
+//! never ended.
 
 #[path = "harness/program.rs"]
 mod program;

@@ -1,5 +1,5 @@
-//! Random paths of a picture on disk, so that another run goes on from them: a more accurate
-//! reference refines what is there, and a run that was ended loses a few seconds.
+//! Random paths of a picture on disk, which another run goes on from. A more accurate reference
+//! refines what is there. A run that was ended loses a few seconds.
 //!
 //! The name of a file is the hash of everything that its paths depend on, but for their number. A
 //! study's pictures also have a file for each number that is a power of two: a reference may end
@@ -54,7 +54,7 @@ impl PathSums {
     }
 }
 
-/// What the disk has of a picture's paths.
+/// How many of a picture's paths are on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnDisk {
     /// Nothing.
@@ -117,7 +117,7 @@ impl KeptPaths {
     }
 
     /// Takes up the paths through the centres of a study's pixels: the first number that is
-    /// `enough`, else all, so that what is added ends as it would without a file.
+    /// `enough`, else all. What is added then ends as it would without a file.
     ///
     /// # Errors
     /// The frame cannot be computed.

@@ -1,5 +1,5 @@
-//! A cache of references on disk, by the hash of everything that they depend on. Those of random
-//! paths are refined, others are read back.
+//! A cache of references on disk, by the hash of everything that they depend on. A reference of
+//! random paths is refined, and any other is read back.
 
 use std::fs;
 use std::io::Write;

@@ -107,8 +107,8 @@ impl PairwiseSum {
         self.open.push(next);
     }
 
-    /// Takes the sums of neighbouring ranges, the first from sample 0 on; `None` unless each has a
-    /// power of two samples, less than the one before it, and all as many values.
+    /// Takes the sums of neighbouring ranges, the first from sample 0 on. `None` unless each has a
+    /// power of two samples, less than the one before it. All have as many values.
     pub fn of_parts(open: Vec<SampleSums>) -> Option<PairwiseSum> {
         let is_shorter = |pair: &[SampleSums]| {
             pair[1].n_samples < pair[0].n_samples && pair[1].values.len() == pair[0].values.len()

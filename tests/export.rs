@@ -83,6 +83,37 @@ fn an_export_has_the_mass_of_all_blobs() {
     assert!(run(&["export", &scene, "--mitsuba", &out, "--force", "-q"]).status.success());
 }
 
+/// Each spot throws its own picture.
+#[test]
+fn spots_throw_pictures() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let spot = |x: f64, outer: f64| {
+        format!(
+            "[[light]]\nkind = 'spot'\nposition = [{x}, 3.0, 0.0]\ndirection = [0.0, -1.0, 0.0]\n\
+             intensity = [1.0, 2.0, 3.0]\nouter_deg = {outer:?}\n"
+        )
+    };
+    let scene = scene(dir.path(), &(spot(0.5, 30.0) + &spot(-0.5, 40.0)));
+    let out = path(&dir, "out");
+    assert!(run(&["export", &scene, "--mitsuba", &out, "-q"]).status.success());
+    let text = std::fs::read_to_string(format!("{out}/scene.xml")).expect("a scene");
+    let xml = roxmltree::Document::parse(&text).expect("XML");
+    let spots: Vec<_> =
+        xml.descendants().filter(|node| node.attribute("type") == Some("spot")).collect();
+    assert_eq!(spots.len(), 2);
+    for (i, (spot, (x, outer))) in spots.iter().zip([("0.5", 30.0), ("-0.5", 40.0)]).enumerate() {
+        let named = |name: &str| {
+            let node = spot.descendants().find(|node| node.attribute("name") == Some(name));
+            node.and_then(|node| node.attribute("value")).expect("a value")
+        };
+        let place = spot.descendants().find_map(|node| node.attribute("origin")).expect("a place");
+        assert!(place.starts_with(&format!("{x}, 3")), "{place}");
+        assert!((named("cutoff_angle").parse::<f64>().expect("an angle") - outer).abs() < 1e-9);
+        assert_eq!((named("intensity"), named("filename")), ("1, 2, 3", &*format!("spot-{i}.exr")));
+        assert!(Path::new(&out).join(named("filename")).exists());
+    }
+}
+
 #[test]
 fn what_mitsuba_has_not_is_refused_and_nothing_written() {
     let dir = tempfile::tempdir().expect("a folder");
@@ -94,9 +125,9 @@ fn what_mitsuba_has_not_is_refused_and_nothing_written() {
         ("", "lighting.mode=\"none\"", "nothing is lit"),
         (
             "[[light]]\nkind = 'spot'\nposition = [0.0, 3.0, 0.0]\ndirection = [0.0, -1.0, 0.0]\n\
-             intensity = [1.0, 1.0, 1.0]\n",
+             intensity = [1.0, 1.0, 1.0]\nouter_deg = 85.0\n",
             "film.width=24",
-            "spot lights",
+            "spot lights so wide",
         ),
     ] {
         let scene = scene(dir.path(), more);

@@ -9,7 +9,9 @@ use super::args::ExportArgs;
 use super::progress::spinner;
 use super::scene::{check_time, load, print_sizes};
 use crate::error::{Error, Result};
-use crate::inspect::mitsuba::{ALBEDO, EXTINCTION, Exported, GROUND, SCENE, SKY_PICTURE, export};
+use crate::inspect::mitsuba::{
+    ALBEDO, EXTINCTION, Exported, GROUND, SCENE, SKY_PICTURE, export, spot_picture,
+};
 use crate::io::console::say;
 use crate::io::image::{self, ImageKind};
 use crate::io::result_folder::{Existing, ResultFolder};
@@ -34,6 +36,8 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         print_sizes(scene, None);
     }
     let planned = [SCENE, EXTINCTION, ALBEDO, SKY_PICTURE, GROUND, RECORD].map(str::to_owned);
+    let planned: Vec<String> =
+        planned.into_iter().chain((0..scene.lights.len()).map(spot_picture)).collect();
     let existing = Existing::new(args.force);
     let mut folder = ResultFolder::open(&args.mitsuba, "mitsuba", existing, &planned)?;
     let waiting = spinner("filling the grid", args.options.quiet);
@@ -58,7 +62,7 @@ fn write(
     film: &Film,
     exported: &Exported,
 ) -> Result<()> {
-    let Exported { scene, extinction, albedo, sky, ground, step } = exported;
+    let Exported { scene, extinction, albedo, sky, spots, ground, step } = exported;
     let bytes =
         |path: &Path, bytes: &[u8]| fs::write(path, bytes).map_err(|cause| Error::io(path, cause));
     folder.add(SCENE, |path| bytes(path, scene.as_bytes()))?;
@@ -67,9 +71,11 @@ fn write(
             folder.add(name, |path| bytes(path, &grid.bytes()))?;
         }
     }
-    if let Some(([width, height], rgba)) = sky {
+    let of_spots = spots.iter().enumerate().map(|(i, picture)| (spot_picture(i), picture));
+    let pictures = sky.iter().map(|picture| (SKY_PICTURE.to_owned(), picture)).chain(of_spots);
+    for (name, ([width, height], rgba)) in pictures {
         let picture = image::encoded(ImageKind::Exr, film, *width, *height, rgba)?;
-        folder.add(SKY_PICTURE, |path| bytes(path, &picture))?;
+        folder.add(&name, |path| bytes(path, &picture))?;
     }
     if let Some(ground) = ground {
         folder.add(GROUND, |path| bytes(path, ground.as_bytes()))?;

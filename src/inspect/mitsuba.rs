@@ -2,6 +2,7 @@
 //! (transport.md, "Another program").
 
 mod grid;
+mod spot;
 
 use std::fmt::Write;
 
@@ -15,6 +16,7 @@ use crate::reference::picture::TransportParts;
 
 pub use grid::Grid;
 use grid::{extinction, reach, usual_step};
+pub use spot::file_name as spot_picture;
 
 /// Columns and rows of the picture of the sky.
 const SKY: [u32; 2] = [512, 256];
@@ -41,6 +43,8 @@ pub struct Exported {
     pub albedo: Option<Grid>,
     /// The sky's picture: columns, rows, linear RGBA.
     pub sky: Option<([u32; 2], Vec<f32>)>,
+    /// The pictures that spots throw, alike.
+    pub spots: Vec<([u32; 2], Vec<f32>)>,
     /// The ground as PLY.
     pub ground: Option<String>,
     /// Width of a cell.
@@ -64,12 +68,13 @@ pub fn export(scene: &Scene, time_s: f64, step: Option<f64>, n_samples: u32) -> 
         None => (None, None),
     };
     let sky = sky(&parts.lights);
+    let spots = parts.lights.iter().filter_map(spot::picture).collect();
     let ground = (!parts.triangles.is_empty()).then(|| ply(&parts));
     let mut text = String::new();
     let files = (extinction.as_ref(), albedo.is_some(), sky.is_some());
     // Writing to a string cannot fail.
     let _ = scene_file(&mut text, scene, &parts, files, n_samples);
-    Ok(Exported { scene: text, extinction, albedo, sky, ground, step })
+    Ok(Exported { scene: text, extinction, albedo, sky, spots, ground, step })
 }
 
 /// Checks that Mitsuba has everything that the scene has.
@@ -77,8 +82,8 @@ fn check(parts: &TransportParts) -> Result<()> {
     let refused = |what: &str, expected: &str| {
         Err(Error::usage(format!("Mitsuba has no {what} as nimbus has; expected {expected}")))
     };
-    if parts.lights.iter().any(|light| matches!(light, Light::Spot { .. })) {
-        return refused("spot lights", "a scene without them");
+    if parts.lights.iter().any(spot::is_too_wide) {
+        return refused("spot lights so wide", "outer_deg of at most 80");
     }
     if parts.brdfs.iter().any(|brdf| brdf.ks != DVec3::ZERO) {
         return refused("lobes", "surfaces and ground of ks = [0, 0, 0]");
@@ -221,6 +226,7 @@ fn scene_file(
 }
 
 fn lights(text: &mut String, parts: &TransportParts, has_sky: bool) -> std::fmt::Result {
+    let mut n_spots = 0;
     for light in &parts.lights {
         let (kind, place, strength) = match light {
             Light::Directional { direction, irradiance } => {
@@ -229,8 +235,13 @@ fn lights(text: &mut String, parts: &TransportParts, has_sky: bool) -> std::fmt:
             Light::Point { position, intensity, .. } => {
                 ("point", ("point", "position", *position), ("intensity", *intensity))
             }
-            // The sky is the picture, and scenes with spots are refused.
-            Light::Spot { .. } | Light::Sky { .. } => continue,
+            Light::Spot { .. } => {
+                spot::emitter(text, light, n_spots)?;
+                n_spots += 1;
+                continue;
+            }
+            // All skies together are the picture below.
+            Light::Sky { .. } => continue,
         };
         let (tag, name, value) = place;
         writeln!(

@@ -3,6 +3,7 @@
 
 mod grid;
 mod spot;
+mod vector;
 
 use std::fmt::Write;
 
@@ -17,6 +18,7 @@ use crate::reference::picture::TransportParts;
 pub use grid::Grid;
 use grid::{extinction, reach, usual_step};
 pub use spot::file_name as spot_picture;
+use vector::list;
 
 /// Columns and rows of the picture of the sky.
 const SKY: [u32; 2] = [512, 256];
@@ -128,10 +130,6 @@ fn ply(parts: &TransportParts) -> String {
         let _ = writeln!(text, "3 {} {} {}", 3 * i, 3 * i + 1, 3 * i + 2);
     }
     text
-}
-
-fn list(v: DVec3) -> String {
-    format!("{}, {}, {}", v.x, v.y, v.z)
 }
 
 /// Writes the scene file.

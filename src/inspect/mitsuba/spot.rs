@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use glam::DVec3;
 
-use super::list;
+use super::vector::list;
 use crate::model::light::{Light, MIN_PENUMBRA};
 
 /// Columns and rows of the picture, which Mitsuba interpolates.

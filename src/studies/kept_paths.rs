@@ -117,7 +117,7 @@ impl KeptPaths {
     }
 
     /// Takes up the paths through the centres of a study's pixels: the first number that is
-    /// `enough`, else all. What is added then ends as it would without a file.
+    /// `enough`, else all. Paths that are added then end as they would without a file.
     ///
     /// # Errors
     /// The frame cannot be computed.

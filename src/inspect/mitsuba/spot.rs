@@ -76,8 +76,7 @@ pub(super) fn emitter(text: &mut String, light: &Light, i: usize) -> std::fmt::R
 mod tests {
     use super::*;
 
-    /// What the picture throws on a plane one unit away, by a line of sight through each of its
-    /// pixels, is the light that arrives there.
+    /// The light that the picture throws on a plane one unit away is the light that arrives there.
     #[test]
     fn the_picture_has_the_light_of_the_spot() {
         for (inner, outer) in [(0.0, 45.0), (20.0, 30.0), (10.0, 80.0)].map(|(a, b)| {

@@ -12,9 +12,20 @@
 // the clouds' share of it where the second reflection needs it.
 // Law: V = [nothing hides] e^{-(1-g) tau}, tau by midpoint samples of trilinear density.
 // Bound: of the march's sum, passes.md "sums"; IN_PLANE for the surfaces.
+// DEPTHS: tau instead of V, for clouds as a medium.
 
 // 1: the clouds' transmittance is also stored by itself.
 layout(constant_id = 0) const uint APART = 0;
+
+#ifndef DEPTHS
+#define DEPTHS 0
+#endif
+// What a way has that a surface bars, or that leads to a light without energy.
+#if DEPTHS
+const float BARRED = 1e30;
+#else
+const float BARRED = 0.0;
+#endif
 
 layout(push_constant) uniform Push {
     Grid grid;
@@ -24,6 +35,8 @@ layout(push_constant) uniform Push {
     float step_length;
     float backward;
     uint max_steps;
+    // The first so many facets receive the sky through the clouds.
+    uint n_under_sky;
 } push;
 READS(0, Facet, facets)
 READS(1, Light, lights)
@@ -39,6 +52,7 @@ WRITES(5, float, through)
 #define DEEP DOUBLE
 #include "density.glsl"
 #include "reach.glsl"
+#include "march.glsl"
 
 // The direction toward a light, and its distance.
 struct LightPath {
@@ -58,45 +72,21 @@ LightPath light_path(Light light, vec3 p) {
     return LightPath(PLACE(a.toward), a.distance);
 }
 
-// Returns where the ray from p along d enters and leaves the grid's box; the end is before the
-// beginning where the ray misses the box.
-WEIGHTS2 crossing(PLACE p, PLACE d, WEIGHT distance) {
-    PLACE low = push.grid.low;
-    PLACE high = low + cell_edges() * PLACE(push.grid.n_cells);
-    WEIGHT enter = 0.0, leave = distance;
-    for (int axis = 0; axis < 3; ++axis) {
-        if (d[axis] != 0.0) {
-            WEIGHT a = (low[axis] - p[axis]) / d[axis], b = (high[axis] - p[axis]) / d[axis];
-            enter = max(enter, min(a, b));
-            leave = min(leave, max(a, b));
-        } else if (p[axis] < low[axis] || p[axis] > high[axis]) {
-            leave = -1.0;
-        }
-    }
-    return WEIGHTS2(enter, leave);
+// Returns (1-g)tau from p to the light; with DEPTHS tau itself.
+float depth_to(PLACE p, LightPath way) {
+    // There is no march without losses.
+    WEIGHT tau = depth_along(p, way.toward, way.distance, push.backward > 0.0);
+    return float(push.backward * tau);
 }
 
-// Returns e^-(1-g)tau from p to the light.
-float through_the_cloud(PLACE p, LightPath direction) {
-    PLACE d = direction.toward;
-    WEIGHTS2 part = crossing(p, d, direction.distance);
-    WEIGHT length_total = part.y - part.x;
-    // There is nothing to march for without losses, or where the ray misses the box.
-    bool is_marched = push.backward > 0.0 && length_total > 0.0;
-    // Cubes take the step as it is: a unit vector's length is 1 but for its rounding.
-    WEIGHT step_length =
-        push.grid.aspect == 1.0 ? WEIGHT(push.step_length) : push.step_length / in_widths(d);
-    uint n = is_marched ? clamp(uint(ceil(length_total / step_length)), 1u, push.max_steps) : 0u;
-    SUM1 tau = EMPTY1;
-    for (uint j = 0; j < n; ++j) {
-        WEIGHT t0 = WEIGHT(j) * step_length;
-        WEIGHT ds = min(step_length, length_total - t0);
-        ADD(tau, density_at(p + (part.x + (t0 + 0.5 * ds)) * d) * ds);
-    }
-    // Vulkan's exp(0) may be three ulp off 1, and an empty path must give exactly 1. There is no
-    // exp of doubles.
-    float depth = float(push.backward * TOTAL(tau));
+// Returns what arrives through the cloud. Vulkan's exp(0) may be three ulp off 1, and an empty path
+// must give exactly 1. There is no exp of doubles.
+float arriving(float depth) {
+#if DEPTHS
+    return depth;
+#else
     return depth > 0.0 ? exp(-depth) : 1.0;
+#endif
 }
 
 void main() {
@@ -104,14 +94,17 @@ void main() {
         Facet facet = facets[k / push.n_lights];
         Light light = lights[k % push.n_lights];
         // A light without energy is multiplied by 0 later.
-        bool is_on = any(notEqual(light.energy, vec3(0.0)));
+        bool is_on = any(notEqual(light.energy, vec3(0.0)))
+                     && (light.kind != LIGHT_SKY || k / push.n_lights < push.n_under_sky);
         bool is_center_clear =
             is_on && is_clear(facet.position, light, facet.i_region, push.n_surfaces);
         // Part of a surface's facet may be lit though its centre is hidden.
         float dimmed = is_center_clear || (APART != 0 && is_on)
-                           ? through_the_cloud(facet.position, light_path(light, facet.position))
-                           : 0.0;
-        transmittance[k] = is_center_clear ? dimmed : 0.0;
+                           ? arriving(
+                                 depth_to(facet.position, light_path(light, facet.position))
+                             )
+                           : BARRED;
+        transmittance[k] = is_center_clear ? dimmed : BARRED;
         if (APART != 0) {
             through[k] = dimmed;
         }

@@ -19,7 +19,7 @@ use bounded::greatest_ratio;
 use glam::DVec3;
 use harness::{Gpu, assert_within};
 use nimbus::model::light::Light;
-use nimbus::passes::transmit::Transmit;
+use nimbus::passes::transmit::{Arriving, Transmit};
 use sums::PLAIN;
 use ways::{Case, case, case_of_cells, in_cloud, room, sun};
 
@@ -104,7 +104,7 @@ fn rectangles_hide_and_marches_begin_and_end_where_the_way_does() {
 fn by_itself_the_transmittance_is_the_same() {
     let mut gpu = Gpu::new();
     let case = room();
-    let pass = Transmit::new(&gpu.device, &gpu.compiler, false, &PLAIN.into()).expect("transmit");
+    let pass = Transmit::new(&gpu.device, &gpu.compiler, Arriving::Share, &PLAIN.into()).expect("transmit");
     let none = gpu.buffer::<f32>(0);
     let alone = case.dispatch(&mut gpu, &pass, &none, [1.0, 0.5]);
     assert_eq!(alone, case.run(&mut gpu, None, 1.0, 0.5)[0]);

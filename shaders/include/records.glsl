@@ -195,6 +195,18 @@ struct Light {
     float cone_offset;
     vec2 unused;
 };
+struct Medium {
+    vec3 reflected;
+    uint is_given;
+    float g;
+    float straight;
+    float lobe;
+    float mean;
+    float draine_lobe;
+    float draine_alpha;
+    float draine_share;
+    uint unused;
+};
 struct Grid {
     vec3 low;
     float cell;

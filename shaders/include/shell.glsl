@@ -20,6 +20,11 @@ WRITES(5, Facet, facets)
 #define ELLIPSOIDS 0
 #endif
 
+// 0: facets lie at the blobs' centres, where clouds are a medium. Their normals are up.
+#ifndef SHELL
+#define SHELL 1
+#endif
+
 const float SHELL_SIGMA = 1.5;
 // Radius of the quadrature's sphere: 14 points at sqrt(5) s integrate a Gaussian of standard
 // deviation s, here 2 sigma, to degree 5.
@@ -38,6 +43,9 @@ vec3 unit_or(vec3 v, vec3 otherwise) {
 // Returns the unit normal against the gradient of the density smoothed to 2 scale where that is
 // well conditioned, else away from the cloud's centre.
 vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
+#if !SHELL
+    return vec3(0.0, 1.0, 0.0);
+#endif
     vec3 axes = vec3(1.0, ELLIPSOIDS != 0 ? aspect : 1.0, 1.0);
     vec3 gradient = vec3(0.0);
     float sum = 0.0;
@@ -69,7 +77,9 @@ vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
 
 // Returns the place where the shell of a blob about p has the normal n.
 vec3 shell_at(vec3 p, float scale, float aspect, vec3 n) {
-#if ELLIPSOIDS
+#if !SHELL
+    return p;
+#elif ELLIPSOIDS
     vec3 to = vec3(n.x, aspect * aspect * n.y, n.z);
     return p + SHELL_SIGMA * scale / sqrt(dot(n, to)) * to;
 #else

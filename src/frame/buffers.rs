@@ -1,6 +1,6 @@
 //! The buffers that passes share.
 
-use super::features::{has_second, is_grouped, is_lit};
+use super::features::{has_diffusion, has_second, is_grouped, is_lit, is_medium};
 use super::packet::Packet;
 use super::staging::StagedBuffer;
 use crate::error::Result;
@@ -8,13 +8,17 @@ use crate::gpu::{Buffer, Recorder, buffers};
 use crate::layout::cull::KeptRecord;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
+use crate::layout::medium::MediumRecord;
 use crate::layout::particle::{
     BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, TexturedRecord,
 };
 use crate::model::basis::N_NODES;
+use crate::model::cloud::{Cloud, CloudSource};
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
+use crate::model::material::Material;
 use crate::model::scene::Scene;
 use crate::passes::blobs::BlobBuffers;
+use crate::passes::diffusion::Room;
 use crate::passes::texture::POOL_TEXELS;
 
 buffers! {
@@ -46,6 +50,12 @@ buffers! {
         transmittance: Buffer => f32, n_pairs(scene), "transmit.transmittance";
         /// Transmittance of the clouds alone, for the second reflection.
         through: Buffer => f32, n_if(has_second(scene), n_pairs(scene)), "transmit.through";
+        /// What scatters in each cloud, where clouds are a medium.
+        media: StagedBuffer => MediumRecord,
+            n_if(is_medium(scene), scene.clouds.len() as u64), "scatter.media";
+        /// Fluence and flux of diffuse light by cell.
+        field: Buffer => [[f32; 4]; 4], n_if(has_diffusion(scene), n_cells(scene)),
+            "diffusion.field";
         regions: StagedBuffer => RegionRecord, scene.n_regions() as u64, "first.regions", Texels;
         /// Lobes by material, then the vectors of the basis, N_NODES numbers each.
         table: StagedBuffer => f32, n_table_rows(scene) * N_NODES as u64, "first.table", Floats;
@@ -73,13 +83,14 @@ impl SceneBuffers {
         self.modes.write(slot, &packet.modes)?;
         self.table.write(slot, &packet.table)?;
         self.regions.write(slot, &packet.regions)?;
+        self.media.write(slot, &packet.media)?;
         self.lights.write(slot, &packet.lights)
     }
 
     /// Copies the staged data to where shaders read it.
     pub fn record_copies(&self, rec: &mut Recorder<'_>, slot: usize) {
-        let SceneBuffers { groups, drawn, modes, table, regions, lights, .. } = self;
-        for staged in [groups, drawn, modes, table, regions, lights] {
+        let SceneBuffers { groups, drawn, modes, table, media, regions, lights, .. } = self;
+        for staged in [groups, drawn, modes, table, media, regions, lights] {
             staged.record_copy(rec, slot);
         }
     }
@@ -121,6 +132,21 @@ fn n_table_rows(scene: &Scene) -> u64 {
 /// Returns the most cells that the density grid has at any time; 0 if nothing is lit.
 pub fn n_cells(scene: &Scene) -> u64 {
     if is_lit(scene) { n_cells_max(scene) } else { 0 }
+}
+
+/// Returns the room that the diffusion of light takes; `None` without.
+pub(super) fn diffusion_room(scene: &Scene) -> Option<Room> {
+    let grey = |v: glam::DVec3| v.x == v.y && v.y == v.z;
+    let is_grey = |m: &Material| {
+        grey(m.scattering.albedo.unwrap_or_default()) && m.keys.iter().all(|k| grey(k.brdf.kd))
+    };
+    let has_colors = |c: &Cloud| match &c.source {
+        CloudSource::Particles(list) => list.iter().any(|p| !grey(p.color)),
+        _ => false,
+    };
+    let plain = |c: &Cloud| is_grey(&scene.materials[c.i_material]) && !has_colors(c);
+    let n_sets = if scene.clouds.iter().all(plain) { 1 } else { 3 };
+    has_diffusion(scene).then(|| Room::new(n_cells(scene), n_sets))
 }
 
 /// Returns the most cells of a density grid at any time. Clouds that drift apart or grow change its

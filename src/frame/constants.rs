@@ -1,11 +1,12 @@
 //! The numbers of a scene that passes take as arguments. They are constant over a run.
 
-use super::features::{saturation_bound, target_format};
+use super::features::{has_diffusion, is_medium, saturation_bound, target_format};
 use super::packet::Packet;
 use crate::gpu::TargetFormat;
 use crate::layout::frame::CameraRecord;
 use crate::model::edge::Edge;
-use crate::model::scene::{Overlap, Scene};
+use crate::model::medium;
+use crate::model::scene::{Octaves, Overlap, Scene};
 use crate::passes::blobs::BlobView;
 use crate::passes::transmit::MarchParams;
 
@@ -17,6 +18,14 @@ pub(super) struct FrameConstants {
     pub n_solid_facets: u32,
     pub n_regions: u32,
     pub march: MarchParams,
+    /// Surfaces and terrains.
+    pub n_solids: u32,
+    /// g of the ways to surfaces and terrains, where clouds are a medium.
+    pub forward: f64,
+    /// Terms of the light that a medium scatters once.
+    pub terms: Octaves,
+    /// Cycles of the diffusion solver.
+    pub n_cycles: u32,
     pub texture_seed: u32,
     pub edge: Edge,
     /// Blobs are composed by slices.
@@ -43,8 +52,22 @@ impl FrameConstants {
                 n_surfaces: scene.surfaces.len() as u32,
                 step_cells: scene.lighting.step,
                 // Without particles there is nothing to march through.
-                forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
+                forward: match is_medium(scene) {
+                    _ if n_particles == 0 => 1.0,
+                    // The ways' whole depth.
+                    true => 0.0,
+                    false => scene.lighting.forward,
+                },
+                // Diffusion brings the sky into the clouds.
+                n_under_sky: match has_diffusion(scene) {
+                    true => scene.n_solid_facets() as u32,
+                    false => scene.n_facets() as u32,
+                },
             },
+            n_solids: scene.n_solids() as u32,
+            forward: scene.lighting.forward,
+            terms: medium::terms(&scene.lighting),
+            n_cycles: scene.lighting.diffusion.cycles,
             texture_seed: scene.draw.texture_seed,
             edge: scene.draw.edge(),
             slices: scene.draw.overlap == Overlap::Slices,

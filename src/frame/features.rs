@@ -27,6 +27,10 @@ pub struct SceneFeatures {
     pub is_lit: bool,
     /// `lighting.mode` is "two-reflection".
     pub has_second: bool,
+    /// Clouds are a medium.
+    pub is_medium: bool,
+    /// `lighting.mode` is "diffusion".
+    pub has_diffusion: bool,
     /// Facets stand for several particles.
     pub is_grouped: bool,
     /// Some cloud has a texture.
@@ -35,7 +39,8 @@ pub struct SceneFeatures {
     pub n_surfaces: u32,
     /// Number of terrains.
     pub n_terrains: u32,
-    /// Some region has a specular lobe, so that its radiance depends on the eye.
+    /// Some region has a specular lobe or a phase function, so that its radiance depends on the
+    /// eye.
     pub is_glossy: bool,
     /// Whether light tensors are kept.
     pub tensors: Tensors,
@@ -78,11 +83,13 @@ impl SceneFeatures {
             n_facets: scene.n_facets() as u32,
             is_lit: is_lit(scene),
             has_second: has_second(scene),
+            is_medium: is_medium(scene),
+            has_diffusion: has_diffusion(scene),
             is_grouped: is_grouped(scene),
             is_textured: scene.is_textured(),
             n_surfaces: scene.surfaces.len() as u32,
             n_terrains: scene.terrains.len() as u32,
-            is_glossy: has_glossy(scene),
+            is_glossy: has_glossy(scene) || is_medium(scene),
             tensors,
             has_impostors: has_impostors(scene),
             culls: culls(scene),
@@ -101,6 +108,16 @@ pub fn is_lit(scene: &Scene) -> bool {
 /// Returns whether the scene has a second reflection.
 pub fn has_second(scene: &Scene) -> bool {
     scene.lighting.mode == LightingMode::TwoReflection
+}
+
+/// Returns whether clouds are a medium.
+pub fn is_medium(scene: &Scene) -> bool {
+    scene.lighting.mode.is_medium()
+}
+
+/// Returns whether light diffuses on the density grid.
+pub fn has_diffusion(scene: &Scene) -> bool {
+    scene.lighting.mode == LightingMode::Diffusion
 }
 
 /// Returns whether lit facets stand for several particles.

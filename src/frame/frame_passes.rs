@@ -1,9 +1,9 @@
 //! The passes of a scene's frames and the buffers that they share.
 
-use super::buffers::{SceneBuffers, n_cells};
+use super::buffers::{SceneBuffers, diffusion_room, n_cells};
 use super::constants::FrameConstants;
 use super::culling::Culling;
-use super::features::{SceneFeatures, has_second, is_grouped};
+use super::features::{SceneFeatures, has_diffusion, has_second, is_grouped, is_medium};
 use super::gather::IndirectGather;
 use super::live::{LiveParticles, PlacedUploads};
 use super::morton_sort::FacetRuns;
@@ -14,14 +14,16 @@ use super::tensors::LightTensors;
 use crate::error::Result;
 use crate::gpu::{Commands, Compiler, Device};
 use crate::model::scene::{Scene, Simulate};
+use crate::passes::diffusion::Diffusion;
 use crate::passes::facets::Facets;
 use crate::passes::first::First;
 use crate::passes::generate::Generate;
 use crate::passes::grid::Grid;
 use crate::passes::place::Place;
+use crate::passes::scatter::Scatter;
 use crate::passes::sort::Sort;
 use crate::passes::texture::Texture;
-use crate::passes::transmit::Transmit;
+use crate::passes::transmit::{Arriving, Transmit};
 
 /// The pipelines and buffers of a scene's frames. A pass that the scene does not need is `None`.
 pub(super) struct FramePasses {
@@ -35,6 +37,8 @@ pub(super) struct FramePasses {
     pub facets: Facets,
     pub transmit: Transmit,
     pub first: First,
+    pub diffusion: Option<Diffusion>,
+    pub scatter: Option<Scatter>,
     pub gather: Option<IndirectGather>,
     pub tensors: Option<LightTensors>,
     pub culling: Option<Culling>,
@@ -44,6 +48,17 @@ pub(super) struct FramePasses {
     pub picture: Picture,
     pub constants: FrameConstants,
     pub features: SceneFeatures,
+}
+
+/// Returns what the march toward the lights writes.
+fn arriving(scene: &Scene) -> Arriving {
+    if is_medium(scene) {
+        Arriving::Depth
+    } else if has_second(scene) {
+        Arriving::ShareAndClouds
+    } else {
+        Arriving::Share
+    }
 }
 
 impl FramePasses {
@@ -76,9 +91,15 @@ impl FramePasses {
                 .transpose()?,
             grid: Grid::new(device, compiler, n_cells(scene))?,
             runs,
-            facets: Facets::new(device, compiler, scene.has_ellipsoids())?,
-            transmit: Transmit::new(device, compiler, has_second(scene), &sums)?,
+            facets: Facets::new(device, compiler, scene.has_ellipsoids(), is_medium(scene))?,
+            transmit: Transmit::new(device, compiler, arriving(scene), &sums)?,
             first: First::new(device, compiler)?,
+            diffusion: diffusion_room(scene)
+                .map(|room| Diffusion::new(device, compiler, room))
+                .transpose()?,
+            scatter: is_medium(scene)
+                .then(|| Scatter::new(device, compiler, has_diffusion(scene)))
+                .transpose()?,
             gather,
             tensors,
             culling: Culling::new(device, compiler, scene)?,

@@ -63,7 +63,9 @@ pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
             counted(unresolved.len(), "facet")
         ));
     }
-    if let Some(time_s) = stage.renderer.last_time_s() {
+    // A medium has depths in place of transmittances, and no facets that face away.
+    let last = stage.renderer.last_time_s().filter(|_| !stage.scene.lighting.mode.is_medium());
+    if let Some(time_s) = last {
         let origin = FrameState::at(&stage.scene, &stage.scene.groups(), time_s)?.light_origin;
         let at = |light: &Light| light.relative_to(origin);
         let lights: Vec<Light> = stage.scene.lights.iter().map(at).collect();

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::buffers::{SceneBuffers, n_cells};
+use super::buffers::{SceneBuffers, diffusion_room, n_cells};
 use super::culling::Culling;
 use super::features::{has_second, is_grouped, is_lit};
 use super::gather::IndirectGather;
@@ -19,7 +19,7 @@ use crate::model::scene::{Draw, Scene};
 use crate::model::sums::Precision;
 use crate::model::terrain::Terrain;
 use crate::passes::second::MIN_BLOCK;
-use crate::passes::{grid, sort, texture};
+use crate::passes::{diffusion, grid, sort, texture};
 
 /// Most pixels of a picture: 8192 x 4096. Reading one back takes 20 bytes a pixel on the host.
 const MOST_DRAWN_PIXELS: u64 = 1 << 25;
@@ -86,6 +86,7 @@ fn specs(scene: &Scene) -> Vec<BufferSpec> {
         SceneBuffers::specs(&exact),
         live::specs(&exact),
         grid::Scratch::specs(n_cells(&exact)),
+        diffusion_room(&exact).map_or(vec![], diffusion::Scratch::specs),
         when(is_grouped(&exact), FacetRuns::specs),
         when(has_second(&exact), IndirectGather::specs),
         Culling::specs(&exact),

@@ -7,8 +7,10 @@ use std::time::Instant;
 use crate::layout::disc::DiscRecord;
 use crate::layout::facet::{RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
+use crate::layout::medium::MediumRecord;
 use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::passes::blobs::Extent;
+use crate::passes::diffusion::DiffusionParams;
 
 /// The state of a scene at a frame's time.
 #[derive(Debug, Clone)]
@@ -41,6 +43,10 @@ pub struct Packet {
     pub bounds: Vec<RegionBoundsRecord>,
     /// Surfaces, terrains and clouds with their materials.
     pub regions: Vec<RegionRecord>,
+    /// What scatters in each cloud; empty unless clouds are a medium.
+    pub media: Vec<MediumRecord>,
+    /// Numbers of the diffusion of light; `None` without.
+    pub diffusion: Option<DiffusionParams>,
     /// The lobe of every material in the basis, then the basis' vectors; N_NODES numbers each.
     pub table: Arc<Vec<f32>>,
     /// C of every column of the tensors; empty if no material is edited.

@@ -16,14 +16,16 @@ use crate::model::boxes::MAX_ATTEMPTS;
 use crate::passes::blobs::{BlobBuffers, BlobCount};
 use crate::passes::contract::ContractBuffers;
 use crate::passes::cull::{CullBuffers, Order};
+use crate::passes::diffusion::{DiffusionBuffers, DiffusionWork};
 use crate::passes::facets;
 use crate::passes::first::{self, FirstBuffers};
 use crate::passes::morton;
 use crate::passes::place::PlaceBuffers;
+use crate::passes::scatter::{ScatterBuffers, ScatterParams};
 use crate::passes::second::{MergePush, SourcesPush};
 use crate::passes::sort::{Count, TILE};
 use crate::passes::tiles::BLOCK;
-use crate::passes::transmit::TransmitBuffers;
+use crate::passes::transmit::{MAX_STEPS, TransmitBuffers};
 
 /// Records a pass under its timer label if the plan runs it.
 fn pass(
@@ -184,6 +186,7 @@ impl FramePasses {
             let (eye, n_facets) = (packet.camera.eye, c.march.n_facets);
             first.record(rec, &buffers, &first::Push { eye, n_facets, n_lights: c.march.n_lights })
         })?;
+        self.record_medium(rec, packet, plan)?;
         pass(rec, plan, Pass::Second, |rec| self.record_second(rec, packet, plan))?;
         pass(rec, plan, Pass::Contract, |rec| {
             let Some(tensors) = tensors else { return Ok(()) };
@@ -191,6 +194,43 @@ impl FramePasses {
             let buffers =
                 ContractBuffers { facets, lights, regions, coefficients, t1, t2, spans, lit };
             tensors.contract.record(rec, &buffers, &tensors.contract_push(c))
+        })
+    }
+
+    /// Lights clouds as a medium.
+    fn record_medium(&self, rec: &mut Recorder<'_>, packet: &Packet, plan: &Plan) -> Result<()> {
+        let FramePasses { diffusion, scatter, constants: c, .. } = self;
+        let SceneBuffers {
+            facets, lights, regions, density, transmittance, table, lit, media, field, ..
+        } = &self.buffers;
+        pass(rec, plan, Pass::Diffusion, |rec| {
+            let (Some(diffusion), Some(params)) = (diffusion, &packet.diffusion) else {
+                return Ok(());
+            };
+            let buffers = DiffusionBuffers { lights, regions, density, field };
+            let work = DiffusionWork {
+                n_lights: c.march.n_lights,
+                n_surfaces: c.march.n_surfaces,
+                step_cells: c.march.step_cells,
+                max_steps: MAX_STEPS,
+                n_cycles: c.n_cycles,
+            };
+            diffusion.record(rec, &buffers, &packet.grid, params, &work)
+        })?;
+        pass(rec, plan, Pass::Scatter, |rec| {
+            let Some(scatter) = scatter else { return Ok(()) };
+            let depths = transmittance;
+            let buffers =
+                ScatterBuffers { facets, lights, depths, regions, table, lit, media, field };
+            let of = ScatterParams {
+                eye: packet.camera.eye,
+                n_facets: c.march.n_facets,
+                n_lights: c.march.n_lights,
+                n_solids: c.n_solids,
+                forward: c.forward,
+                terms: c.terms,
+            };
+            scatter.record(rec, &buffers, &packet.grid, &of)
         })
     }
 

@@ -1,7 +1,7 @@
 //! The layout of the light tensors T1 and T2 of a scene whose materials are edited
 //! (passes.md "contract").
 
-use super::features::{Tensors, has_glossy, has_second, is_glossy, is_lit, region_sizes};
+use super::features::{Tensors, has_glossy, has_second, is_glossy, is_lit, is_medium, region_sizes};
 use super::gather_lists::region_pairings;
 use crate::gpu::Limits;
 use crate::layout::facet::{REGION_CLOUD, REGION_COLORED, REGION_SURFACE, REGION_TERRAIN};
@@ -17,9 +17,10 @@ pub fn basis_of(scene: &Scene) -> Option<Basis> {
     (has_glossy(scene) && is_lit(scene)).then(|| Basis::new(l.exponents, l.bases, l.sampling))
 }
 
-/// Returns whether materials of a lit scene are edited, so that tensors are of use.
+/// Returns whether materials of facets that reflect are edited, so that tensors are of use.
 pub fn is_edited(scene: &Scene) -> bool {
-    is_lit(scene) && (0..scene.n_regions()).any(|i| scene.region_material(i).is_edited())
+    let reflects = is_lit(scene) && !is_medium(scene);
+    reflects && (0..scene.n_regions()).any(|i| scene.region_material(i).is_edited())
 }
 
 /// Returns the region's kind in its record.

@@ -5,6 +5,7 @@ pub mod cull;
 pub mod disc;
 pub mod facet;
 pub mod frame;
+pub mod medium;
 pub mod particle;
 pub mod roof;
 pub mod second;

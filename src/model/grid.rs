@@ -74,15 +74,67 @@ impl GridSpec {
         self.cell.powi(3) * self.aspect
     }
 
+    /// Returns the centre of cell `c`.
+    pub fn center(&self, c: usize) -> DVec3 {
+        let n = self.n_cells.as_usizevec3();
+        let at = DVec3::new(
+            (c % n.x) as f64,
+            (c / n.x % n.y) as f64,
+            (c / (n.x * n.y)) as f64,
+        );
+        self.low + self.edges() * (at + 0.5)
+    }
+
+    /// Returns 1 over the mean chord 4V/A of the box.
+    pub fn inverse_chord(&self) -> f64 {
+        0.5 * (self.high() - self.low).recip().element_sum()
+    }
+
     /// Returns how many cell widths a step of `d` passes: |d|/cell where cells are cubes.
     pub fn cells_along(&self, d: DVec3) -> f64 {
         (d / self.edges()).length()
     }
 }
 
+/// Number of cells at which a grid is coarse enough to be solved by sweeps alone.
+pub const COARSEST_CELLS: u32 = 64;
+
+/// Returns the next coarser grid of `n` cells with the given edges, and the axes along which pairs
+/// of its cells are merged: those along which cells are short. `None` for the coarsest.
+pub fn coarser(n: UVec3, edges: DVec3) -> Option<(UVec3, [bool; 3])> {
+    if n.element_product() <= COARSEST_CELLS {
+        return None;
+    }
+    let long = |axis: usize| n[axis] > 1;
+    let least = (0..3).filter(|a| long(*a)).map(|a| edges[a]).fold(f64::INFINITY, f64::min);
+    let halved = [0, 1, 2].map(|axis| long(axis) && edges[axis] < 1.5 * least);
+    let of = |axis: usize| if halved[axis] { n[axis].div_ceil(2) } else { n[axis] };
+    Some((UVec3::new(of(0), of(1), of(2)), halved))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn flat_cells_are_merged_across_first() {
+        let n = UVec3::new(16, 9, 16);
+        let (halved, axes) = coarser(n, DVec3::new(1.0, 0.2, 1.0)).expect("more than 64 cells");
+        assert_eq!((halved, axes), (UVec3::new(16, 5, 16), [false, true, false]));
+        let (next, axes) = coarser(halved, DVec3::new(1.0, 0.8, 1.0)).expect("more than 64");
+        assert_eq!((next, axes), (UVec3::new(8, 3, 8), [true; 3]));
+        // Along an axis of one cell nothing is merged, however short the cell is.
+        let (next, _) = coarser(UVec3::new(65, 1, 1), DVec3::new(1.0, 0.1, 0.1)).expect("65");
+        assert_eq!(next, UVec3::new(33, 1, 1));
+        assert_eq!(coarser(UVec3::new(4, 4, 4), DVec3::ONE), None);
+    }
+
+    #[test]
+    fn the_mean_chord_of_a_cube_is_two_thirds_of_its_edge() {
+        let cube = GridSpec { n_cells: UVec3::splat(3), cell: 2.0, aspect: 1.0, low: DVec3::ZERO };
+        assert!((cube.inverse_chord() - 0.25).abs() < 1e-15);
+        assert_eq!(cube.center(1 + 3 * (2 + 3)), DVec3::new(3.0, 5.0, 3.0));
+    }
 
     #[test]
     fn the_grid_covers_its_bounds_with_the_margin() {

@@ -5,14 +5,36 @@ use super::named::named;
 use super::sums::Sums;
 
 named! {
-    /// Reflections that are computed.
+    /// How light is computed.
     pub enum LightingMode {
-        /// None: particles show their own colours.
+        /// Not at all: particles show their own colours.
         None = "none",
         /// The first reflection, C (15).
         First = "first",
         /// The first and the second reflection, C (15) and (16).
         TwoReflection = "two-reflection",
+        /// Clouds as a medium that scatters light once.
+        Single = "single",
+        /// Once, in the medium that scatters alike without forward scattering.
+        Similarity = "similarity",
+        /// Once, in octaves of ever thinner media.
+        Octaves = "octaves",
+        /// Once, and all further scatterings by diffusion.
+        Diffusion = "diffusion",
+    }
+}
+
+impl LightingMode {
+    /// Returns whether clouds are a medium that scatters (model.md §18), and not facets that
+    /// reflect.
+    pub fn is_medium(self) -> bool {
+        match self {
+            LightingMode::None | LightingMode::First | LightingMode::TwoReflection => false,
+            LightingMode::Single
+            | LightingMode::Similarity
+            | LightingMode::Octaves
+            | LightingMode::Diffusion => true,
+        }
     }
 }
 
@@ -28,10 +50,30 @@ named! {
     }
 }
 
+/// The terms of "octaves" (model.md §18).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Octaves {
+    /// n: number of terms.
+    pub n: u32,
+    /// a: light of a term over that of the term before.
+    pub light: f64,
+    /// b: optical depth, alike.
+    pub depth: f64,
+    /// c: mean cosine of the phase function, alike.
+    pub phase: f64,
+}
+
+/// Settings of "diffusion" (model.md §18).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DiffusionSettings {
+    /// Cycles of the multigrid solver.
+    pub cycles: u32,
+}
+
 /// Lighting settings of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lighting {
-    /// Reflections that are computed.
+    /// How light is computed.
     pub mode: LightingMode,
     /// Number of cells along the density grid's longest axis.
     pub grid: u32,
@@ -57,7 +99,17 @@ pub struct Lighting {
     pub sums: Sums,
     /// Angular radius of directional lights in the reference "transport", radians.
     pub sun_radius: f64,
+    /// Terms of "octaves".
+    pub octaves: Octaves,
+    /// Settings of "diffusion".
+    pub diffusion: DiffusionSettings,
 }
+
+/// Greatest number of octaves.
+pub const MAX_OCTAVES: u32 = 16;
+
+/// Greatest number of cycles of the multigrid solver: what is left is rounding.
+pub const MAX_CYCLES: u32 = 32;
 
 /// Greatest number of divisions of an emitter: it is 2¹⁶ times smaller then.
 pub const MAX_PAIR_LEVELS: u32 = 16;

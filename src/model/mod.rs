@@ -26,6 +26,7 @@ pub mod layers;
 pub mod light;
 mod lighting;
 pub mod material;
+pub mod medium;
 pub mod moisture;
 mod named;
 pub mod overlap;

@@ -95,6 +95,17 @@ impl Phase {
         }
     }
 
+    /// Returns the function with its mean cosines multiplied by `c` in [0, 1].
+    pub fn flattened(&self, c: f64) -> Phase {
+        match *self {
+            Phase::HenyeyGreenstein { g } => Phase::HenyeyGreenstein { g: c * g },
+            Phase::Droplets { mixture: m } => {
+                let mixture = Mixture { g: c * m.g, g_draine: c * m.g_draine, ..m };
+                Phase::Droplets { mixture }
+            }
+        }
+    }
+
     /// Draws a cosine with the density 2π p. `uniform` returns independent numbers in (0, 1).
     pub fn sample(&self, mut uniform: impl FnMut() -> f64) -> f64 {
         match *self {
@@ -116,6 +127,8 @@ impl Phase {
 fn henyey_greenstein(g: f64, cosine: f64) -> f64 {
     // (1 − g)² + 2g (1 − cos) keeps its digits near the peak.
     let d = (1.0 - g).powi(2) + 2.0 * g * (1.0 - cosine);
+    // Of g = 1 nothing is scattered by any angle.
+    let d = d.max(f64::MIN_POSITIVE);
     (1.0 - g * g) / (4.0 * PI * d * d.sqrt())
 }
 

@@ -12,7 +12,10 @@ pub use super::draw::{Chunks, Cull, Draw, DrawPath, Impostors, MAX_CHUNKS};
 use super::film::Film;
 use super::grid::GridSpec;
 use super::light::Light;
-pub use super::lighting::{Gather, Lighting, LightingMode, MAX_PAIR_LEVELS, Pairs};
+pub use super::lighting::{
+    DiffusionSettings, Gather, Lighting, LightingMode, MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS,
+    Octaves, Pairs,
+};
 use super::material::Material;
 use super::named::named;
 pub use super::overlap::Overlap;

@@ -27,6 +27,7 @@ pub mod blobs;
 pub mod chunks;
 pub mod contract;
 pub mod cull;
+pub mod diffusion;
 pub mod facets;
 pub mod first;
 pub mod generate;
@@ -36,6 +37,7 @@ pub mod live;
 pub mod morton;
 pub mod place;
 pub mod present;
+pub mod scatter;
 pub mod second;
 pub mod sort;
 pub mod sprites;
@@ -63,6 +65,14 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "cull_scan.comp",
     "cull_test.comp",
     "cull_write.comp",
+    "diffusion_coarsen.comp",
+    "diffusion_coarsest.comp",
+    "diffusion_flux.comp",
+    "diffusion_prolong.comp",
+    "diffusion_restrict.comp",
+    "diffusion_sources.comp",
+    "diffusion_sweep.comp",
+    "diffusion_system.comp",
     "facets.comp",
     "facets_groups.comp",
     "facets_surfaces.comp",
@@ -84,7 +94,9 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/cull.glsl",
     "include/density.glsl",
     "include/depths.glsl",
+    "include/diffusion.glsl",
     "include/each.glsl",
+    "include/equations.glsl",
     "include/first.glsl",
     "include/functions.glsl",
     "include/gather.glsl",
@@ -93,6 +105,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/key.glsl",
     "include/light.glsl",
     "include/lobe.glsl",
+    "include/march.glsl",
+    "include/medium.glsl",
     "include/occlude.glsl",
     "include/occluders.glsl",
     "include/one_subgroup.glsl",
@@ -101,6 +115,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/plane.glsl",
     "include/reach.glsl",
     "include/records.glsl",
+    "include/reflect.glsl",
     "include/regions.glsl",
     "include/scan.glsl",
     "include/second.glsl",
@@ -130,6 +145,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "roof_arithmetic.comp",
     "roof_atomics.comp",
     "roof_memory.comp",
+    "scatter.comp",
     "second_gather.comp",
     "second_merge.comp",
     "second_sources.comp",

@@ -30,6 +30,8 @@ record! {
         backward: f32,
         /// The most steps of a march.
         max_steps: u32,
+        /// The first so many facets receive the sky through the clouds.
+        n_under_sky: u32,
     }
 }
 
@@ -69,6 +71,22 @@ pub struct MarchParams {
     pub step_cells: f64,
     /// Forward-scattering share g; 1 marches nothing.
     pub forward: f64,
+    /// The first so many facets receive the sky through the clouds.
+    pub n_under_sky: u32,
+}
+
+/// Optical depth of a way that a surface bars, and to a light without energy.
+pub const BARRED: f32 = 1e30;
+
+/// What the pass writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Arriving {
+    /// V.
+    Share,
+    /// V, and beside it what the clouds alone let through.
+    ShareAndClouds,
+    /// τ, where clouds are a medium; [`BARRED`] where V is 0.
+    Depth,
 }
 
 /// The pipeline of the pass.
@@ -77,20 +95,22 @@ pub struct Transmit {
 }
 
 impl Transmit {
-    /// Creates the pipeline. With `has_through`, the transmittance of the clouds alone is written
-    /// too; `sums` says how τ is summed.
+    /// Creates the pipeline; `sums` says how τ is summed.
     ///
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
-        has_through: bool,
+        arriving: Arriving,
         sums: &SumMacros,
     ) -> Result<Transmit> {
-        let constants = [(0, u32::from(has_through))];
-        let (fields, macros) = (Push::FIELDS, sums.list());
-        let kernel = Kernel::with_macros(device, compiler, "transmit", fields, &constants, macros)?;
+        let constants = [(0, u32::from(arriving == Arriving::ShareAndClouds))];
+        let depths = [("DEPTHS", u32::from(arriving == Arriving::Depth))];
+        let macros = [sums.list(), &depths].concat();
+        let fields = Push::FIELDS;
+        let kernel =
+            Kernel::with_macros(device, compiler, "transmit", fields, &constants, &macros)?;
         Ok(Transmit { kernel })
     }
 
@@ -105,7 +125,8 @@ impl Transmit {
         grid: &GridRecord,
         march: &MarchParams,
     ) -> Result<()> {
-        let MarchParams { n_facets, n_lights, n_surfaces, step_cells, forward } = *march;
+        let MarchParams { n_facets, n_lights, n_surfaces, step_cells, forward, n_under_sky } =
+            *march;
         let push = Push {
             grid: *grid,
             n_facets,
@@ -114,6 +135,7 @@ impl Transmit {
             step_length: (step_cells * f64::from(grid.cell)) as f32,
             backward: (1.0 - forward) as f32,
             max_steps: MAX_STEPS,
+            n_under_sky,
         };
         rec.dispatch(&self.kernel, &buffers.by_binding(), &push, n_facets * n_lights)
     }

@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::Blob;
-use super::facets::{Facet, FacetSources, area, on_shell};
+use super::facets::{Facet, FacetSources, area, facet_at};
 use super::grid::sample;
 use crate::model::cloud::MIN_ASPECT;
 use crate::model::grid::GridSpec;
@@ -89,7 +89,9 @@ pub fn grouped(
         let region = sources.regions[run[0] as usize];
         let (shape, center) =
             ([b.sigma.max(b.sigma_mean), b.aspect], cloud_centers[region as usize]);
-        let facet = on_shell(b.position, shape, b.area, region, center, |x| sample(spec, cells, x));
+        let density = |x| sample(spec, cells, x);
+        let facet =
+            facet_at(sources.place, b.position, shape, b.area, region, center, density);
         (facet, b.color)
     };
     runs.iter().map(of).collect()
@@ -100,7 +102,7 @@ mod tests {
     use glam::UVec3;
 
     use super::*;
-    use crate::reference::facets::facets;
+    use crate::reference::facets::{FacetPlace, facets};
     use crate::reference::grid::deposit;
 
     const SPEC: GridSpec =
@@ -118,7 +120,7 @@ mod tests {
             blobs: &blobs,
             sigma_means: &[1.0, 6.0, 2.0, 4.0],
             regions: &[0; 4],
-            colors: &colors,
+            colors: &colors, place: FacetPlace::Shell
         };
         let b = merged(&members, &[0, 1], false);
         assert!(
@@ -153,7 +155,7 @@ mod tests {
         let centers = [DVec3::Y, DVec3::Z];
         let colors = [DVec3::X; 3];
         let members =
-            FacetSources { blobs: &blobs, sigma_means: &means, regions: &regions, colors: &colors };
+            FacetSources { blobs: &blobs, sigma_means: &means, regions: &regions, colors: &colors, place: FacetPlace::Shell };
         let single = facets(&SPEC, &cells, &members, &centers);
         let of_runs =
             grouped(&SPEC, &cells, &members, &centers, &[0, 2, 1], &[(0, 1), (1, 2), (2, 3)]);

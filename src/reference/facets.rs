@@ -113,6 +113,18 @@ pub struct FacetSources<'a> {
     pub regions: &'a [u32],
     /// Colours, linear RGB.
     pub colors: &'a [DVec3],
+    /// Where facets lie.
+    pub place: FacetPlace,
+}
+
+/// Where the facets of blobs lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FacetPlace {
+    /// On the blobs' shells.
+    Shell,
+    /// At the blobs' centres, in modes in which clouds are a medium. Their normals mean nothing and
+    /// are up.
+    Center,
 }
 
 /// Returns one facet a blob, with normals from the density grid. `cloud_centers` are relative to
@@ -143,11 +155,12 @@ fn facet_of(
     let (blob, region) = (&sources.blobs[i], sources.regions[i]);
     let shape = [blob.sigma.max(sources.sigma_means[i]), blob.aspect];
     let center = cloud_centers[region as usize];
-    on_shell(blob.position, shape, area(blob), region, center, density)
+    facet_at(sources.place, blob.position, shape, area(blob), region, center, density)
 }
 
-/// Returns the facet on the shell of a blob of shape (σ, aspect) at `p`.
-pub(super) fn on_shell(
+/// Returns the facet of a blob of shape (σ, aspect) at `p`, on its shell or at its centre.
+pub(super) fn facet_at(
+    place: FacetPlace,
     p: DVec3,
     shape: [f64; 2],
     area: f64,
@@ -155,6 +168,9 @@ pub(super) fn on_shell(
     center: DVec3,
     density: impl Fn(DVec3) -> f64,
 ) -> Facet {
+    if place == FacetPlace::Center {
+        return Facet { position: p, normal: DVec3::Y, area, region, conditioning: 1.0 };
+    }
     let gradient = gradient(density, p, shape[0], shape[1]);
     let (normal, conditioning) = blended_normal(gradient, shape[1], p, center);
     Facet { position: shell(p, shape, normal), normal, area, region, conditioning }
@@ -174,7 +190,7 @@ mod tests {
         sigma_means: &'a [f64],
         regions: &'a [u32],
     ) -> FacetSources<'a> {
-        FacetSources { blobs, sigma_means, regions, colors: &[] }
+        FacetSources { blobs, sigma_means, regions, colors: &[], place: FacetPlace::Shell }
     }
 
     fn ball() -> Vec<f64> {

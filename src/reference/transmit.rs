@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::grid::sample;
 use super::occlude::{Rectangle, is_clear};
+use super::scatter::BARRED;
 use crate::model::grid::{GridSpec, MAX_MARCH_STEPS};
 use crate::model::light::Light;
 
@@ -103,6 +104,23 @@ impl Obstacles<'_> {
     /// [receiver][light].
     pub fn through(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
         self.where_lit(receivers, lights, |_, _| true)
+    }
+
+    /// Returns the optical depth from every receiver to every light: [`BARRED`] if a surface hides
+    /// the light, and of lights without energy. *Shape*: [receiver][light].
+    pub fn depths(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
+        let one = |r: &Receiver, light: &Light| {
+            let is_lit = light.energy() != DVec3::ZERO
+                && is_clear(self.rectangles, r.i_region, r.position, light);
+            if !is_lit {
+                return BARRED;
+            }
+            let way = light.arrival(r.position);
+            let (toward, distance) = (way.toward, way.distance);
+            optical_depth(self.spec, self.cells, r.position, toward, distance, self.step)
+        };
+        let of = |r: &Receiver| lights.iter().map(|light| one(r, light)).collect::<Vec<_>>();
+        receivers.iter().flat_map(of).collect()
     }
 
     fn where_lit(

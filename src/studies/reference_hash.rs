@@ -57,7 +57,9 @@ pub(super) fn hash_of_paths(scene: &Scene, time_s: f64, pixels: &Pixels) -> Resu
 /// Returns `scene` with every setting that this kind of reference ignores at a fixed value.
 fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
     let scene = against.without_approximations(scene);
-    let Lighting { mode, grid, step, forward, facets_per_cloud, sun_radius, .. } = scene.lighting;
+    let Lighting {
+        mode, grid, step, forward, facets_per_cloud, sun_radius, octaves, diffusion, ..
+    } = scene.lighting;
     let by_model = matches!(
         against,
         ReferenceKind::Model | ReferenceKind::Reflections(_) | ReferenceKind::Transport
@@ -78,6 +80,8 @@ fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
         pairs: Pairs { size: 1.0, levels: 0, steps: 1 },
         sums: Sums::default(),
         sun_radius,
+        octaves,
+        diffusion,
     };
     let film = Film {
         format: FilmFormat::Rgba32f,

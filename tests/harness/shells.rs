@@ -9,7 +9,7 @@ use nimbus::model::grid::GridSpec;
 use nimbus::passes::facets::{Facets, ParticleBuffers};
 use nimbus::passes::grid::Grid;
 use nimbus::reference::Blob;
-use nimbus::reference::facets::{
+use nimbus::reference::facets::{FacetPlace, 
     CONDITIONING, Facet, FacetSources, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions, facets,
     gradient, smoothstep,
 };
@@ -122,7 +122,7 @@ impl Scene {
     ) -> (Vec<f64>, Vec<FacetRecord>, Vec<u32>) {
         let (n, n_cells) = (self.blobs.len(), self.spec.n_total() as usize);
         let grid = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
-        let pass = Facets::new(&gpu.device, compiler, self.has_ellipsoids()).unwrap();
+        let pass = Facets::new(&gpu.device, compiler, self.has_ellipsoids(), false).unwrap();
         let placed = |b: &Blob| PlacedRecord {
             position: b.position.as_vec3().to_array(),
             sigma: b.sigma as f32,
@@ -191,7 +191,7 @@ impl Scene {
                 blobs: &self.blobs,
                 sigma_means: &means,
                 regions: &regions,
-                colors: &[],
+                colors: &[], place: FacetPlace::Shell
             };
             facets(&self.spec, cells, &sources, &self.centers())
         }

@@ -100,8 +100,16 @@ passes! {
         unless |same| same.rays => "facets and lights stand still";
     /// Computes the first reflection.
     First "first", Facets,
-        needs unlit,
+        needs |f, same| unlit(f, same).or_else(|| unless(!f.is_medium, "clouds are a medium")),
         unless |same| same.response && same.eye => "facets and lights are the same";
+    /// Computes the diffuse light by cell.
+    Diffusion "diffusion", Facets,
+        needs |f, _| unless(f.has_diffusion, "lighting.mode is not \"diffusion\""),
+        unless |same| same.diffusion => "the medium and its lights are the same";
+    /// Computes the light that clouds scatter as a medium.
+    Scatter "scatter", Facets,
+        needs |f, _| unless(f.is_medium, "no medium: clouds reflect"),
+        unless |same| same.light && same.eye => "facets and lights are the same";
     /// Computes the second reflection.
     Second "second", Facets,
         needs |f, _| unless(f.has_second, "lighting.mode is not \"two-reflection\""),

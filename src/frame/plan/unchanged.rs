@@ -50,6 +50,8 @@ pub(super) struct Unchanged {
     pub eye: bool,
     /// Facets, lights and materials, as far as the first two reflections depend on them.
     pub response: bool,
+    /// Density grid, medium and lights.
+    pub diffusion: bool,
     /// Facets, lights and materials.
     pub light: bool,
     drawn: bool,
@@ -91,7 +93,9 @@ impl Unchanged {
         let materials = same(&|a, b| {
             a.regions == b.regions && a.table == b.table && a.coefficients == b.coefficients
         });
-        let light = facets && materials && same(&|a, b| a.lights == b.lights);
+        let lights = same(&|a, b| a.lights == b.lights);
+        let media = same(&|a, b| a.media == b.media && a.diffusion == b.diffusion);
+        let light = facets && materials && media && lights;
         // With tensors, the first two reflections depend on neither energies nor materials.
         let response = match features.tensors {
             Tensors::Kept => facets && same(&|a, b| shine_alike(&a.lights, &b.lights)),
@@ -124,6 +128,7 @@ impl Unchanged {
             rays: facets && same(&has_same_rays),
             eye,
             response,
+            diffusion: grid && geometry && media && lights,
             light,
             drawn,
             kept,

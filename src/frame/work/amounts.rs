@@ -6,8 +6,8 @@ use super::layers::{Rays, layers};
 use super::marches::march_samples;
 use crate::error::Result;
 use crate::frame::features::{
-    gathers_from_tree, has_glossy, has_impostors, has_live, has_second, is_lit, region_sizes,
-    target_format,
+    gathers_from_tree, has_diffusion, has_glossy, has_impostors, has_live, has_second, is_lit,
+    is_medium, region_sizes, target_format,
 };
 use crate::frame::packet::Packet;
 use crate::frame::renderer::Renderer;
@@ -53,6 +53,10 @@ pub struct Amounts {
     pub march_samples: f64,
     /// Whether light is reflected twice.
     pub has_second: bool,
+    /// Whether clouds are a medium.
+    pub is_medium: bool,
+    /// Cycles of the diffusion solver; 0 without.
+    pub cycles: f64,
     /// Whether some material has a lobe.
     pub is_glossy: bool,
     /// Pairs of receiver and source that are looked at: at least this many.
@@ -164,6 +168,11 @@ impl Amounts {
             lights: scene.lights.len() as f64,
             march_samples: 0.0,
             has_second: has_second(scene),
+            is_medium: is_medium(scene),
+            cycles: match has_diffusion(scene) {
+                true => f64::from(scene.lighting.diffusion.cycles),
+                false => 0.0,
+            },
             is_glossy: has_glossy(scene),
             pairs: if is_tree { facets } else { facets * (cloud_facets - 1.0).max(0.0) },
             tensor_numbers: is_edited(scene).then(|| tensor_numbers(scene, packet)),

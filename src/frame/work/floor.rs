@@ -63,6 +63,18 @@ pub fn floor(pass: Pass, of: &Amounts) -> Option<Work> {
         Pass::Facets => Some(facets(of)),
         Pass::Transmit => Some(transmit(of)),
         Pass::First => Some(first(of)),
+        // Reads the density, writes φ and the flux along each axis. A cycle solves each cell's
+        // equation three times and forms what is left once: six neighbours of three channels, a
+        // multiply-add each, and a quotient.
+        Pass::Diffusion => {
+            let of_cycle = 4.0 * (6.0 * 3.0 * 2.0 + 3.0);
+            work(of.cells * (NUMBER + 4.0 * VECTOR), of.cells * of.cycles * of_cycle)
+        }
+        // As "first"; a light takes three exponents and a phase function (8), too.
+        Pass::Scatter => work(
+            of.facets * (VECTOR + NUMBER * of.lights + 2.0 * VECTOR),
+            of.facets * (19.0 * of.lights + 6.0),
+        ),
         // With lobes, a frame in which only the eye moves gathers for some receivers alone.
         Pass::Second if of.is_glossy => None,
         Pass::Second => Some(second(of)),
@@ -120,7 +132,11 @@ fn facets(of: &Amounts) -> Work {
             + members
             + of.cloud_facets * FACET
             + solid * FACET,
-        operations: of.cloud_facets * SHELL * (6.0 + TRILINEAR + 4.0),
+        operations: match of.is_medium {
+            // They lie at the particles' places.
+            true => 0.0,
+            false => of.cloud_facets * SHELL * (6.0 + TRILINEAR + 4.0),
+        },
     }
 }
 

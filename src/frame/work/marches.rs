@@ -6,24 +6,27 @@ use crate::frame::packet::Packet;
 use crate::layout::facet::FacetRecord;
 use crate::layout::frame::{GridRecord, LIGHT_POINT, LightRecord};
 use crate::model::scene::Scene;
-use crate::passes::transmit::MAX_STEPS;
+use crate::passes::transmit::{BARRED, MAX_STEPS};
 
 /// Returns the samples on the paths of all facets to all lights. Paths that a surface hides have
-/// none: their transmittance, `[facet][light]`, is 0.
+/// none: their transmittance, `[facet][light]`, is 0, or where clouds are a medium their depth that
+/// of a barred way.
 pub(super) fn march_samples(
     scene: &Scene,
     packet: &Packet,
     facets: &[FacetRecord],
     transmittance: &[f32],
 ) -> f64 {
+    let is_medium = scene.lighting.mode.is_medium();
     // Without losses and without particles nothing is marched.
-    if scene.lighting.forward >= 1.0 || scene.n_particles() == 0 {
+    if (scene.lighting.forward >= 1.0 && !is_medium) || scene.n_particles() == 0 {
         return 0.0;
     }
     let step = scene.lighting.step * f64::from(packet.grid.cell);
     let n_lights = packet.lights.len().max(1);
     let of = |(facet, through): (&FacetRecord, &[f32])| -> f64 {
-        let lit = packet.lights.iter().zip(through).filter(|(_, through)| **through > 0.0);
+        let is_clear = |v: f32| if is_medium { v < BARRED } else { v > 0.0 };
+        let lit = packet.lights.iter().zip(through).filter(|(_, through)| is_clear(**through));
         lit.map(|(light, _)| samples(&packet.grid, step, vector(facet.position), light)).sum()
     };
     facets.iter().zip(transmittance.chunks(n_lights)).map(of).sum()

@@ -7,15 +7,20 @@ use crate::io::bounds::{Bounds, GREATEST_EXPONENT, SHARE};
 use crate::io::document::section::Section;
 use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, min_step};
-use crate::model::scene::{Gather, Lighting, LightingMode, MAX_PAIR_LEVELS, Pairs};
+use crate::model::scene::{
+    DiffusionSettings, Gather, Lighting, LightingMode, MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS,
+    Octaves, Pairs,
+};
 use crate::model::sums::{Precision, Summation, Sums};
 
 /// Cutoff cells of the density grid: with fewer the margins leave next to no grid.
 const MIN_CELLS: u32 = 8;
 
 keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
-    /// Reflections that are computed: none (particles have their colours as given), the first,
-    /// C (15), or the first and the second, C (15) and (16).
+    /// How light is computed: not at all (particles have their colours as given); by the first
+    /// reflection, C (15), or the first and the second, C (15) and (16); or clouds as a medium that
+    /// scatters light once, in full ("single") or without its forward scattering ("similarity"),
+    /// in octaves, or once and then by diffusion (model.md, 18).
     mode: choice("two-reflection", &LightingMode::NAMES);
     /// Cells along the longest axis of the density grid.
     grid: integer(64, MIN_CELLS, MAX_CELLS);
@@ -44,6 +49,25 @@ keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
     /// sun's.
     sun_radius ["sun_radius_deg"]: number(0.27, Bounds::Within(0.01, 30.0)).map(f64::to_radians),
         "degree";
+    octaves => octaves(s)?;
+    diffusion => diffusion(s)?;
+}}
+
+keys! { OCTAVES: fn octaves(s) -> Octaves { Octaves;
+    /// Terms of mode "octaves".
+    n ["octaves"]: integer(8, 1, MAX_OCTAVES);
+    /// Light of an octave over that of the one before.
+    light ["octave_light"]: number(0.5, SHARE);
+    /// Optical depth of an octave over that of the one before.
+    depth ["octave_depth"]: number(0.7, SHARE);
+    /// Mean cosine of an octave's phase function over that of the one before.
+    phase ["octave_phase"]: number(0.5, SHARE);
+}}
+
+keys! { DIFFUSION: fn diffusion(s) -> DiffusionSettings { DiffusionSettings;
+    /// Cycles of the multigrid solver of mode "diffusion". Each leaves about a seventh of the error
+    /// of the one before.
+    cycles ["diffusion_cycles"]: integer(3, 1, MAX_CYCLES);
 }}
 
 keys! { PAIRS: fn pairs(s) -> Pairs { Pairs;
@@ -63,7 +87,7 @@ keys! { SUMS: fn sums(s) -> Sums { Sums;
 }}
 
 /// Keys of `[lighting]`.
-pub const KEYS: [Keys; 3] = [LIGHTING, PAIRS, SUMS];
+pub const KEYS: [Keys; 5] = [LIGHTING, PAIRS, SUMS, OCTAVES, DIFFUSION];
 
 /// Reads `[lighting]`. `of_materials` are the exponents n_s of the scene's materials.
 pub fn read_lighting(root: &mut Section, of_materials: &[f64]) -> Result<Lighting> {

@@ -7,11 +7,14 @@ use crate::error::Result;
 use crate::model::cloud::{Cloud, CloudSource, Group};
 use crate::model::frame_state::FrameState;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
+use crate::model::light::{Light, UP};
+use crate::model::medium::{MeanMedium, Medium, ScatterLaw};
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::reference::area::adaptive::{Accuracy, Estimate};
 use crate::reference::area::{AreaScene, DiscFacet, Receiver};
-use crate::reference::facets::{Facet, FacetSources};
+use crate::reference::diffusion::{DiffuseLight, DiffusionMedium};
+use crate::reference::facets::{Facet, FacetPlace, FacetSources};
 use crate::reference::generate::Generated;
 use crate::reference::occlude::Rectangle;
 use crate::reference::parallel::parallel_map;
@@ -42,9 +45,9 @@ pub struct FrameReference {
     pub facets: Vec<Facet>,
     /// Colour of every facet: 1 for surfaces and ground.
     pub facet_colors: Vec<DVec3>,
-    /// I_d of every facet, W m⁻².
+    /// I_d of every facet; of a medium the fluence of suns and lamps, W m⁻².
     pub irradiance: Vec<DVec3>,
-    /// L1 of every facet toward the eye, W m⁻² sr⁻¹.
+    /// L1 of every facet toward the eye, and what a medium scatters, W m⁻² sr⁻¹.
     pub radiance: Vec<DVec3>,
     /// I_i of every facet; empty unless the lighting mode is "two-reflection".
     pub indirect: Vec<DVec3>,
@@ -109,8 +112,8 @@ impl FrameReference {
         let mut frame = FrameReference::unlit(scene, time_s)?;
         Ok(match scene.lighting.mode {
             LightingMode::TwoReflection => frame.light(scene, take),
-            LightingMode::First => frame.light(scene, |frame, _| take(frame, &nothing)),
             LightingMode::None => take(&frame, &nothing),
+            _ => frame.light(scene, |frame, _| take(frame, &nothing)),
         })
     }
 
@@ -157,16 +160,16 @@ impl FrameReference {
         scene: &Scene,
         take: impl FnOnce(&FrameReference, &SecondOf<'_>) -> T,
     ) -> T {
-        let (grid, origin) = (&self.state.grid, self.state.light_origin);
+        let (grid, origin) = (self.state.grid, self.state.light_origin);
         let local = LocalScene::new(scene, origin, self.state.time_s);
-        let cells = reference::grid::deposit(grid, &self.blobs);
+        let cells = reference::grid::deposit(&grid, &self.blobs);
         (self.facets, self.facet_colors) = self.cloud_facets(scene, &cells);
         self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, local.ground.len()));
         self.facets.splice(0..0, local.ground.iter().copied());
         let rectangles: Vec<Rectangle> =
             scene.surfaces.iter().map(|s| Rectangle::new(s, origin)).collect();
         let obstacles = Obstacles {
-            spec: grid,
+            spec: &grid,
             cells: &cells,
             rectangles: &rectangles,
             step: scene.lighting.step,
@@ -185,7 +188,44 @@ impl FrameReference {
             reference::first::irradiance(&positions, &normals, &transmittance, &local.lights);
         self.radiance =
             reference::first::radiance(&self.irradiance, &regions, &local.kd(), &self.facet_colors);
+        if scene.lighting.mode.is_medium() {
+            self.scatter(scene, &obstacles, &local.lights);
+        }
         self.light_surfaces(scene, &local, take)
+    }
+
+    /// Replaces the light of the clouds' facets by what they scatter as a medium.
+    fn scatter(&mut self, scene: &Scene, obstacles: &Obstacles<'_>, lights: &[Light]) {
+        let time_s = self.state.time_s;
+        let diffuse = (scene.lighting.mode == LightingMode::Diffusion).then(|| {
+            let mean = MeanMedium::new(scene, &self.groups, time_s);
+            let medium = DiffusionMedium::new(mean, &self.state.grid);
+            DiffuseLight::new(&medium, obstacles, lights, scene.lighting.diffusion.cycles)
+        });
+        let forward = scene.lighting.forward;
+        let medium = |c: &Cloud| Medium::new(&scene.materials[c.i_material], time_s, forward);
+        let media: Vec<Medium> = scene.clouds.iter().map(medium).collect();
+        let eye = self.state.pose.position - self.state.light_origin;
+        let n_solids = scene.n_solids();
+        let found = parallel_map(self.facets.len(), |i| {
+            let facet = &self.facets[i];
+            let i_cloud = (facet.region as usize).checked_sub(n_solids)?;
+            let law = ScatterLaw::new(&scene.lighting, &media[i_cloud], self.facet_colors[i]);
+            let p = facet.position;
+            let receiver = transmit::Receiver { position: p, i_region: facet.region };
+            let taus = obstacles.depths(&[receiver], lights);
+            let fluence = reference::scatter::fluence(&law, p, &taus, lights);
+            let has_sky = diffuse.is_none();
+            let once = reference::scatter::radiance(&law, p, eye, &taus, lights, has_sky);
+            let outgoing = (eye - p).normalize_or(UP);
+            let more = diffuse.as_ref().map(|light| light.scattered(&law, p, outgoing));
+            Some((fluence, once + more.unwrap_or_default()))
+        });
+        for (i, light) in found.into_iter().enumerate() {
+            if let Some((fluence, radiance)) = light {
+                (self.irradiance[i], self.radiance[i]) = (fluence, radiance);
+            }
+        }
     }
 
     /// Facets of the clouds and their colours, from the density grid.
@@ -219,6 +259,10 @@ impl FrameReference {
             sigma_means: &reference::place::sigma_means(&self.groups, &scene.clouds, time_s),
             regions: &reference::place::regions(&self.groups),
             colors: &self.colors,
+            place: match scene.lighting.mode.is_medium() {
+                true => FacetPlace::Center,
+                false => FacetPlace::Shell,
+            },
         };
         take(&sources, &reference::place::cloud_centers(&scene.clouds, time_s, light_origin))
     }

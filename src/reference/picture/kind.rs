@@ -143,12 +143,13 @@ impl ReferenceKind {
     }
 }
 
-/// Returns the number of reflections that the scene's lighting mode computes.
+/// Returns the number of reflections that the scene's lighting mode computes. A medium reflects
+/// once, as surfaces and ground in it do.
 pub fn n_reflections(scene: &Scene) -> u32 {
     match scene.lighting.mode {
         LightingMode::None => 0,
-        LightingMode::First => 1,
         LightingMode::TwoReflection => 2,
+        _ => 1,
     }
 }
 

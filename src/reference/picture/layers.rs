@@ -54,7 +54,7 @@ pub fn layers_as_set(scene: &Scene, time_s: f64, on_progress: OnProgress) -> Res
             let second = FrameReference { radiance: dark(n), ..frame };
             (picture(&first), picture(&second))
         }
-        LightingMode::None | LightingMode::First => (beauty.clone(), vec![[0.0; 4]; beauty.len()]),
+        _ => (beauty.clone(), vec![[0.0; 4]; beauty.len()]),
     };
     Ok(PictureLayers { beauty, sums, first, second })
 }

@@ -99,6 +99,13 @@ pub(super) fn with_renderer<T>(
         return draw(&mut |sample| picture.draw(pixels, sample, on_progress));
     }
     let is_model = matches!(kind, ReferenceKind::Model | ReferenceKind::Reflections(_));
+    if is_model && scene.lighting.mode.is_medium() {
+        let mode = scene.lighting.mode.name();
+        return Err(Error::usage(format!(
+            "the reference \"{kind}\" has facets that reflect, and lighting.mode = \"{mode}\" has \
+             none; expected thin, slices, volume or transport"
+        )));
+    }
     if is_model && scene.lighting.mode != LightingMode::None {
         let how = ModelDrawing { n_reflections: kind.n_reflections(scene), by_facet: false };
         return with_model(how, (scene, time_s), pixels, on_progress, draw);

@@ -14,6 +14,7 @@ use super::scene_light::{PixelSample, RenderedPixels};
 use crate::error::Result;
 use crate::model::light::Light;
 use crate::model::material::Brdf;
+use crate::model::medium::Medium;
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
 use crate::reference::Blob;
@@ -142,14 +143,8 @@ fn scatterers(scene: &Scene, frame: &FrameReference) -> (Vec<u32>, Vec<Scatterer
         let key = (i_cloud, color.to_array().map(f64::to_bits));
         let number = *numbers.entry(key).or_insert_with(|| {
             let material = &scene.materials[scene.clouds[i_cloud as usize].i_material];
-            let kd = material.at(frame.state.time_s).kd * *color;
-            let (albedo, phase) = material.scattering.of(kd, forward);
-            // A given albedo is that of white particles.
-            let albedo = match material.scattering.albedo {
-                Some(_) => (albedo * *color).min(DVec3::ONE),
-                None => albedo,
-            };
-            scatterers.push(Scatterer { albedo, phase });
+            let medium = Medium::new(material, frame.state.time_s, forward);
+            scatterers.push(Scatterer { albedo: medium.albedo(*color), phase: medium.phase });
             scatterers.len() as u32 - 1
         });
         i_scatterer.push(number);

@@ -83,8 +83,8 @@ fn has_surfaces(scene: &Scene) -> bool {
 fn reflections(scene: &Scene) -> u32 {
     match scene.lighting.mode {
         LightingMode::None => 0,
-        LightingMode::First => 1,
         LightingMode::TwoReflection => 2,
+        _ => 1,
     }
 }
 

@@ -169,10 +169,14 @@ impl LedgerStudy<'_> {
             return Ok(());
         }
         // The reference of the light on surfaces has no density grid.
+        let of = match scene.lighting.mode.is_medium() {
+            true => "scattering",
+            false => "first reflection",
+        };
         let link = if scene.n_particles() > 0 && !scene.surfaces.is_empty() {
-            Link::new("first reflection", "f32, grid", "f64, closed form on surfaces")
+            Link::new(of, "f32, grid", "f64, closed form on surfaces")
         } else {
-            Link::new("first reflection", "f32", "f64")
+            Link::new(of, "f32", "f64")
         };
         let (second, second_error) = (by_device.second, Vec::new());
         let first = FrameReference { second, second_error, ..exact.clone() };
@@ -181,7 +185,9 @@ impl LedgerStudy<'_> {
             let link = Link::new("second reflection", "pairs in f32", "areas in f64");
             self.add(link, draw(&exact, BlobModel::Volume));
         }
-        self.add_models(scene, listener)?;
+        if !scene.lighting.mode.is_medium() {
+            self.add_models(scene, listener)?;
+        }
         self.add_transport(scene, listener)
     }
 

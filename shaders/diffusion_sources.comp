@@ -1,0 +1,69 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+#include "records.glsl"
+#include "each.glsl"
+#include "light.glsl"
+#include "occlude.glsl"
+
+// Computes the light of suns and lamps that is scattered for the first time in every cell
+// (model.md §18, passes.md "diffusion").
+// In: lights, regions, the density grid (1/length). Out: by cell Q0 (W/m^3), and q = 3 D Q1 along
+// each axis (W/m^2). Law: Q0 = albedo (1-f) sigma U, Q1 = albedo (g-f) sigma F of the light that
+// arrives, weakened by e^{-s tau}. Bound: that of the march.
+
+layout(push_constant) uniform Push {
+    Grid grid;
+    vec3 albedo;
+    float inverse_chord;
+    float g;
+    float straight;
+    uint n_lights;
+    uint n_surfaces;
+    float step_length;
+    uint max_steps;
+} push;
+READS(0, Light, lights)
+TEXELS(1, regions)
+#include "regions.glsl"
+FLOATS(2, density)
+// By cell: Q0, q along x, y and z.
+WRITES(3, vec4, field)
+
+#include "sum.glsl"
+#include "density.glsl"
+#include "reach.glsl"
+#include "march.glsl"
+#include "medium.glsl"
+
+void main() {
+    uvec3 n = push.grid.n_cells;
+    FOR_EACH(c, n.x * n.y * n.z) {
+        uint row = c / n.x;
+        vec3 at = vec3(c - row * n.x, row % n.y, row / n.y) + 0.5;
+        vec3 p = push.grid.low + push.grid.cell * vec3(1.0, push.grid.aspect, 1.0) * at;
+        float sigma = cell_at(int(c));
+        vec3 weakened = 1.0 - push.albedo * push.straight;
+        vec3 fluence = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
+        for (uint l = 0; l < push.n_lights; ++l) {
+            Light light = lights[l];
+            bool is_on = light.kind != LIGHT_SKY && sigma > 0.0
+                         && any(notEqual(light.energy, vec3(0.0)));
+            if (is_on && is_clear(p, light, 0xFFFFFFFFu, push.n_surfaces)) {
+                Arrival a = arrival_at(light, p);
+                float tau = depth_along(p, a.toward, a.distance, true);
+                vec3 e = light.energy * a.falloff * through(tau * weakened);
+                fluence += e;
+                x -= e * a.toward.x;
+                y -= e * a.toward.y;
+                z -= e * a.toward.z;
+            }
+        }
+        vec3 reach = 1.0 / (3.0 * sigma * (1.0 - push.albedo * push.g) + push.inverse_chord);
+        vec3 carried = 3.0 * reach * push.albedo * (push.g - push.straight) * sigma;
+        field[4 * c] = vec4(push.albedo * (1.0 - push.straight) * sigma * fluence, 0.0);
+        field[4 * c + 1] = vec4(carried * x, 0.0);
+        field[4 * c + 2] = vec4(carried * y, 0.0);
+        field[4 * c + 3] = vec4(carried * z, 0.0);
+    }
+}

@@ -1,0 +1,83 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "each.glsl"
+#include "diffusion.glsl"
+
+// Writes the equations of the finest cells (model.md §18, passes.md "diffusion").
+// In: lights, the density grid, sources of "diffusion_sources". Out: operators, phi = 0, and the
+// right-hand sides. Law: -div(D grad phi) + absorption phi = Q0 - div q, with Marshak's condition
+// phi/4 - F/2 = J at the faces of the box. Error: some ulp.
+
+layout(push_constant) uniform Push {
+    Grid grid;
+    vec3 absorbed;
+    float inverse_chord;
+    // 1 - albedo g
+    vec3 kept;
+    uint n_lights;
+    uint n_all;
+} push;
+READS(0, Light, lights)
+FLOATS(1, density)
+READS(2, vec4, field)
+// [set][cell]
+WRITES(3, vec4, operators)
+WRITES(4, vec4, phi)
+WRITES(5, vec4, source)
+
+vec3 reach_of(int c) {
+    return 1.0 / (3.0 * FLOAT(density, c) * push.kept + push.inverse_chord);
+}
+
+// Returns the light of the sky that comes in through a face: `share` of a horizontal plane's.
+vec3 of_sky(float share) {
+    vec3 sum = vec3(0.0);
+    for (uint l = 0; l < push.n_lights; ++l) {
+        if (lights[l].kind == LIGHT_SKY) {
+            sum += lights[l].energy * (share + lights[l].constant);
+        }
+    }
+    return sum;
+}
+
+void main() {
+    Level level = Level(push.grid.n_cells, 0u);
+    FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
+        int c = int(i);
+        ivec3 at = place_of(level, i), stride = strides_of(level);
+        vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
+        vec3 own = reach_of(c);
+        vec3 sink = FLOAT(density, c) * push.absorbed, right = field[4 * c].rgb;
+        // w along each axis, by channel.
+        vec3 next[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            float inverse = 1.0 / edges[axis];
+            vec3 through = inverse / (2.0 + 0.5 * edges[axis] / own);
+            vec3 carried = field[4 * c + 1 + axis].rgb;
+            next[axis] = vec3(0.0);
+            if (at[axis] + 1 < int(level.n_cells[axis])) {
+                int after = c + stride[axis];
+                vec3 other = reach_of(after);
+                next[axis] = 2.0 * own * other / (own + other) * inverse * inverse;
+                right -= 0.5 * inverse * (carried + field[4 * after + 1 + axis].rgb);
+            } else {
+                sink += through;
+                right += 4.0 * through * of_sky(axis == 1 ? 1.0 : 0.5);
+            }
+            if (at[axis] > 0) {
+                int prior = c - stride[axis];
+                right += 0.5 * inverse * (carried + field[4 * prior + 1 + axis].rgb);
+            } else {
+                sink += through;
+                right += 4.0 * through * of_sky(axis == 1 ? 0.0 : 0.5);
+            }
+        }
+        for (int set = 0; set < N_SETS; ++set) {
+            operators[c + set * int(push.n_all)] =
+                vec4(next[0][set], next[1][set], next[2][set], sink[set]);
+        }
+        phi[c] = vec4(0.0);
+        source[c] = vec4(right, 0.0);
+    }
+}

@@ -1,0 +1,29 @@
+// The grids of the diffusion solver, one behind the other in the same buffers, the finest first
+// (model.md §18, passes.md "diffusion").
+
+// A grid: its cells along each axis, and the place of its first cell.
+struct Level {
+    uvec3 n_cells;
+    uint i_first;
+};
+
+// 3: channels have equations of their own; 1: one for all.
+#ifndef N_SETS
+#define N_SETS 1
+#endif
+
+// Steps between cells along each axis.
+ivec3 strides_of(Level level) {
+    return ivec3(1, level.n_cells.x, level.n_cells.x * level.n_cells.y);
+}
+
+// Returns where cell c of a level lies.
+ivec3 place_of(Level level, uint c) {
+    uvec3 n = level.n_cells;
+    uint row = c / n.x;
+    return ivec3(c - row * n.x, row % n.y, row / n.y);
+}
+
+int index_of(Level level, ivec3 at) {
+    return int(level.i_first) + at.x + int(level.n_cells.x) * (at.y + int(level.n_cells.y) * at.z);
+}

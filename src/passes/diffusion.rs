@@ -1,0 +1,403 @@
+//! diffusion: computes the diffuse light in every cell of the density grid.
+//!
+//! In: the density grid, lights, regions (rectangles). Out: fluence φ and flux F by cell. Law:
+//! −∇·(D∇φ) + σ(1 − ϖ)φ = Q0 − ∇·q with Marshak's condition at the box, by a fixed number of
+//! multigrid cycles. Source: model.md §18, passes.md. Error: of a cycle about a seventh of what the
+//! cycle before left; of rounding 2e-6 of φ.
+
+use glam::{DVec3, UVec3};
+
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
+use crate::layout::frame::GridRecord;
+use crate::layout::medium::LevelRecord;
+use crate::layout::record;
+use crate::model::grid::{GridSpec, coarser};
+use crate::model::medium::MeanMedium;
+
+record! {
+    /// Push constants of `diffusion_sources.comp`.
+    pub struct SourcesPush {
+        /// The density grid.
+        grid: GridRecord,
+        /// ϖ.
+        albedo: [f32; 3],
+        /// c, 1/length.
+        inverse_chord: f32,
+        /// g.
+        g: f32,
+        /// f.
+        straight: f32,
+        /// Number of lights.
+        n_lights: u32,
+        /// Number of surfaces that may hide a light.
+        n_surfaces: u32,
+        /// Length of a step of the march.
+        step_length: f32,
+        /// The most steps of a march.
+        max_steps: u32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_system.comp`.
+    pub struct SystemPush {
+        /// The density grid.
+        grid: GridRecord,
+        /// 1 − ϖ.
+        absorbed: [f32; 3],
+        /// c, 1/length.
+        inverse_chord: f32,
+        /// 1 − ϖg.
+        kept: [f32; 3],
+        /// Number of lights.
+        n_lights: u32,
+        /// Cells of all levels.
+        n_all: u32,
+    }
+}
+
+record! {
+    /// Push constants of the kernels between two levels.
+    pub struct PairPush {
+        /// The finer level.
+        fine: LevelRecord,
+        /// The coarser level.
+        coarse: LevelRecord,
+        /// 1 along the axes that are halved.
+        halved: [u32; 3],
+        /// Cells of all levels.
+        n_all: u32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_prolong.comp`.
+    pub struct ProlongPush {
+        /// The finer level.
+        fine: LevelRecord,
+        /// The coarser level.
+        coarse: LevelRecord,
+        /// 1 along the axes that are halved.
+        halved: [u32; 3],
+        /// Padding.
+        unused: u32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_sweep.comp`.
+    pub struct SweepPush {
+        /// The level.
+        level: LevelRecord,
+        /// Cells of all levels.
+        n_all: u32,
+        /// 0 or 1: the cells of which the sum of the coordinates is even or odd.
+        color: u32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_coarsest.comp`.
+    pub struct CoarsestPush {
+        /// The level.
+        level: LevelRecord,
+        /// Cells of all levels.
+        n_all: u32,
+        /// Number of sweeps.
+        n_sweeps: u32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_flux.comp`.
+    pub struct FluxPush {
+        /// The density grid.
+        grid: GridRecord,
+        /// 1 − ϖg.
+        kept: [f32; 3],
+        /// c, 1/length.
+        inverse_chord: f32,
+    }
+}
+
+/// Sweeps of the coarsest grid.
+const COARSEST_SWEEPS: u32 = 16;
+
+bindings! {
+    /// The buffers of the pass that others share.
+    pub struct DiffusionBuffers {
+        /// `LightRecord` by light.
+        lights,
+        /// `RegionRecord` by region, surfaces first.
+        regions,
+        /// `f32` by cell: extinction per length.
+        density,
+        /// Output, four `[f32; 4]` by cell: φ and F along each axis.
+        field,
+    }
+}
+
+/// Numbers of the medium, rounded once. They change with materials and the grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DiffusionParams {
+    /// ϖ.
+    pub albedo: [f32; 3],
+    /// 1 − ϖ.
+    pub absorbed: [f32; 3],
+    /// 1 − ϖg.
+    pub kept: [f32; 3],
+    /// g.
+    pub g: f32,
+    /// f.
+    pub straight: f32,
+    /// c, 1/length.
+    pub inverse_chord: f32,
+}
+
+impl DiffusionParams {
+    /// Returns the numbers of a medium on a grid.
+    pub fn new(mean: &MeanMedium, grid: &GridSpec) -> DiffusionParams {
+        let f32s = |v: DVec3| v.as_vec3().to_array();
+        DiffusionParams {
+            albedo: f32s(mean.albedo),
+            absorbed: f32s(DVec3::ONE - mean.albedo),
+            kept: f32s(DVec3::ONE - mean.albedo * mean.g),
+            g: mean.g as f32,
+            straight: mean.straight as f32,
+            inverse_chord: grid.inverse_chord() as f32,
+        }
+    }
+}
+
+/// The march toward suns and lamps, and the cycles.
+#[derive(Debug, Clone, Copy)]
+pub struct DiffusionWork {
+    /// Number of lights.
+    pub n_lights: u32,
+    /// Number of surfaces that may hide a light.
+    pub n_surfaces: u32,
+    /// Step in cells.
+    pub step_cells: f64,
+    /// The most steps of a march.
+    pub max_steps: u32,
+    /// Number of cycles.
+    pub n_cycles: u32,
+}
+
+/// Room for the grids of the solver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room {
+    /// Cells of all levels.
+    pub n_cells: u64,
+    /// Sets of equations: 1 where channels share them, else 3.
+    pub n_sets: u32,
+}
+
+impl Room {
+    /// Returns the room for a grid of at most `n_cells`: a level has at most two thirds of the cells
+    /// of the finer one.
+    pub fn new(n_cells: u64, n_sets: u32) -> Room {
+        Room { n_cells: 3 * n_cells, n_sets }
+    }
+}
+
+buffers! {
+    /// Scratch of the pass.
+    pub struct Scratch(room: Room) {
+        /// By set and cell: what flows to the next cell along each axis, and what is lost, by φ.
+        operators: Buffer => [f32; 4], room.n_cells * u64::from(room.n_sets),
+            "diffusion.operators";
+        /// φ by cell.
+        phi: Buffer => [f32; 4], room.n_cells, "diffusion.phi";
+        /// Right-hand sides by cell.
+        source: Buffer => [f32; 4], room.n_cells, "diffusion.source";
+    }
+}
+
+/// A level and how it is merged to the next.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    level: LevelRecord,
+    halved: [u32; 3],
+}
+
+/// The pipelines and scratch buffers of the pass.
+pub struct Diffusion {
+    sources: Kernel,
+    system: Kernel,
+    coarsen: Kernel,
+    sweep: Kernel,
+    coarsest: Kernel,
+    restrict: Kernel,
+    prolong: Kernel,
+    flux: Kernel,
+    scratch: Scratch,
+    room: Room,
+}
+
+impl Diffusion {
+    /// Creates the pipelines and the scratch buffers.
+    ///
+    /// # Errors
+    /// Fails if a shader does not compile or the device cannot hold the buffers.
+    pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Diffusion> {
+        let macros = [("N_SETS", room.n_sets)];
+        let kernel = |name: &str, fields: &_| {
+            Kernel::with_macros(device, compiler, name, fields, &[], &macros)
+        };
+        Ok(Diffusion {
+            sources: kernel("diffusion.sources", SourcesPush::FIELDS)?,
+            system: kernel("diffusion.system", SystemPush::FIELDS)?,
+            coarsen: kernel("diffusion.coarsen", PairPush::FIELDS)?,
+            sweep: kernel("diffusion.sweep", SweepPush::FIELDS)?,
+            coarsest: kernel("diffusion.coarsest", CoarsestPush::FIELDS)?,
+            restrict: kernel("diffusion.restrict", PairPush::FIELDS)?,
+            prolong: kernel("diffusion.prolong", ProlongPush::FIELDS)?,
+            flux: kernel("diffusion.flux", FluxPush::FIELDS)?,
+            scratch: Scratch::new(device, room)?,
+            room,
+        })
+    }
+
+    /// Writes φ and F of every cell of `grid`.
+    ///
+    /// # Errors
+    /// Fails if the grid has more cells than there is room for.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: &DiffusionBuffers<'_>,
+        grid: &GridRecord,
+        of: &DiffusionParams,
+        work: &DiffusionWork,
+    ) -> Result<()> {
+        let (steps, n_all) = steps(grid);
+        if u64::from(n_all) > self.room.n_cells {
+            return Err(Error::limit(format!(
+                "diffusion on {n_all} cells of all levels, where there is room for {}",
+                self.room.n_cells
+            )));
+        }
+        let DiffusionBuffers { lights, regions, density, field } = *buffers;
+        let Scratch { operators, phi, source } = &self.scratch;
+        let n_cells = n_of(&steps[0].level);
+        let push = SourcesPush {
+            grid: *grid,
+            albedo: of.albedo,
+            inverse_chord: of.inverse_chord,
+            g: of.g,
+            straight: of.straight,
+            n_lights: work.n_lights,
+            n_surfaces: work.n_surfaces,
+            step_length: (work.step_cells * f64::from(grid.cell)) as f32,
+            max_steps: work.max_steps,
+        };
+        rec.dispatch(&self.sources, &[lights, regions, density, field], &push, n_cells)?;
+        let push = SystemPush {
+            grid: *grid,
+            absorbed: of.absorbed,
+            inverse_chord: of.inverse_chord,
+            kept: of.kept,
+            n_lights: work.n_lights,
+            n_all,
+        };
+        let system = [lights, density, field, operators, phi, source];
+        rec.dispatch(&self.system, &system, &push, n_cells)?;
+        for pair in steps.windows(2) {
+            let push = pair_push(pair, n_all);
+            rec.dispatch(&self.coarsen, &[operators], &push, n_of(&pair[1].level))?;
+        }
+        for _ in 0..work.n_cycles {
+            self.record_cycle(rec, &steps, n_all)?;
+        }
+        let push =
+            FluxPush { grid: *grid, kept: of.kept, inverse_chord: of.inverse_chord };
+        rec.dispatch(&self.flux, &[density, phi, field], &push, n_cells)
+    }
+
+    /// Two sweeps on every level on the way down, and one on the way up.
+    fn record_cycle(&self, rec: &mut Recorder<'_>, steps: &[Step], n_all: u32) -> Result<()> {
+        let Scratch { operators, phi, source } = &self.scratch;
+        for pair in steps.windows(2) {
+            self.record_sweeps(rec, &pair[0].level, n_all, &[0, 1, 0, 1])?;
+            let push = pair_push(pair, n_all);
+            let buffers = [operators, source, phi];
+            rec.dispatch(&self.restrict, &buffers, &push, n_of(&pair[1].level))?;
+        }
+        let level = steps[steps.len() - 1].level;
+        let push = CoarsestPush { level, n_all, n_sweeps: COARSEST_SWEEPS };
+        rec.dispatch_groups(&self.coarsest, &[operators, source, phi], &push, 1)?;
+        for pair in steps.windows(2).rev() {
+            let PairPush { fine, coarse, halved, .. } = pair_push(pair, n_all);
+            let push = ProlongPush { fine, coarse, halved, unused: 0 };
+            rec.dispatch(&self.prolong, &[phi], &push, n_of(&fine))?;
+            self.record_sweeps(rec, &fine, n_all, &[1, 0])?;
+        }
+        Ok(())
+    }
+
+    fn record_sweeps(
+        &self,
+        rec: &mut Recorder<'_>,
+        level: &LevelRecord,
+        n_all: u32,
+        colors: &[u32],
+    ) -> Result<()> {
+        let Scratch { operators, phi, source } = &self.scratch;
+        let [x, y, z] = level.n_cells;
+        let n = x.div_ceil(2) * y * z;
+        colors.iter().try_for_each(|&color| {
+            let push = SweepPush { level: *level, n_all, color };
+            rec.dispatch(&self.sweep, &[operators, source, phi], &push, n)
+        })
+    }
+}
+
+fn n_of(level: &LevelRecord) -> u32 {
+    level.n_cells.iter().product()
+}
+
+fn pair_push(pair: &[Step], n_all: u32) -> PairPush {
+    PairPush { fine: pair[0].level, coarse: pair[1].level, halved: pair[0].halved, n_all }
+}
+
+/// Returns all levels, the finest first, and the number of their cells.
+fn steps(grid: &GridRecord) -> (Vec<Step>, u32) {
+    let (mut steps, mut i_first) = (Vec::new(), 0);
+    let mut n = UVec3::from(grid.n_cells);
+    let mut edges = DVec3::new(1.0, f64::from(grid.aspect), 1.0);
+    loop {
+        let level = LevelRecord { n_cells: n.to_array(), i_first };
+        i_first += n_of(&level);
+        let next = coarser(n, edges);
+        let halved = next.map_or([false; 3], |(_, halved)| halved).map(u32::from);
+        steps.push(Step { level, halved });
+        let Some((coarse, _)) = next else { return (steps, i_first) };
+        n = coarse;
+        edges *= UVec3::from(halved).as_dvec3() + 1.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_follow_one_another_and_have_room() {
+        for (n, aspect) in [([32, 20, 14], 1.0), ([3, 3, 300], 1.0), ([5, 5, 5], 0.1), ([1; 3], 1.0)]
+        {
+            let grid = GridRecord { n_cells: n, aspect, ..GridRecord::default() };
+            let (steps, n_all) = steps(&grid);
+            let mut expected = 0;
+            for step in &steps {
+                assert_eq!(step.level.i_first, expected);
+                expected += n_of(&step.level);
+            }
+            assert_eq!(expected, n_all);
+            let n_finest = u64::from(n_of(&steps[0].level));
+            assert!(u64::from(n_all) <= Room::new(n_finest, 1).n_cells);
+            assert!(n_of(&steps[steps.len() - 1].level) <= 64);
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! scatter: computes the radiance that clouds scatter toward the eye as a medium.
+//!
+//! In: facets, lights, optical depths, regions (materials of surfaces and ground), media, and with
+//! diffusion the diffuse light by cell. Out: fluence of suns and lamps and radiance of clouds, I_d
+//! and L1 of surfaces and ground, linear RGB. Law: model.md §18, passes.md "scatter". Error: a few
+//! ulp a light, and the depth's relative error times the depth.
+
+use crate::error::Result;
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
+use crate::layout::frame::GridRecord;
+use crate::layout::record;
+use crate::model::scene::Octaves;
+
+record! {
+    /// Push constants of `scatter.comp`.
+    pub struct Push {
+        /// The density grid.
+        grid: GridRecord,
+        /// Eye, relative to the lighting origin.
+        eye: [f32; 3],
+        /// Number of facets.
+        n_facets: u32,
+        /// Number of lights.
+        n_lights: u32,
+        /// Number of surfaces and grounds: the regions before the clouds.
+        n_solids: u32,
+        /// 1 − g of the ways to surfaces and ground.
+        backward: f32,
+        /// Number of terms.
+        n_terms: u32,
+        /// Light of a term over that of the one before.
+        term_light: f32,
+        /// Optical depth, alike.
+        term_depth: f32,
+        /// Mean cosines, alike.
+        term_phase: f32,
+    }
+}
+
+bindings! {
+    /// The buffers of the pass.
+    pub struct ScatterBuffers {
+        /// `FacetRecord` by facet.
+        facets,
+        /// `LightRecord` by light.
+        lights,
+        /// `f32` optical depth by facet and light.
+        depths,
+        /// `RegionRecord` by region.
+        regions,
+        /// `f32`: a row a lobe.
+        table,
+        /// Output, `LitRecord` by facet.
+        lit,
+        /// `MediumRecord` by cloud.
+        media,
+        /// Four `[f32; 4]` by cell: φ and F along each axis; without diffusion not read.
+        field,
+    }
+}
+
+/// The light that the pass computes, besides the buffers.
+#[derive(Debug, Clone, Copy)]
+pub struct ScatterParams {
+    /// Eye, relative to the lighting origin.
+    pub eye: [f32; 3],
+    /// Number of facets.
+    pub n_facets: u32,
+    /// Number of lights.
+    pub n_lights: u32,
+    /// Number of surfaces and grounds.
+    pub n_solids: u32,
+    /// g of the ways to surfaces and ground.
+    pub forward: f64,
+    /// Terms of the light that is scattered once.
+    pub terms: Octaves,
+}
+
+/// The pipeline of the pass.
+pub struct Scatter {
+    kernel: Kernel,
+    is_diffuse: bool,
+}
+
+impl Scatter {
+    /// Creates the pipeline; `is_diffuse` if light is scattered further by diffusion.
+    ///
+    /// # Errors
+    /// Fails if the shader does not compile or the pipeline cannot be created.
+    pub fn new(device: &Device, compiler: &Compiler, is_diffuse: bool) -> Result<Scatter> {
+        let macros = [("DIFFUSE", u32::from(is_diffuse))];
+        let kernel =
+            Kernel::with_macros(device, compiler, "scatter", Push::FIELDS, &[], &macros)?;
+        Ok(Scatter { kernel, is_diffuse })
+    }
+
+    /// Writes the light of every facet.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: &ScatterBuffers<'_>,
+        grid: &GridRecord,
+        of: &ScatterParams,
+    ) -> Result<()> {
+        let push = Push {
+            grid: *grid,
+            eye: of.eye,
+            n_facets: of.n_facets,
+            n_lights: of.n_lights,
+            n_solids: of.n_solids,
+            backward: (1.0 - of.forward) as f32,
+            n_terms: of.terms.n,
+            term_light: of.terms.light as f32,
+            term_depth: of.terms.depth as f32,
+            term_phase: of.terms.phase as f32,
+        };
+        let buffers: [&Buffer; 8] = buffers.by_binding();
+        let n_buffers = if self.is_diffuse { 8 } else { 7 };
+        rec.dispatch(&self.kernel, &buffers[..n_buffers], &push, of.n_facets)
+    }
+}

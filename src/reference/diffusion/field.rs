@@ -1,0 +1,89 @@
+//! Diffuse light of a frame, and what a blob scatters of it toward the eye.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use super::multigrid::Multigrid;
+use super::sources::{DiffusionMedium, Sources};
+use super::system::{System, before, next};
+use crate::model::grid::GridSpec;
+use crate::model::light::Light;
+use crate::model::medium::ScatterLaw;
+use crate::reference::transmit::Obstacles;
+
+/// Fluence and flux of diffuse light in every cell.
+#[derive(Debug, Clone)]
+pub struct DiffuseLight {
+    spec: GridSpec,
+    /// φ, W m⁻², and F along each axis, W m⁻².
+    pub cells: Vec<[DVec3; 4]>,
+}
+
+impl DiffuseLight {
+    /// Computes the light in the cells of `obstacles` by `n_cycles` cycles.
+    pub fn new(
+        of: &DiffusionMedium,
+        obstacles: &Obstacles<'_>,
+        lights: &[Light],
+        n_cycles: u32,
+    ) -> DiffuseLight {
+        let (grid, cells) = (obstacles.spec, obstacles.cells);
+        let sources = Sources::new(of, obstacles, lights);
+        let system = System::new(of, grid, cells, &sources, lights);
+        let phi = Multigrid::new(system, grid.edges()).solve(n_cycles);
+        DiffuseLight::of_fluence(of, grid, cells, &sources, &phi)
+    }
+
+    /// Returns φ with the flux F = q − D∇φ; at the faces of the box by one-sided differences.
+    pub fn of_fluence(
+        of: &DiffusionMedium,
+        grid: &GridSpec,
+        cells: &[f64],
+        sources: &Sources,
+        phi: &[DVec3],
+    ) -> DiffuseLight {
+        let (n, h) = (grid.n_cells.as_usizevec3(), grid.edges());
+        let flux = |c: usize, axis: usize| {
+            let (after, prior) = (next(n, c, axis), before(n, c, axis));
+            let steps = f64::from(u8::from(after.is_some()) + u8::from(prior.is_some()));
+            let rise = phi[after.unwrap_or(c)] - phi[prior.unwrap_or(c)];
+            let slope = if steps > 0.0 { rise / (steps * h[axis]) } else { DVec3::ZERO };
+            sources.carried[c][axis] - of.reach(cells[c]) * slope
+        };
+        let of_cell = |c: usize| [phi[c], flux(c, 0), flux(c, 1), flux(c, 2)];
+        DiffuseLight { spec: *grid, cells: (0..cells.len()).map(of_cell).collect() }
+    }
+
+    /// Returns φ and F at `p`: trilinear between the cells' centres, and beyond the outermost ones
+    /// as on them.
+    pub fn at(&self, p: DVec3) -> [DVec3; 4] {
+        let n = self.spec.n_cells.as_usizevec3();
+        let at = (p - self.spec.low) / self.spec.edges() - DVec3::splat(0.5);
+        let at = at.max(DVec3::ZERO).min((n - 1).as_dvec3());
+        let (base, part) = (at.floor().as_usizevec3(), at - at.floor());
+        let mut sum = [DVec3::ZERO; 4];
+        for corner in 0..8usize {
+            let (mut c, mut weight, mut stride) = (0, 1.0, 1);
+            for axis in 0..3 {
+                let is_next = corner >> axis & 1;
+                weight *= if is_next == 1 { part[axis] } else { 1.0 - part[axis] };
+                c += stride * (base[axis] + is_next).min(n[axis] - 1);
+                stride *= n[axis];
+            }
+            for (sum, value) in sum.iter_mut().zip(self.cells[c]) {
+                *sum += weight * value;
+            }
+        }
+        sum
+    }
+
+    /// Returns the radiance that a blob at `p` scatters of the diffuse light along `outgoing`:
+    /// ϖ'(φ + 3g' F·ω)/4π, at least 0.
+    pub fn scattered(&self, law: &ScatterLaw, p: DVec3, outgoing: DVec3) -> DVec3 {
+        let [phi, x, y, z] = self.at(p);
+        let along = x * outgoing.x + y * outgoing.y + z * outgoing.z;
+        let g = law.phase.mean_cosine();
+        law.albedo * (phi + 3.0 * g * along).max(DVec3::ZERO) / (4.0 * PI)
+    }
+}

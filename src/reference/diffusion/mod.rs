@@ -1,0 +1,24 @@
+//! Diffusion of light in clouds, in f64: model.md §18 and passes.md "diffusion".
+//!
+//! In: the density grid, the mean medium, lights. Out: the fluence φ and the flux F of scattered
+//! light in every cell.
+//!
+//! - [`Sources`]: light that is scattered for the first time.
+//!
+//! - [`System`]: the linear equations of the cells.
+//!
+//! - [`Multigrid`]: their solution by cycles, as the device does.
+//!
+//! - [`DiffuseLight`]: all of them for a frame, and what a blob scatters of it.
+
+mod direct_solve;
+mod field;
+mod multigrid;
+mod sources;
+mod system;
+
+pub use direct_solve::solve;
+pub use field::DiffuseLight;
+pub use multigrid::Multigrid;
+pub use sources::{DiffusionMedium, Sources};
+pub use system::System;

@@ -1,0 +1,72 @@
+//! Light of suns and lamps that is scattered for the first time, cell by cell.
+
+use glam::{DMat3, DVec3};
+
+use crate::model::grid::GridSpec;
+use crate::model::light::Light;
+use crate::model::medium::MeanMedium;
+use crate::reference::parallel::parallel_map;
+use crate::reference::transmit::{Obstacles, Receiver};
+
+/// Numbers that diffusion depends on, besides densities and lights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DiffusionMedium {
+    /// ϖ, g and f.
+    pub mean: MeanMedium,
+    /// c: inverse length that bounds how far light travels where nothing scatters.
+    pub inverse_chord: f64,
+}
+
+impl DiffusionMedium {
+    /// Returns the numbers for a grid: c is 1 over the mean chord 4V/A of its box.
+    pub fn new(mean: MeanMedium, grid: &GridSpec) -> DiffusionMedium {
+        DiffusionMedium { mean, inverse_chord: grid.inverse_chord() }
+    }
+
+    /// Returns D = 1/(3σ(1 − ϖg) + c) at an extinction.
+    pub fn reach(&self, extinction: f64) -> DVec3 {
+        let MeanMedium { albedo, g, .. } = self.mean;
+        let loss = DVec3::ONE - albedo * g;
+        (3.0 * extinction * loss + DVec3::splat(self.inverse_chord)).recip()
+    }
+}
+
+/// What suns and lamps bring into the cells.
+#[derive(Debug, Clone)]
+pub struct Sources {
+    /// Q0: light that is scattered, W m⁻³.
+    pub scattered: Vec<DVec3>,
+    /// q = 3D Q1: D times three times the momentum that it keeps, a row an axis, W m⁻².
+    pub carried: Vec<[DVec3; 3]>,
+}
+
+impl Sources {
+    /// Returns the sources in the cells of `cells` density.
+    pub fn new(of: &DiffusionMedium, obstacles: &Obstacles<'_>, lights: &[Light]) -> Sources {
+        let MeanMedium { albedo, g, straight: f } = of.mean;
+        let depth = DVec3::ONE - albedo * f;
+        let spec = obstacles.spec;
+        let found = parallel_map(obstacles.cells.len(), |c| {
+            let p = spec.center(c);
+            let receiver = Receiver { position: p, i_region: u32::MAX };
+            let (mut fluence, mut flux) = (DVec3::ZERO, DMat3::ZERO);
+            for light in lights.iter().filter(|light| !light.is_sky()) {
+                let way = light.arrival(p);
+                let tau = obstacles.depths(&[receiver], std::slice::from_ref(light))[0];
+                let e = light.energy() * way.falloff * (-tau * depth).exp();
+                fluence += e;
+                // A column an axis.
+                for axis in 0..3 {
+                    *flux.col_mut(axis) -= e * way.toward[axis];
+                }
+            }
+            let extinction = obstacles.cells[c];
+            let carried = [0, 1, 2].map(|axis| {
+                3.0 * of.reach(extinction) * albedo * (g - f) * extinction * flux.col(axis)
+            });
+            (albedo * (1.0 - f) * extinction * fluence, carried)
+        });
+        let (scattered, carried) = found.into_iter().unzip();
+        Sources { scattered, carried }
+    }
+}

@@ -1,0 +1,121 @@
+//! The equations of the cells: what flows through their faces, what is absorbed, and what comes in.
+
+use glam::{DVec3, USizeVec3};
+
+use super::sources::{DiffusionMedium, Sources};
+use crate::model::grid::GridSpec;
+use crate::model::light::Light;
+
+/// The equations of the cells of a grid for each channel:
+/// Σ_n w (φ − φ_n) + sink φ = source.
+#[derive(Debug, Clone)]
+pub struct System {
+    /// Number of cells along each axis.
+    pub n_cells: USizeVec3,
+    /// w between each cell and the next one along each axis; 0 on the last.
+    pub next: Vec<[DVec3; 3]>,
+    /// Absorption, and what leaves the box, by φ.
+    pub sink: Vec<DVec3>,
+    /// Source of each cell.
+    pub source: Vec<DVec3>,
+}
+
+/// Returns the index of the next cell along an axis, if there is one.
+pub(super) fn next(n: USizeVec3, c: usize, axis: usize) -> Option<usize> {
+    let stride = [1, n.x, n.x * n.y][axis];
+    (c / stride % n[axis] + 1 < n[axis]).then_some(c + stride)
+}
+
+/// Returns the index of the cell before along an axis, if there is one.
+pub(super) fn before(n: USizeVec3, c: usize, axis: usize) -> Option<usize> {
+    let stride = [1, n.x, n.x * n.y][axis];
+    (c / stride % n[axis] > 0).then(|| c - stride)
+}
+
+/// Returns the light of the sky that comes in through a face of the box: `side` is 0 for the
+/// lower and 1 for the upper face of an axis.
+fn of_sky(lights: &[Light], axis: usize, side: usize) -> DVec3 {
+    let share = match (axis, side) {
+        (1, 1) => 1.0,
+        (1, _) => 0.0,
+        _ => 0.5,
+    };
+    let of = |light: &Light| match *light {
+        Light::Sky { irradiance, constant } => irradiance * (share + constant),
+        _ => DVec3::ZERO,
+    };
+    lights.iter().map(of).sum()
+}
+
+impl System {
+    /// Returns the equations of the cells of `grid`, in which extinction is `cells`.
+    pub fn new(
+        of: &DiffusionMedium,
+        grid: &GridSpec,
+        cells: &[f64],
+        sources: &Sources,
+        lights: &[Light],
+    ) -> System {
+        let n = grid.n_cells.as_usizevec3();
+        let reach: Vec<DVec3> = cells.iter().map(|sigma| of.reach(*sigma)).collect();
+        let h = grid.edges();
+        let mut system = System {
+            n_cells: n,
+            next: vec![[DVec3::ZERO; 3]; cells.len()],
+            sink: cells.iter().map(|sigma| sigma * (DVec3::ONE - of.mean.albedo)).collect(),
+            source: sources.scattered.clone(),
+        };
+        for c in 0..cells.len() {
+            for axis in 0..3 {
+                let h = h[axis];
+                let carried = |c: usize| sources.carried[c][axis];
+                match next(n, c, axis) {
+                    Some(after) => {
+                        let (a, b) = (reach[c], reach[after]);
+                        system.next[c][axis] = 2.0 * a * b / (a + b) / (h * h);
+                        system.source[c] -= 0.5 * (carried(c) + carried(after)) / h;
+                    }
+                    None => system.add_face(c, reach[c], h, of_sky(lights, axis, 1)),
+                }
+                match before(n, c, axis) {
+                    Some(prior) => system.source[c] += 0.5 * (carried(prior) + carried(c)) / h,
+                    None => system.add_face(c, reach[c], h, of_sky(lights, axis, 0)),
+                }
+            }
+        }
+        system
+    }
+
+    /// Adds a face of the box: Marshak's condition φ/4 − F/2 = J with what flows in, F, over half a
+    /// cell.
+    fn add_face(&mut self, c: usize, reach: DVec3, h: f64, arriving: DVec3) {
+        let through = (2.0 + 0.5 * h / reach).recip() / h;
+        self.sink[c] += through;
+        self.source[c] += 4.0 * through * arriving;
+    }
+
+    /// Returns Σ w (φ − φ_n) + sink φ in cell `c`.
+    pub fn applied(&self, phi: &[DVec3], c: usize) -> DVec3 {
+        let of_axis = |axis: usize| {
+            let mut sum = DVec3::ZERO;
+            if let Some(after) = next(self.n_cells, c, axis) {
+                sum += self.next[c][axis] * (phi[c] - phi[after]);
+            }
+            if let Some(prior) = before(self.n_cells, c, axis) {
+                sum += self.next[prior][axis] * (phi[c] - phi[prior]);
+            }
+            sum
+        };
+        self.sink[c] * phi[c] + (0..3).map(of_axis).sum::<DVec3>()
+    }
+
+    /// Returns the sum of the factors of φ in cell `c`.
+    pub fn diagonal(&self, c: usize) -> DVec3 {
+        let of_axis = |axis: usize| {
+            let after = next(self.n_cells, c, axis).map(|_| self.next[c][axis]);
+            let prior = before(self.n_cells, c, axis).map(|p| self.next[p][axis]);
+            after.unwrap_or_default() + prior.unwrap_or_default()
+        };
+        self.sink[c] + (0..3).map(of_axis).sum::<DVec3>()
+    }
+}

@@ -4,7 +4,8 @@
 #include "diffusion.glsl"
 
 // Solves the equations of the coarsest grid by sweeps in one workgroup (passes.md "diffusion").
-// In: operators, right-hand sides. Out: phi, which begins at 0.
+// In: operators, right-hand sides. Out: phi. Law: Gauss and Seidel, the cells of one colour of a
+// chessboard at once, from phi = 0.
 
 layout(local_size_x = 64) in;
 
@@ -13,9 +14,10 @@ layout(push_constant) uniform Push {
     uint n_all;
     uint n_sweeps;
 } push;
-READS(0, vec4, operators)
+TEXELS(0, operators)
 READS(1, vec4, source)
 UPDATES(2, vec4, phi)
+#define PHI(at) phi[index_of(push.level, at)].rgb
 #include "equations.glsl"
 
 void main() {
@@ -24,13 +26,16 @@ void main() {
     bool is_cell = c < level.n_cells.x * level.n_cells.y * level.n_cells.z;
     ivec3 at = place_of(level, c);
     int k = index_of(level, at);
+    if (is_cell) {
+        phi[k] = vec4(0.0);
+    }
     for (uint i = 0; i < 2u * push.n_sweeps; ++i) {
+        memoryBarrierBuffer();
+        barrier();
         if (is_cell && (uint(at.x + at.y + at.z) + i) % 2u == 0u) {
             vec3 flows, all;
             around(level, at, flows, all);
             phi[k] = vec4((source[k].rgb + flows) / all, 0.0);
         }
-        memoryBarrierBuffer();
-        barrier();
     }
 }

@@ -4,20 +4,38 @@
 #include "each.glsl"
 #include "diffusion.glsl"
 
-// Adds up what the equations of merged cells leave over (passes.md "diffusion").
-// In: operators, phi of the finer grid. In, out: right-hand sides of the coarser grid. Out: its
-// phi = 0.
+// Adds up what the equations of merged cells leave over, and begins to solve those of the coarser
+// grid for it (passes.md "diffusion").
+// In: operators, phi of the finer grid. In, out: right-hand sides. Out: phi of the coarser grid
+// after a sweep from phi = 0.
 
 layout(push_constant) uniform Push {
     Level fine;
     Level coarse;
+    // 1 along the axes that are halved.
     uvec3 halved;
     uint n_all;
 } push;
-READS(0, vec4, operators)
+TEXELS(0, operators)
 UPDATES(1, vec4, source)
-UPDATES(2, vec4, phi)
+TEXELS(2, before)
+WRITES(3, vec4, after)
+#define PHI(at) uintBitsToFloat(TEXEL(before, index_of(push.fine, at))).rgb
 #include "equations.glsl"
+
+// Returns the sum of the factors of phi in a cell's equation.
+vec3 diagonal(Level level, ivec3 at) {
+    int c = index_of(level, at);
+    ivec3 stride = strides_of(level);
+    FACTORS own = factors(c);
+    vec3 sum = factor(own, 0) + factor(own, 1) + factor(own, 2) + factor(own, 3);
+    for (int axis = 0; axis < 3; ++axis) {
+        if (at[axis] > 0) {
+            sum += factor(factors(c - stride[axis]), axis);
+        }
+    }
+    return sum;
+}
 
 void main() {
     Level coarse = push.coarse;
@@ -30,15 +48,14 @@ void main() {
             for (int y = first.y; y < end.y; ++y) {
                 for (int x = first.x; x < end.x; ++x) {
                     ivec3 from = ivec3(x, y, z);
-                    int c = index_of(push.fine, from);
                     vec3 flows, all;
                     around(push.fine, from, flows, all);
-                    left += source[c].rgb + flows - all * phi[c].rgb;
+                    left += source[index_of(push.fine, from)].rgb + flows - all * PHI(from);
                 }
             }
         }
         int k = index_of(coarse, at);
         source[k] = vec4(left, 0.0);
-        phi[k] = vec4(0.0);
+        after[k] = vec4(LONG_STEP * left / diagonal(coarse, at), 0.0);
     }
 }

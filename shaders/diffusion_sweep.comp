@@ -4,33 +4,46 @@
 #include "each.glsl"
 #include "diffusion.glsl"
 
-// Solves the equation of every second cell for its own phi (passes.md "diffusion").
-// In: operators, right-hand sides. In, out: phi. Law: Gauss and Seidel, the cells of one colour of a
-// chessboard at once.
+// Moves every phi toward the solution of its own equation (passes.md "diffusion").
+// In: operators, right-hand sides, phi; with CORRECTED phi of the coarser grid, which is added to
+// it first. Out: phi. Law: Jacobi's, phi + step (source - A phi)/diagonal.
+
+#ifndef CORRECTED
+#define CORRECTED 0
+#endif
 
 layout(push_constant) uniform Push {
     Level level;
+    Level coarse;
+    // 1 along the axes that are halved.
+    uvec3 halved;
     uint n_all;
-    uint color;
+    float step;
 } push;
-READS(0, vec4, operators)
-READS(1, vec4, source)
-UPDATES(2, vec4, phi)
+TEXELS(0, operators)
+TEXELS(1, source)
+TEXELS(2, before)
+WRITES(3, vec4, after)
+#if CORRECTED
+// Phi of the coarser grid.
+#define PHI(at) (phi_of(before, push.level, at) + phi_of(before, push.coarse, (at) >> halved()))
+#else
+#define PHI(at) phi_of(before, push.level, at)
+#endif
+#define phi_of(name, level, at) uintBitsToFloat(TEXEL(name, index_of(level, at))).rgb
+ivec3 halved() { return ivec3(push.halved); }
+
 #include "equations.glsl"
 
 void main() {
     Level level = push.level;
-    uint n_row = (level.n_cells.x + 1u) / 2u;
-    FOR_EACH(i, n_row * level.n_cells.y * level.n_cells.z) {
-        uint row = i / n_row;
-        uint y = row % level.n_cells.y, z = row / level.n_cells.y;
-        uint x = 2u * (i - row * n_row) + (y + z + push.color) % 2u;
-        if (x < level.n_cells.x) {
-            ivec3 at = ivec3(x, y, z);
-            int c = index_of(level, at);
-            vec3 flows, all;
-            around(level, at, flows, all);
-            phi[c] = vec4((source[c].rgb + flows) / all, 0.0);
-        }
+    FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
+        ivec3 at = place_of(level, i);
+        int c = index_of(level, at);
+        vec3 flows, all;
+        around(level, at, flows, all);
+        vec3 own = PHI(at);
+        vec3 right = uintBitsToFloat(TEXEL(source, c)).rgb;
+        after[c] = vec4(own + push.step * ((right + flows) / all - own), 0.0);
     }
 }

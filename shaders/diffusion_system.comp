@@ -5,8 +5,8 @@
 #include "diffusion.glsl"
 
 // Writes the equations of the finest cells (model.md §18, passes.md "diffusion").
-// In: lights, the density grid, sources of "diffusion_sources". Out: operators, phi = 0, and the
-// right-hand sides. Law: -div(D grad phi) + absorption phi = Q0 - div q, with Marshak's condition
+// In: lights, the density grid, sources of "diffusion_sources". Out: operators, the right-hand
+// sides, and phi after a sweep from phi = 0. Law: -div(D grad phi) + absorption phi = Q0 - div q, with Marshak's condition
 // phi/4 - F/2 = J at the faces of the box. Error: some ulp.
 
 layout(push_constant) uniform Push {
@@ -21,6 +21,8 @@ layout(push_constant) uniform Push {
 READS(0, Light, lights)
 FLOATS(1, density)
 READS(2, vec4, field)
+const float LONG_STEP = 1.6;
+
 // [set][cell]
 WRITES(3, vec4, operators)
 WRITES(4, vec4, phi)
@@ -49,6 +51,7 @@ void main() {
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 own = reach_of(c);
         vec3 sink = FLOAT(density, c) * push.absorbed, right = field[4 * c].rgb;
+        vec3 prior_w = vec3(0.0);
         // w along each axis, by channel.
         vec3 next[3];
         for (int axis = 0; axis < 3; ++axis) {
@@ -67,6 +70,8 @@ void main() {
             }
             if (at[axis] > 0) {
                 int prior = c - stride[axis];
+                vec3 other = reach_of(prior);
+                prior_w += 2.0 * own * other / (own + other) * inverse * inverse;
                 right += 0.5 * inverse * (carried + field[4 * prior + 1 + axis].rgb);
             } else {
                 sink += through;
@@ -77,7 +82,8 @@ void main() {
             operators[c + set * int(push.n_all)] =
                 vec4(next[0][set], next[1][set], next[2][set], sink[set]);
         }
-        phi[c] = vec4(0.0);
+        vec3 diagonal = next[0] + next[1] + next[2] + prior_w + sink;
+        phi[c] = vec4(LONG_STEP * right / diagonal, 0.0);
         source[c] = vec4(right, 0.0);
     }
 }

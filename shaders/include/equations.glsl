@@ -1,32 +1,45 @@
 // The equations of cells: sum w (phi - phi_n) + sink phi = source. Needs diffusion.glsl,
-// `operators` [set][cell] (w toward the next cell along each axis, and sink) and `phi`, and n_all in
-// the push constants: the cells of all levels.
+// `TEXELS operators` [set][cell] (w toward the next cell along each axis, and sink), n_all in the
+// push constants (the cells of all levels), and PHI(at): phi of the cell at a place.
 
-// Returns component k of the equations of cell c, by channel.
-vec3 factors(int c, int k) {
-#if N_SETS == 3
-    int n = int(push.n_all);
-    return vec3(operators[c][k], operators[c + n][k], operators[c + 2 * n][k]);
-#else
-    return vec3(operators[c][k]);
-#endif
+// The steps of a pair of sweeps: together they damp what two neighbours do not share best.
+const float LONG_STEP = 1.6;
+const float SHORT_STEP = 0.6;
+
+vec4 operator_at(int c, int set) {
+    return uintBitsToFloat(TEXEL(operators, c + set * int(push.n_all)));
 }
+
+// Returns the equations of cell c, a column a channel.
+#if N_SETS == 3
+#define FACTORS mat3x4
+mat3x4 factors(int c) {
+    return mat3x4(operator_at(c, 0), operator_at(c, 1), operator_at(c, 2));
+}
+vec3 factor(mat3x4 of, int k) { return vec3(of[0][k], of[1][k], of[2][k]); }
+#else
+#define FACTORS vec4
+vec4 factors(int c) { return operator_at(c, 0); }
+vec3 factor(vec4 of, int k) { return vec3(of[k]); }
+#endif
 
 // Sets `flows` to sum w phi_n over the neighbours of a cell, and `all` to the sum of w and sink.
 void around(Level level, ivec3 at, out vec3 flows, out vec3 all) {
     int c = index_of(level, at);
     ivec3 stride = strides_of(level);
+    FACTORS own = factors(c);
     flows = vec3(0.0);
-    all = factors(c, 3);
+    all = factor(own, 3);
     for (int axis = 0; axis < 3; ++axis) {
+        ivec3 to = ivec3(axis == 0, axis == 1, axis == 2);
         if (at[axis] + 1 < int(level.n_cells[axis])) {
-            vec3 w = factors(c, axis);
-            flows += w * phi[c + stride[axis]].rgb;
+            vec3 w = factor(own, axis);
+            flows += w * PHI(at + to);
             all += w;
         }
         if (at[axis] > 0) {
-            vec3 w = factors(c - stride[axis], axis);
-            flows += w * phi[c - stride[axis]].rgb;
+            vec3 w = factor(factors(c - stride[axis]), axis);
+            flows += w * PHI(at - to);
             all += w;
         }
     }

@@ -2,8 +2,8 @@
 //!
 //! In: the density grid, lights, regions (rectangles). Out: fluence φ and flux F by cell. Law:
 //! −∇·(D∇φ) + σ(1 − ϖ)φ = Q0 − ∇·q with Marshak's condition at the box, by a fixed number of
-//! multigrid cycles. Source: model.md §18, passes.md. Error: of a cycle about a seventh of what the
-//! cycle before left; of rounding 2e-6 of φ.
+//! multigrid cycles. Source: model.md §18, passes.md. Error: of a cycle about an eighth of what
+//! the cycle before left; of rounding 2e-6 of φ.
 
 use glam::{DVec3, UVec3};
 
@@ -58,7 +58,7 @@ record! {
 }
 
 record! {
-    /// Push constants of the kernels between two levels.
+    /// Push constants of `diffusion_coarsen.comp` and `diffusion_restrict.comp`.
     pub struct PairPush {
         /// The finer level.
         fine: LevelRecord,
@@ -72,28 +72,18 @@ record! {
 }
 
 record! {
-    /// Push constants of `diffusion_prolong.comp`.
-    pub struct ProlongPush {
-        /// The finer level.
-        fine: LevelRecord,
-        /// The coarser level.
-        coarse: LevelRecord,
-        /// 1 along the axes that are halved.
-        halved: [u32; 3],
-        /// Padding.
-        unused: u32,
-    }
-}
-
-record! {
     /// Push constants of `diffusion_sweep.comp`.
     pub struct SweepPush {
         /// The level.
         level: LevelRecord,
+        /// The coarser level, where its φ is added.
+        coarse: LevelRecord,
+        /// 1 along the axes that are halved.
+        halved: [u32; 3],
         /// Cells of all levels.
         n_all: u32,
-        /// 0 or 1: the cells of which the sum of the coordinates is even or odd.
-        color: u32,
+        /// Length of the step, 1 to the solution of the cell's own equation.
+        step: f32,
     }
 }
 
@@ -123,6 +113,9 @@ record! {
 
 /// Sweeps of the coarsest grid.
 const COARSEST_SWEEPS: u32 = 16;
+/// Steps of a pair of sweeps.
+const LONG_STEP: f32 = 1.6;
+const SHORT_STEP: f32 = 0.6;
 
 bindings! {
     /// The buffers of the pass that others share.
@@ -207,11 +200,13 @@ buffers! {
     pub struct Scratch(room: Room) {
         /// By set and cell: what flows to the next cell along each axis, and what is lost, by φ.
         operators: Buffer => [f32; 4], room.n_cells * u64::from(room.n_sets),
-            "diffusion.operators";
-        /// φ by cell.
-        phi: Buffer => [f32; 4], room.n_cells, "diffusion.phi";
+            "diffusion.operators", Texels;
+        /// φ by cell, before and after every second sweep.
+        phi: Buffer => [f32; 4], room.n_cells, "diffusion.phi", Texels;
+        /// φ by cell after the other sweeps, and in the end.
+        next_phi: Buffer => [f32; 4], room.n_cells, "diffusion.next_phi", Texels;
         /// Right-hand sides by cell.
-        source: Buffer => [f32; 4], room.n_cells, "diffusion.source";
+        source: Buffer => [f32; 4], room.n_cells, "diffusion.source", Texels;
     }
 }
 
@@ -228,9 +223,9 @@ pub struct Diffusion {
     system: Kernel,
     coarsen: Kernel,
     sweep: Kernel,
+    corrected: Kernel,
     coarsest: Kernel,
     restrict: Kernel,
-    prolong: Kernel,
     flux: Kernel,
     scratch: Scratch,
     room: Room,
@@ -251,9 +246,16 @@ impl Diffusion {
             system: kernel("diffusion.system", SystemPush::FIELDS)?,
             coarsen: kernel("diffusion.coarsen", PairPush::FIELDS)?,
             sweep: kernel("diffusion.sweep", SweepPush::FIELDS)?,
+            corrected: Kernel::with_macros(
+                device,
+                compiler,
+                "diffusion.sweep",
+                SweepPush::FIELDS,
+                &[],
+                &[("N_SETS", room.n_sets), ("CORRECTED", 1)],
+            )?,
             coarsest: kernel("diffusion.coarsest", CoarsestPush::FIELDS)?,
             restrict: kernel("diffusion.restrict", PairPush::FIELDS)?,
-            prolong: kernel("diffusion.prolong", ProlongPush::FIELDS)?,
             flux: kernel("diffusion.flux", FluxPush::FIELDS)?,
             scratch: Scratch::new(device, room)?,
             room,
@@ -280,7 +282,7 @@ impl Diffusion {
             )));
         }
         let DiffusionBuffers { lights, regions, density, field } = *buffers;
-        let Scratch { operators, phi, source } = &self.scratch;
+        let Scratch { operators, phi, next_phi, source } = &self.scratch;
         let n_cells = n_of(&steps[0].level);
         let push = SourcesPush {
             grid: *grid,
@@ -308,49 +310,55 @@ impl Diffusion {
             let push = pair_push(pair, n_all);
             rec.dispatch(&self.coarsen, &[operators], &push, n_of(&pair[1].level))?;
         }
-        for _ in 0..work.n_cycles {
-            self.record_cycle(rec, &steps, n_all)?;
+        for i in 0..work.n_cycles {
+            self.record_cycle(rec, &steps, n_all, i == 0)?;
         }
         let push =
             FluxPush { grid: *grid, kept: of.kept, inverse_chord: of.inverse_chord };
-        rec.dispatch(&self.flux, &[density, phi, field], &push, n_cells)
+        rec.dispatch(&self.flux, &[density, next_phi, field], &push, n_cells)
     }
 
-    /// Two sweeps on every level on the way down, and one on the way up.
-    fn record_cycle(&self, rec: &mut Recorder<'_>, steps: &[Step], n_all: u32) -> Result<()> {
-        let Scratch { operators, phi, source } = &self.scratch;
-        for pair in steps.windows(2) {
-            self.record_sweeps(rec, &pair[0].level, n_all, &[0, 1, 0, 1])?;
+    /// Two sweeps on every level on the way down, and two on the way up. The first sweep from φ = 0
+    /// is part of what makes the right-hand sides.
+    fn record_cycle(
+        &self,
+        rec: &mut Recorder<'_>,
+        steps: &[Step],
+        n_all: u32,
+        is_first: bool,
+    ) -> Result<()> {
+        let Scratch { operators, phi, next_phi, source } = &self.scratch;
+        for (i, pair) in steps.windows(2).enumerate() {
             let push = pair_push(pair, n_all);
-            let buffers = [operators, source, phi];
+            if i == 0 && !is_first {
+                self.record_sweep(rec, &self.sweep, [next_phi, phi], &push, LONG_STEP)?;
+            }
+            self.record_sweep(rec, &self.sweep, [phi, next_phi], &push, SHORT_STEP)?;
+            let buffers = [operators, source, next_phi, phi];
             rec.dispatch(&self.restrict, &buffers, &push, n_of(&pair[1].level))?;
         }
         let level = steps[steps.len() - 1].level;
         let push = CoarsestPush { level, n_all, n_sweeps: COARSEST_SWEEPS };
-        rec.dispatch_groups(&self.coarsest, &[operators, source, phi], &push, 1)?;
+        rec.dispatch_groups(&self.coarsest, &[operators, source, next_phi], &push, 1)?;
         for pair in steps.windows(2).rev() {
-            let PairPush { fine, coarse, halved, .. } = pair_push(pair, n_all);
-            let push = ProlongPush { fine, coarse, halved, unused: 0 };
-            rec.dispatch(&self.prolong, &[phi], &push, n_of(&fine))?;
-            self.record_sweeps(rec, &fine, n_all, &[1, 0])?;
+            let push = pair_push(pair, n_all);
+            self.record_sweep(rec, &self.corrected, [next_phi, phi], &push, LONG_STEP)?;
+            self.record_sweep(rec, &self.sweep, [phi, next_phi], &push, SHORT_STEP)?;
         }
         Ok(())
     }
 
-    fn record_sweeps(
+    fn record_sweep(
         &self,
         rec: &mut Recorder<'_>,
-        level: &LevelRecord,
-        n_all: u32,
-        colors: &[u32],
+        kernel: &Kernel,
+        [from, to]: [&Buffer; 2],
+        &PairPush { fine, coarse, halved, n_all }: &PairPush,
+        step: f32,
     ) -> Result<()> {
-        let Scratch { operators, phi, source } = &self.scratch;
-        let [x, y, z] = level.n_cells;
-        let n = x.div_ceil(2) * y * z;
-        colors.iter().try_for_each(|&color| {
-            let push = SweepPush { level: *level, n_all, color };
-            rec.dispatch(&self.sweep, &[operators, source, phi], &push, n)
-        })
+        let Scratch { operators, source, .. } = &self.scratch;
+        let push = SweepPush { level: fine, coarse, halved, n_all, step };
+        rec.dispatch(kernel, &[operators, source, from, to], &push, n_of(&fine))
     }
 }
 

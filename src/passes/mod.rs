@@ -68,7 +68,6 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "diffusion_coarsen.comp",
     "diffusion_coarsest.comp",
     "diffusion_flux.comp",
-    "diffusion_prolong.comp",
     "diffusion_restrict.comp",
     "diffusion_sources.comp",
     "diffusion_sweep.comp",

@@ -65,9 +65,9 @@ keys! { OCTAVES: fn octaves(s) -> Octaves { Octaves;
 }}
 
 keys! { DIFFUSION: fn diffusion(s) -> DiffusionSettings { DiffusionSettings;
-    /// Cycles of the multigrid solver of mode "diffusion". Each leaves about a seventh of the error
+    /// Cycles of the multigrid solver of mode "diffusion". Each leaves about an eighth of the error
     /// of the one before.
-    cycles ["diffusion_cycles"]: integer(3, 1, MAX_CYCLES);
+    cycles ["diffusion_cycles"]: integer(2, 1, MAX_CYCLES);
 }}
 
 keys! { PAIRS: fn pairs(s) -> Pairs { Pairs;

@@ -15,6 +15,9 @@ pub struct Multigrid {
 
 /// Sweeps of the coarsest grid.
 const COARSEST_SWEEPS: u32 = 16;
+/// Steps of a pair of sweeps: a long and a short one together damp what neighbours do not share
+/// best.
+const STEPS: [f64; 2] = [1.6, 0.6];
 
 /// Returns the cell of the coarser grid that cell `c` of `n` belongs to.
 fn parent(n: USizeVec3, coarse: USizeVec3, halved: [bool; 3], c: usize) -> usize {
@@ -47,18 +50,16 @@ impl Multigrid {
         phi
     }
 
-    /// Two sweeps, a correction by the coarser grid, and a sweep.
-    fn cycle(&self, level: usize, phi: &mut [DVec3], source: &[DVec3]) {
+    /// Two sweeps, a correction by the coarser grid, and two sweeps.
+    fn cycle(&self, level: usize, phi: &mut Vec<DVec3>, source: &[DVec3]) {
         let system = &self.levels[level];
         let Some(axes) = self.halved.get(level) else {
             for _ in 0..COARSEST_SWEEPS {
-                system.sweep(phi, source, [0, 1]);
+                system.sweep_by_colors(phi, source);
             }
             return;
         };
-        for _ in 0..2 {
-            system.sweep(phi, source, [0, 1]);
-        }
+        STEPS.iter().for_each(|step| *phi = system.swept(phi, source, *step));
         let coarse = self.levels[level + 1].n_cells;
         let of = |c: usize| parent(system.n_cells, coarse, *axes, c);
         let n_coarse = coarse.element_product();
@@ -71,16 +72,25 @@ impl Multigrid {
         for (c, phi) in phi.iter_mut().enumerate() {
             *phi += correction[of(c)];
         }
-        system.sweep(phi, source, [1, 0]);
+        STEPS.iter().for_each(|step| *phi = system.swept(phi, source, *step));
     }
 }
 
 impl System {
-    /// Solves the equation of each cell for its own φ, first in cells of one colour of a
-    /// chessboard, then in those of the other.
-    fn sweep(&self, phi: &mut [DVec3], source: &[DVec3], colors: [usize; 2]) {
+    /// Returns φ after a sweep of Jacobi's: every φ moves toward the solution of its own equation,
+    /// by the given step.
+    fn swept(&self, phi: &[DVec3], source: &[DVec3], step: f64) -> Vec<DVec3> {
+        let of = |c: usize| {
+            phi[c] + step * (source[c] - self.applied(phi, c)) / self.diagonal(c)
+        };
+        (0..phi.len()).map(of).collect()
+    }
+
+    /// Solves the equation of each cell for its own φ, first in the even cells of a chessboard,
+    /// then in the odd ones.
+    fn sweep_by_colors(&self, phi: &mut [DVec3], source: &[DVec3]) {
         let n = self.n_cells;
-        for color in colors {
+        for color in [0, 1] {
             for c in 0..phi.len() {
                 let at = [c % n.x, c / n.x % n.y, c / (n.x * n.y)];
                 if at.iter().sum::<usize>() % 2 == color {

@@ -6,8 +6,8 @@
 
 // Writes the equations of the finest cells (model.md §18, passes.md "diffusion").
 // In: lights, the density grid, sources of "diffusion_sources". Out: operators, the right-hand
-// sides, and phi after a sweep from phi = 0. Law: -div(D grad phi) + absorption phi = Q0 - div q, with Marshak's condition
-// phi/4 - F/2 = J at the faces of the box. Error: some ulp.
+// sides, and phi after a sweep from phi = 0. Law: -div(D grad phi) + absorption phi = Q0 - div q,
+// with Marshak's condition phi/4 - F/2 = J at the faces of the box. Error: some ulp.
 
 layout(push_constant) uniform Push {
     Grid grid;

@@ -20,7 +20,7 @@ layout(constant_id = 0) const uint APART = 0;
 #ifndef DEPTHS
 #define DEPTHS 0
 #endif
-// What a way has that a surface bars, or that leads to a light without energy.
+// Result of a way that a surface bars, or that leads to a light without energy.
 #if DEPTHS
 const float BARRED = 1e30;
 #else

@@ -11,7 +11,7 @@ use nimbus::gpu::Compiler;
 use nimbus::layout::facet::FacetRecord;
 use nimbus::model::cloud::runs;
 use nimbus::reference::facet_runs::{grouped, merged};
-use nimbus::reference::facets::{FacetPlace, CONDITIONING, Facet, FacetSources};
+use nimbus::reference::facets::{CONDITIONING, Facet, FacetPlace, FacetSources};
 use nimbus::reference::morton;
 use nimbus::reference::rounding::DIVISION_ERROR;
 use shells::{
@@ -212,7 +212,8 @@ impl Runs {
             blobs: &scene.blobs,
             sigma_means: &means,
             regions: &regions,
-            colors: &colors, place: FacetPlace::Shell
+            colors: &colors,
+            place: FacetPlace::Shell,
         };
         let facets =
             grouped(&scene.spec, cells, &members, &scene.centers(), &self.order, &self.runs);

@@ -242,8 +242,8 @@ fn facets_lie_where_their_origins_are() {
         hills,
     );
     let run = |gpu: &mut Gpu, compiler: Option<&Compiler>| -> Vec<FacetRecord> {
-        let pass =
-            Facets::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), false, false).expect("facets");
+        let pass = Facets::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), false, false)
+            .expect("facets");
         let (regions, points) = (gpu.upload(&relief.regions), gpu.upload(&relief.points));
         let n = relief.points.len() as u32;
         let facets = gpu.upload(&vec![FacetRecord::default(); (n + 5) as usize]);

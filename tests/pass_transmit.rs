@@ -104,7 +104,8 @@ fn rectangles_hide_and_marches_begin_and_end_where_the_way_does() {
 fn by_itself_the_transmittance_is_the_same() {
     let mut gpu = Gpu::new();
     let case = room();
-    let pass = Transmit::new(&gpu.device, &gpu.compiler, Arriving::Share, &PLAIN.into()).expect("transmit");
+    let pass = Transmit::new(&gpu.device, &gpu.compiler, Arriving::Share, &PLAIN.into())
+        .expect("transmit");
     let none = gpu.buffer::<f32>(0);
     let alone = case.dispatch(&mut gpu, &pass, &none, [1.0, 0.5]);
     assert_eq!(alone, case.run(&mut gpu, None, 1.0, 0.5)[0]);

@@ -1,6 +1,7 @@
 // The equations of cells: sum w (phi - phi_n) + sink phi = source. Needs diffusion.glsl,
-// `TEXELS operators` [set][cell] (w toward the next cell along each axis, and sink), n_all in the
-// push constants (the cells of all levels), and PHI(at): phi of the cell at a place.
+// `TEXELS operators` [set][cell], and PHI(at), the phi of the cell at a place. An operator has w
+// toward the next cell along each axis, and sink. n_all in the push constants is the number of
+// cells of all levels.
 
 // The steps of a pair of sweeps: together they damp what two neighbours do not share best.
 const float LONG_STEP = 1.6;

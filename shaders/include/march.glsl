@@ -1,5 +1,5 @@
-// The march through the density grid (passes.md "transmit"). Needs density.glsl and sum.glsl, and in
-// the push constants `Grid grid`, `float step_length` and `uint max_steps`.
+// The march through the density grid (passes.md "transmit"). Needs density.glsl and sum.glsl. The
+// push constants have `Grid grid`, `float step_length` and `uint max_steps`.
 
 // Returns where the ray from p along d enters and leaves the grid's box; the end is before the
 // beginning where the ray misses the box.
@@ -19,8 +19,8 @@ WEIGHTS2 crossing(PLACE p, PLACE d, WEIGHT distance) {
     return WEIGHTS2(enter, leave);
 }
 
-// Returns the optical depth from p along d, by midpoint samples. There is nothing to march for where
-// the ray misses the box.
+// Returns the optical depth from p along d, by midpoint samples. There is nothing to march for
+// where the ray misses the box.
 WEIGHT depth_along(PLACE p, PLACE d, WEIGHT distance, bool is_wanted) {
     WEIGHTS2 part = crossing(p, d, distance);
     WEIGHT length_total = part.y - part.x;

@@ -20,7 +20,7 @@ vec3 albedo_of(vec3 reflected, float g) {
     return (1.0 - squared) / max(1.0 - g * squared, vec3(1e-30));
 }
 
-// What a cloud's particles of one colour scatter: albedo and share of the depth that counts.
+// Albedo, and share of the depth that counts, of particles of one colour.
 struct Law {
     vec3 albedo;
     vec3 depth;

@@ -50,7 +50,7 @@ buffers! {
         transmittance: Buffer => f32, n_pairs(scene), "transmit.transmittance";
         /// Transmittance of the clouds alone, for the second reflection.
         through: Buffer => f32, n_if(has_second(scene), n_pairs(scene)), "transmit.through";
-        /// What scatters in each cloud, where clouds are a medium.
+        /// Medium of each cloud, in modes that have one.
         media: StagedBuffer => MediumRecord,
             n_if(is_medium(scene), scene.clouds.len() as u64), "scatter.media";
         /// Fluence and flux of diffuse light by cell.

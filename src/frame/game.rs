@@ -179,9 +179,8 @@ impl Game {
             bounds: self.bounds(&setting),
             regions: self.regions(time_s, setting.light_origin),
             media: self.media(time_s),
-            diffusion: has_diffusion(&self.scene).then(|| {
-                DiffusionParams::new(&self.mean_medium(time_s), &setting.grid)
-            }),
+            diffusion: has_diffusion(&self.scene)
+                .then(|| DiffusionParams::new(&self.mean_medium(time_s), &setting.grid)),
             lights: self
                 .scene
                 .lights

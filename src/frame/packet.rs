@@ -43,7 +43,7 @@ pub struct Packet {
     pub bounds: Vec<RegionBoundsRecord>,
     /// Surfaces, terrains and clouds with their materials.
     pub regions: Vec<RegionRecord>,
-    /// What scatters in each cloud; empty unless clouds are a medium.
+    /// Medium of each cloud; empty in modes without.
     pub media: Vec<MediumRecord>,
     /// Numbers of the diffusion of light; `None` without.
     pub diffusion: Option<DiffusionParams>,

@@ -201,7 +201,16 @@ impl FramePasses {
     fn record_medium(&self, rec: &mut Recorder<'_>, packet: &Packet, plan: &Plan) -> Result<()> {
         let FramePasses { diffusion, scatter, constants: c, .. } = self;
         let SceneBuffers {
-            facets, lights, regions, density, transmittance, table, lit, media, field, ..
+            facets,
+            lights,
+            regions,
+            density,
+            transmittance,
+            table,
+            lit,
+            media,
+            field,
+            ..
         } = &self.buffers;
         pass(rec, plan, Pass::Diffusion, |rec| {
             let (Some(diffusion), Some(params)) = (diffusion, &packet.diffusion) else {

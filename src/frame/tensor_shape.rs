@@ -1,7 +1,9 @@
 //! The layout of the light tensors T1 and T2 of a scene whose materials are edited
 //! (passes.md "contract").
 
-use super::features::{Tensors, has_glossy, has_second, is_glossy, is_lit, is_medium, region_sizes};
+use super::features::{
+    Tensors, has_glossy, has_second, is_glossy, is_lit, is_medium, region_sizes,
+};
 use super::gather_lists::region_pairings;
 use crate::gpu::Limits;
 use crate::layout::facet::{REGION_CLOUD, REGION_COLORED, REGION_SURFACE, REGION_TERRAIN};

@@ -1,12 +1,12 @@
 //! Records of clouds as a medium, and of the grids on which their light diffuses.
 
 use crate::layout::record;
-use crate::model::scene::LightingMode;
 use crate::model::medium::{Medium, without};
 use crate::model::phase::Phase;
+use crate::model::scene::LightingMode;
 
 record! {
-    /// What scatters in a cloud (model.md §18).
+    /// The medium of a cloud (model.md §18).
     pub struct MediumRecord {
         /// K_d, or the given albedo of white particles, linear RGB.
         reflected: [f32; 3],

@@ -77,11 +77,7 @@ impl GridSpec {
     /// Returns the centre of cell `c`.
     pub fn center(&self, c: usize) -> DVec3 {
         let n = self.n_cells.as_usizevec3();
-        let at = DVec3::new(
-            (c % n.x) as f64,
-            (c / n.x % n.y) as f64,
-            (c / (n.x * n.y)) as f64,
-        );
+        let at = DVec3::new((c % n.x) as f64, (c / n.x % n.y) as f64, (c / (n.x * n.y)) as f64);
         self.low + self.edges() * (at + 0.5)
     }
 

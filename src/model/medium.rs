@@ -8,7 +8,7 @@ use super::material::Material;
 use super::phase::{Phase, albedo_of};
 use super::scene::Scene;
 
-/// What scatters in a cloud.
+/// The medium of a cloud.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Medium {
     /// K_d of the material.
@@ -81,23 +81,24 @@ impl ScatterLaw {
     /// `cosine` is that of the angle between its way and the way to the eye, and `tau` the optical
     /// depth that it has passed.
     pub fn toward_eye(&self, cosine: f64, tau: f64) -> DVec3 {
-        self.sum(|law, phase| law * phase.at(cosine), tau)
+        self.sum(tau, |c| self.phase.flattened(c).at(cosine))
     }
 
-    /// Returns the light of a sky of radiance 1 above the horizon, and of `constant` more from
-    /// everywhere, that is scattered toward the eye at `up`: the cosine between the way to the eye
-    /// and the zenith. `tau` is the optical depth toward the zenith.
+    /// Returns the light of a sky that is scattered toward the eye. The sky's radiance is 1 above
+    /// the horizon, and `constant` more from everywhere. `up` is the cosine between the way to the
+    /// eye and the zenith, and `tau` the optical depth toward the zenith.
     pub fn of_sky(&self, up: f64, constant: f64, tau: f64) -> DVec3 {
-        let share = |phase: Phase| 0.5 - (forward_half(phase.mean_cosine()) - 0.5) * up;
-        self.sum(|law, phase| law * (share(phase) + constant), tau)
+        let g = self.phase.mean_cosine();
+        self.sum(tau, |c| 0.5 - (forward_half(c * g) - 0.5) * up + constant)
     }
 
-    fn sum(&self, of: impl Fn(DVec3, Phase) -> DVec3, tau: f64) -> DVec3 {
+    /// Sums the terms; `share` returns what is scattered by the phase function times c.
+    fn sum(&self, tau: f64, share: impl Fn(f64) -> f64) -> DVec3 {
         let Octaves { n, light, depth, phase } = self.terms;
         let term = |i: u32| {
             let [a, b, c] = [light, depth, phase].map(|x| x.powi(i as i32));
             let through = (-b * tau * self.depth).exp();
-            of(a * self.albedo * through, self.phase.flattened(c))
+            a * share(c) * self.albedo * through
         };
         (0..n).map(term).sum()
     }
@@ -112,7 +113,8 @@ pub fn terms(lighting: &Lighting) -> Octaves {
 }
 
 /// Returns the phase function of what is left of `phase` without the share `f` that goes straight
-/// on: of f = 0 itself, else Henyey and Greenstein's with the mean cosine (g − f)/(1 − f).
+/// on. It is `phase` itself for f = 0, else Henyey and Greenstein's with the mean cosine
+/// (g − f)/(1 − f).
 pub fn without(phase: Phase, f: f64) -> Phase {
     if f == 0.0 {
         return phase;

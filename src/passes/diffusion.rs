@@ -188,8 +188,8 @@ pub struct Room {
 }
 
 impl Room {
-    /// Returns the room for a grid of at most `n_cells`: a level has at most two thirds of the cells
-    /// of the finer one.
+    /// Returns the room for a grid of at most `n_cells`. A level has at most two thirds of the
+    /// cells of the finer one.
     pub fn new(n_cells: u64, n_sets: u32) -> Room {
         Room { n_cells: 3 * n_cells, n_sets }
     }
@@ -313,8 +313,7 @@ impl Diffusion {
         for i in 0..work.n_cycles {
             self.record_cycle(rec, &steps, n_all, i == 0)?;
         }
-        let push =
-            FluxPush { grid: *grid, kept: of.kept, inverse_chord: of.inverse_chord };
+        let push = FluxPush { grid: *grid, kept: of.kept, inverse_chord: of.inverse_chord };
         rec.dispatch(&self.flux, &[density, next_phi, field], &push, n_cells)
     }
 
@@ -393,7 +392,8 @@ mod tests {
 
     #[test]
     fn levels_follow_one_another_and_have_room() {
-        for (n, aspect) in [([32, 20, 14], 1.0), ([3, 3, 300], 1.0), ([5, 5, 5], 0.1), ([1; 3], 1.0)]
+        for (n, aspect) in
+            [([32, 20, 14], 1.0), ([3, 3, 300], 1.0), ([5, 5, 5], 0.1), ([1; 3], 1.0)]
         {
             let grid = GridRecord { n_cells: n, aspect, ..GridRecord::default() };
             let (steps, n_all) = steps(&grid);

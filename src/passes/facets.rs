@@ -70,8 +70,8 @@ pub struct Facets {
 }
 
 impl Facets {
-    /// Creates the pipelines; `has_ellipsoids` if some blobs are not spheres. Facets of blobs lie on
-    /// their shells, or where clouds are a medium, `is_medium`, at their centres.
+    /// Creates the pipelines; `has_ellipsoids` if some blobs are not spheres. Facets lie on the
+    /// blobs' shells, or at their centres where clouds are a medium, `is_medium`.
     ///
     /// # Errors
     /// Fails if a shader does not compile or a pipeline cannot be created.
@@ -81,8 +81,7 @@ impl Facets {
         has_ellipsoids: bool,
         is_medium: bool,
     ) -> Result<Facets> {
-        let macros =
-            [("ELLIPSOIDS", u32::from(has_ellipsoids)), ("SHELL", u32::from(!is_medium))];
+        let macros = [("ELLIPSOIDS", u32::from(has_ellipsoids)), ("SHELL", u32::from(!is_medium))];
         let kernel = |name| Kernel::with_macros(device, compiler, name, Push::FIELDS, &[], &macros);
         Ok(Facets {
             particles: kernel("facets")?,

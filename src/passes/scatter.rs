@@ -89,8 +89,7 @@ impl Scatter {
     /// Fails if the shader does not compile or the pipeline cannot be created.
     pub fn new(device: &Device, compiler: &Compiler, is_diffuse: bool) -> Result<Scatter> {
         let macros = [("DIFFUSE", u32::from(is_diffuse))];
-        let kernel =
-            Kernel::with_macros(device, compiler, "scatter", Push::FIELDS, &[], &macros)?;
+        let kernel = Kernel::with_macros(device, compiler, "scatter", Push::FIELDS, &[], &macros)?;
         Ok(Scatter { kernel, is_diffuse })
     }
 

@@ -78,7 +78,7 @@ pub struct MarchParams {
 /// Optical depth of a way that a surface bars, and to a light without energy.
 pub const BARRED: f32 = 1e30;
 
-/// What the pass writes.
+/// Result of the pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Arriving {
     /// V.

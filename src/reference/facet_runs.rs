@@ -90,8 +90,7 @@ pub fn grouped(
         let (shape, center) =
             ([b.sigma.max(b.sigma_mean), b.aspect], cloud_centers[region as usize]);
         let density = |x| sample(spec, cells, x);
-        let facet =
-            facet_at(sources.place, b.position, shape, b.area, region, center, density);
+        let facet = facet_at(sources.place, b.position, shape, b.area, region, center, density);
         (facet, b.color)
     };
     runs.iter().map(of).collect()
@@ -120,7 +119,8 @@ mod tests {
             blobs: &blobs,
             sigma_means: &[1.0, 6.0, 2.0, 4.0],
             regions: &[0; 4],
-            colors: &colors, place: FacetPlace::Shell
+            colors: &colors,
+            place: FacetPlace::Shell,
         };
         let b = merged(&members, &[0, 1], false);
         assert!(
@@ -154,8 +154,13 @@ mod tests {
             ([blob(0.5), blob(-1.0), blob(2.0)], [0.1, 0.4, 0.2], [0, 1, 1]);
         let centers = [DVec3::Y, DVec3::Z];
         let colors = [DVec3::X; 3];
-        let members =
-            FacetSources { blobs: &blobs, sigma_means: &means, regions: &regions, colors: &colors, place: FacetPlace::Shell };
+        let members = FacetSources {
+            blobs: &blobs,
+            sigma_means: &means,
+            regions: &regions,
+            colors: &colors,
+            place: FacetPlace::Shell,
+        };
         let single = facets(&SPEC, &cells, &members, &centers);
         let of_runs =
             grouped(&SPEC, &cells, &members, &centers, &[0, 2, 1], &[(0, 1), (1, 2), (2, 3)]);

@@ -16,6 +16,7 @@ mod generation;
 mod live;
 mod metamorphic;
 mod moisture;
+mod scattering;
 mod scenes;
 mod sorting;
 mod space;
@@ -39,6 +40,7 @@ pub fn cases() -> Vec<Case> {
         transport::CASES,
         sums::CASES,
         transmittance::CASES,
+        scattering::CASES,
         sorting::CASES,
         compositing::CASES,
         space::CASES,

@@ -58,7 +58,15 @@ pub(super) fn hash_of_paths(scene: &Scene, time_s: f64, pixels: &Pixels) -> Resu
 fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
     let scene = against.without_approximations(scene);
     let Lighting {
-        mode, grid, step, forward, facets_per_cloud, sun_radius, octaves, diffusion, ..
+        mode,
+        grid,
+        step,
+        forward,
+        facets_per_cloud,
+        sun_radius,
+        octaves,
+        diffusion,
+        ..
     } = scene.lighting;
     let by_model = matches!(
         against,

@@ -224,4 +224,25 @@ pub const FAULTS: &[Fault] = &[
         "1.0",
         "brdf/exponent-0",
     ),
+    (
+        "no light leaves the box of diffusion",
+        "diffusion_system.comp",
+        "right += 4.0 * through * of_sky(axis == 1 ? 1.0 : 0.5);",
+        "",
+        "scattering/furnace",
+    ),
+    (
+        "diffuse light is not averaged over all directions",
+        "scatter.comp",
+        "max(diffuse, vec3(0.0)) * INV_FOUR_PI",
+        "max(diffuse, vec3(0.0)) * 2.0 * INV_FOUR_PI",
+        "scattering/furnace",
+    ),
+    (
+        "the sky's light from above is counted twice",
+        "scatter.comp",
+        "light * (share + constant)",
+        "light * (2.0 * share + 1.000002 * constant)",
+        "scattering/thin",
+    ),
 ];

@@ -9,9 +9,9 @@ use nimbus::model::grid::GridSpec;
 use nimbus::passes::facets::{Facets, ParticleBuffers};
 use nimbus::passes::grid::Grid;
 use nimbus::reference::Blob;
-use nimbus::reference::facets::{FacetPlace, 
-    CONDITIONING, Facet, FacetSources, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions, facets,
-    gradient, smoothstep,
+use nimbus::reference::facets::{
+    CONDITIONING, Facet, FacetPlace, FacetSources, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions,
+    facets, gradient, smoothstep,
 };
 use nimbus::reference::generate::uniforms;
 use nimbus::reference::grid::sample;
@@ -191,7 +191,8 @@ impl Scene {
                 blobs: &self.blobs,
                 sigma_means: &means,
                 regions: &regions,
-                colors: &[], place: FacetPlace::Shell
+                colors: &[],
+                place: FacetPlace::Shell,
             };
             facets(&self.spec, cells, &sources, &self.centers())
         }

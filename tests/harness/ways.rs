@@ -143,7 +143,8 @@ impl Case {
         sums: Sums,
     ) -> [Vec<f64>; 2] {
         let compiler = compiler.unwrap_or(&gpu.compiler);
-        let pass = Transmit::new(&gpu.device, compiler, Arriving::ShareAndClouds, &sums.into()).expect("transmit");
+        let pass = Transmit::new(&gpu.device, compiler, Arriving::ShareAndClouds, &sums.into())
+            .expect("transmit");
         let n_total = self.facets.len() * self.lights.len();
         let through = gpu.buffer::<f32>(n_total);
         let transmittance = self.dispatch(gpu, &pass, &through, [step, forward]);
@@ -176,7 +177,14 @@ impl Case {
             through,
         };
         let [n_facets, n_lights, n_surfaces] = n;
-        let march = MarchParams { n_facets, n_lights, n_surfaces, step_cells: step, forward, n_under_sky: n_facets };
+        let march = MarchParams {
+            n_facets,
+            n_lights,
+            n_surfaces,
+            step_cells: step,
+            forward,
+            n_under_sky: n_facets,
+        };
         gpu.run(|rec| pass.record(rec, &buffers, &grid, &march));
         gpu.download::<f32>(&out, n_total).into_iter().map(f64::from).collect()
     }

@@ -5,6 +5,7 @@ use nimbus::layout::cull::KeptRecord;
 use nimbus::layout::disc::DiscRecord;
 use nimbus::layout::facet::{FacetRecord, LitRecord, RegionBoundsRecord, RegionRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LightRecord};
+use nimbus::layout::medium::MediumRecord;
 use nimbus::layout::particle::{
     BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, TexturedRecord,
 };
@@ -12,15 +13,16 @@ use nimbus::layout::roof;
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 use nimbus::passes::{
-    blobs, chunks, contract, cull, facets, first, generate, grid, impostors, live, morton, place,
-    present, second, sort, sprites, surfaces, terrain, texture, tiles, transmit, upsample,
+    blobs, chunks, contract, cull, diffusion, facets, first, generate, grid, impostors, live,
+    morton, place, present, scatter, second, sort, sprites, surfaces, terrain, texture, tiles,
+    transmit, upsample,
 };
 
 /// A host record: GLSL's name of it, its fields, its size.
 pub type Record = (&'static str, &'static [Field], usize);
 
 /// All records of the host.
-pub const RECORDS: [Record; 25] = [
+pub const RECORDS: [Record; 26] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Disc", DiscRecord::FIELDS, size_of::<DiscRecord>()),
@@ -40,6 +42,7 @@ pub const RECORDS: [Record; 25] = [
     ("Block", BlockRecord::FIELDS, size_of::<BlockRecord>()),
     ("Pairing", PairingRecord::FIELDS, size_of::<PairingRecord>()),
     ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
+    ("Medium", MediumRecord::FIELDS, size_of::<MediumRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
     ("Kept", KeptRecord::FIELDS, size_of::<KeptRecord>()),
     ("SplatTexture", SplatTextureRecord::FIELDS, size_of::<SplatTextureRecord>()),
@@ -60,6 +63,13 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("cull_scan.comp", cull::ScanPush::FIELDS, "4 Kept"),
     ("cull_test.comp", cull::TestPush::FIELDS, "Placed Particle 4 Drawn 8 4"),
     ("cull_write.comp", blobs::KeyPush::FIELDS, "Placed 8 4 8"),
+    ("diffusion_coarsen.comp", diffusion::PairPush::FIELDS, "16"),
+    ("diffusion_coarsest.comp", diffusion::CoarsestPush::FIELDS, "T 16 16"),
+    ("diffusion_flux.comp", diffusion::FluxPush::FIELDS, "F 16 16"),
+    ("diffusion_restrict.comp", diffusion::PairPush::FIELDS, "T 16 T 16"),
+    ("diffusion_sources.comp", diffusion::SourcesPush::FIELDS, "Light T F 16"),
+    ("diffusion_sweep.comp", diffusion::SweepPush::FIELDS, "T T T 16"),
+    ("diffusion_system.comp", diffusion::SystemPush::FIELDS, "Light F 16 16 16 16"),
     ("facets.comp", facets::Push::FIELDS, "Placed Particle 4 Group F Facet"),
     ("facets_groups.comp", facets::Push::FIELDS, "Placed Particle 4 Group F Facet 4 Run 4"),
     ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, "T 4 Facet"),
@@ -78,6 +88,7 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("place.comp", place::Push::FIELDS, "Particle 4 Group Mode Placed"),
     ("present.frag", present::Push::FIELDS, "T T"),
     ("present.vert", &[], ""),
+    ("scatter.comp", scatter::Push::FIELDS, "Facet Light 4 T F Lit Medium"),
     (
         "second_gather.comp",
         second::GatherPush::FIELDS,

@@ -15,6 +15,8 @@ fn packet(x: f64, z: f64) -> Packet {
         n_particles: 400,
     };
     Packet {
+        media: vec![],
+        diffusion: None,
         i_frame: 0,
         time_s: 0.0,
         begin: Instant::now(),

@@ -4,12 +4,15 @@ use crate::frame::features::{SceneFeatures, Tensors};
 use crate::frame::packet::Packet;
 use crate::layout::facet::RegionRecord;
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
+use crate::layout::medium::MediumRecord;
 use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord};
 use crate::model::scene::DrawPath;
 use std::sync::Arc;
 use std::time::Instant;
 
 const FEATURES: SceneFeatures = SceneFeatures {
+    is_medium: false,
+    has_diffusion: false,
     has_boxes: true,
     has_live: false,
     n_particles: 7,
@@ -46,6 +49,8 @@ const OFF: Skipping = Skipping { is_on: false, ..ON };
 
 fn packet() -> Packet {
     Packet {
+        media: vec![],
+        diffusion: None,
         i_frame: 0,
         time_s: 0.0,
         begin: Instant::now(),
@@ -93,8 +98,8 @@ fn running(features: &SceneFeatures, last: Option<&Packet>, next: &Packet) -> Ve
 #[test]
 fn the_first_frame_runs_everything_and_a_still_one_nothing() {
     let p = packet();
-    // Particles are drawn by one of two passes.
-    let all = Pass::ALL.len() - 1;
+    // Particles are drawn by one of two passes, and two more are for clouds as a medium.
+    let all = Pass::ALL.len() - 3;
     assert_eq!(running(&ALL_FEATURES, None, &p).len(), all);
     for features in [FEATURES, KEPT, ALL_FEATURES] {
         assert!(running(&features, Some(&p), &p).is_empty());
@@ -274,4 +279,25 @@ fn unlit_empty_and_cpu_scenes_skip_passes_that_they_do_not_need() {
     assert!(running(&FEATURES, Some(&last), &next).is_empty());
     next.placed = Some(vec![Default::default()]);
     assert!(running(&FEATURES, Some(&last), &next).contains(&"place"));
+}
+
+#[test]
+fn a_medium_runs_what_its_light_depends_on() {
+    let p = packet();
+    let features = SceneFeatures { is_medium: true, has_diffusion: true, ..FEATURES };
+    let after = |change: fn(&mut Packet)| {
+        let mut next = p.clone();
+        change(&mut next);
+        running(&features, Some(&p), &next)
+    };
+    let lit = ["diffusion", "scatter", "sprites"];
+    assert_eq!(after(|p| p.lights[0].energy[1] = 2.0), lit);
+    assert_eq!(after(|p| p.media.push(MediumRecord::default())), lit);
+    let marched = ["transmit", "diffusion", "scatter", "sprites"];
+    assert_eq!(after(|p| p.lights[0].toward[1] = 0.5), marched);
+    // Without diffusion the same passes but one.
+    let once = SceneFeatures { has_diffusion: false, ..features };
+    let mut next = p.clone();
+    next.lights[0].energy[1] = 2.0;
+    assert_eq!(running(&once, Some(&p), &next), ["scatter", "sprites"]);
 }

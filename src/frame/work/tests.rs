@@ -6,6 +6,8 @@ use crate::frame::work::amounts::Blobs;
 /// Ten particles of boxes, five of them in view, in a grid of 4 × 5 × 6 cells, with two lights and
 /// two reflections, drawn into 8 × 4 pixels of half floats.
 const SMALL: Amounts = Amounts {
+    is_medium: false,
+    cycles: 0.0,
     particles: 10.0,
     box_particles: 10.0,
     live_particles: 0.0,

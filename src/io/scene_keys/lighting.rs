@@ -17,10 +17,10 @@ use crate::model::sums::{Precision, Summation, Sums};
 const MIN_CELLS: u32 = 8;
 
 keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
-    /// How light is computed: not at all (particles have their colours as given); by the first
-    /// reflection, C (15), or the first and the second, C (15) and (16); or clouds as a medium that
-    /// scatters light once, in full ("single") or without its forward scattering ("similarity"),
-    /// in octaves, or once and then by diffusion (model.md, 18).
+    /// How light is computed. "none": particles have their colours as given. "first": the first
+    /// reflection, C (15); "two-reflection": and the second, C (16). In the others clouds are a
+    /// medium (model.md, 18). Light is scattered once in "single", "similarity" (without what goes
+    /// forward) and "octaves", and in "diffusion" many times.
     mode: choice("two-reflection", &LightingMode::NAMES);
     /// Cells along the longest axis of the density grid.
     grid: integer(64, MIN_CELLS, MAX_CELLS);

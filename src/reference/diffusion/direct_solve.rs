@@ -32,8 +32,7 @@ fn of_channel(system: &System, k: usize) -> Vec<f64> {
             let known: f64 =
                 (from..d).map(|e| rows[c][width + e - c] * rows[d][width + e - d]).sum();
             let left = rows[c][width + d - c] - known;
-            rows[c][width + d - c] =
-                if d == c { left.sqrt() } else { left / rows[d][width] };
+            rows[c][width + d - c] = if d == c { left.sqrt() } else { left / rows[d][width] };
         }
     }
     let mut x: Vec<f64> = system.source.iter().map(|s| s[k]).collect();

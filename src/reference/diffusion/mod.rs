@@ -16,6 +16,8 @@ mod field;
 mod multigrid;
 mod sources;
 mod system;
+#[cfg(test)]
+mod tests;
 
 pub use direct_solve::solve;
 pub use field::DiffuseLight;

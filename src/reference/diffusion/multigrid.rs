@@ -80,9 +80,7 @@ impl System {
     /// Returns φ after a sweep of Jacobi's: every φ moves toward the solution of its own equation,
     /// by the given step.
     fn swept(&self, phi: &[DVec3], source: &[DVec3], step: f64) -> Vec<DVec3> {
-        let of = |c: usize| {
-            phi[c] + step * (source[c] - self.applied(phi, c)) / self.diagonal(c)
-        };
+        let of = |c: usize| phi[c] + step * (source[c] - self.applied(phi, c)) / self.diagonal(c);
         (0..phi.len()).map(of).collect()
     }
 
@@ -101,9 +99,8 @@ impl System {
     }
 }
 
-/// Returns the equations of a coarser grid: cells are merged, and what flows between them at a
-/// difference of φ is half of what flows through their faces, as their centres lie twice as far
-/// apart.
+/// Returns the equations of a coarser grid. The faces between merged cells add up, and count half
+/// along a merged axis, as centres lie twice as far apart.
 fn merged(fine: &System, coarse: USizeVec3, halved: [bool; 3]) -> System {
     let n = coarse.element_product();
     let mut of = System {

@@ -31,7 +31,7 @@ impl DiffusionMedium {
     }
 }
 
-/// What suns and lamps bring into the cells.
+/// Light of suns and lamps in the cells.
 #[derive(Debug, Clone)]
 pub struct Sources {
     /// Q0: light that is scattered, W m⁻³.

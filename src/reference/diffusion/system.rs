@@ -29,7 +29,8 @@ pub(super) fn next(n: USizeVec3, c: usize, axis: usize) -> Option<usize> {
 /// Returns the index of the cell before along an axis, if there is one.
 pub(super) fn before(n: USizeVec3, c: usize, axis: usize) -> Option<usize> {
     let stride = [1, n.x, n.x * n.y][axis];
-    (c / stride % n[axis] > 0).then(|| c - stride)
+    let is_first = (c / stride).is_multiple_of(n[axis]);
+    (!is_first).then(|| c - stride)
 }
 
 /// Returns the light of the sky that comes in through a face of the box: `side` is 0 for the

@@ -1,0 +1,155 @@
+use glam::{DVec3, UVec3};
+
+use super::{DiffuseLight, DiffusionMedium, Multigrid, Sources, System, solve};
+use crate::model::grid::GridSpec;
+use crate::model::light::Light;
+use crate::model::medium::MeanMedium;
+use crate::reference::Blob;
+use crate::reference::grid::deposit;
+use crate::reference::transmit::Obstacles;
+
+const MEAN: MeanMedium =
+    MeanMedium { albedo: DVec3::new(1.0, 0.99, 0.6), g: 0.85, straight: 0.85 * 0.85 };
+
+fn spec(n: [u32; 3], aspect: f64) -> GridSpec {
+    let half = DVec3::new(2.0, 1.5, 1.0);
+    let cell = 2.0 * half.x / f64::from(n[0]);
+    let n_cells = UVec3::from(n);
+    let low = -0.5 * cell * DVec3::new(1.0, aspect, 1.0) * n_cells.as_dvec3();
+    GridSpec { n_cells, cell, aspect, low }
+}
+
+fn blobs() -> Vec<Blob> {
+    let blob = |x: f64, y: f64, z: f64, sigma, kappa| Blob {
+        aspect: 1.0,
+        position: DVec3::new(x, y, z),
+        sigma,
+        kappa,
+    };
+    vec![
+        blob(-0.4, 0.1, 0.0, 0.3, 6.0),
+        blob(0.5, -0.2, 0.1, 0.25, 9.0),
+        blob(0.0, 0.5, -0.3, 0.2, 4.0),
+    ]
+}
+
+fn lights() -> [Light; 3] {
+    [
+        Light::Directional {
+            direction: DVec3::new(-0.4, -0.8, -0.3).normalize(),
+            irradiance: DVec3::new(3.0, 2.5, 2.0),
+        },
+        Light::Point { position: DVec3::new(1.5, 0.8, 0.9), intensity: DVec3::ONE, radius: 0.1 },
+        Light::Sky { irradiance: DVec3::new(0.5, 0.7, 1.0), constant: 0.3 },
+    ]
+}
+
+/// The equations on a grid, with what they were made from.
+fn system(grid: &GridSpec, lights: &[Light]) -> (DiffusionMedium, Vec<f64>, Sources, System) {
+    let cells = deposit(grid, &blobs());
+    let of = DiffusionMedium::new(MEAN, grid);
+    let obstacles =
+        Obstacles { spec: grid, cells: &cells, rectangles: &[], step: 0.5, forward: 0.0 };
+    let sources = Sources::new(&of, &obstacles, lights);
+    let system = System::new(&of, grid, &cells, &sources, lights);
+    (of, cells, sources, system)
+}
+
+/// Greatest difference as a share of the greatest value.
+fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
+    let most =
+        |v: &mut dyn Iterator<Item = DVec3>| v.map(|v| v.abs().max_element()).fold(0.0, f64::max);
+    most(&mut a.iter().zip(b).map(|(a, b)| *a - *b)) / most(&mut b.iter().copied())
+}
+
+#[test]
+fn cycles_end_at_the_solution_by_elimination() {
+    // Cubes, an odd number of cells, and flat cells: each cycle leaves less than a quarter.
+    for grid in [spec([12, 9, 6], 1.0), spec([11, 7, 5], 1.0), spec([10, 30, 6], 0.25)] {
+        let (.., system) = system(&grid, &lights());
+        let truth = solve(&system);
+        let levels = Multigrid::new(system, grid.edges());
+        let left: Vec<f64> = [1, 2, 3, 4, 5, 24].map(|n| apart(&levels.solve(n), &truth)).into();
+        println!("{:?}: {left:?}", grid.n_cells);
+        for pair in left[..5].windows(2) {
+            assert!(pair[1] < 0.25 * pair[0], "{:?}: {left:?}", grid.n_cells);
+        }
+        assert!(left[0] < 0.2 && left[1] < 0.03 && left[5] < 1e-12, "{left:?}");
+    }
+}
+
+#[test]
+fn elimination_solves_the_equations() {
+    let (.., system) = system(&spec([9, 7, 5], 1.0), &lights());
+    let phi = solve(&system);
+    let most = system.source.iter().map(|s| s.max_element()).fold(0.0, f64::max);
+    for c in 0..phi.len() {
+        let left = (system.applied(&phi, c) - system.source[c]).abs().max_element();
+        // Some hundred roundings of a cell's terms.
+        assert!(left < 1e-12 * most, "{c}: {left:e}");
+    }
+    // What comes in is absorbed or leaves.
+    let [in_all, out_all] = [
+        system.source.iter().sum::<DVec3>(),
+        system.sink.iter().zip(&phi).map(|(sink, phi)| *sink * *phi).sum::<DVec3>(),
+    ];
+    assert!(((in_all - out_all) / in_all).abs().max_element() < 1e-12);
+}
+
+#[test]
+fn light_from_everywhere_is_the_same_everywhere() {
+    // A radiance of 1 has φ = 4π and no flux; only what absorbs is darker.
+    let even = Light::Sky { irradiance: DVec3::splat(1e-9), constant: 1e9 * std::f64::consts::PI };
+    let grid = spec([8, 6, 5], 1.0);
+    let (of, cells, sources, system) = system(&grid, &[even]);
+    let phi = solve(&system);
+    let light = DiffuseLight::of_fluence(&of, &grid, &cells, &sources, &phi);
+    for [phi, flux @ ..] in &light.cells {
+        // The share from above alone is 1e-9 of it.
+        assert!((phi.x / (4.0 * std::f64::consts::PI) - 1.0).abs() < 1e-8);
+        assert!(flux.iter().all(|f| f.x.abs() < 1e-7));
+        assert!(phi.z < phi.y && phi.y < phi.x);
+    }
+}
+
+#[test]
+fn finer_grids_converge_at_second_order() {
+    // The box stays, so that c does.
+    let at = |n: u32| {
+        let grid = spec([8 * n, 6 * n, 4 * n], 1.0);
+        // Beside a lamp light has no limit.
+        let [sun, _, sky] = lights();
+        let (of, cells, sources, system) = system(&grid, &[sun, sky]);
+        let phi = Multigrid::new(system, grid.edges()).solve(16);
+        let light = DiffuseLight::of_fluence(&of, &grid, &cells, &sources, &phi);
+        // φ is trilinear between centres, which is of second order too.
+        [DVec3::ZERO, DVec3::new(-0.4, 0.1, 0.0), DVec3::new(0.9, 0.4, 0.2)]
+            .map(|p| light.at(p)[0].x)
+    };
+    let found = [1, 2, 4, 8].map(at);
+    let step = |a: [f64; 3], b: [f64; 3]| {
+        let squares: f64 = a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum();
+        squares.sqrt()
+    };
+    let steps = [0, 1, 2].map(|i: usize| step(found[i], found[i + 1]));
+    println!("{found:?}, steps {steps:?}");
+    // A quarter of the step before, once a cell is shorter than a blob's σ.
+    assert!(steps[2] < 0.35 * steps[1] && steps[1] < 0.6 * steps[0], "{steps:?}");
+}
+
+#[test]
+fn a_flux_by_hand() {
+    // φ rises by 2 along x in cells of edge 0.5 without extinction: F = −D·4, D = 1/c.
+    let grid = GridSpec { n_cells: UVec3::new(3, 1, 1), cell: 0.5, aspect: 1.0, low: DVec3::ZERO };
+    let of = DiffusionMedium::new(MEAN, &grid);
+    // c: 1/1.5 + 1/0.5 + 1/0.5, halved.
+    assert!((of.inverse_chord - 7.0 / 3.0).abs() < 1e-15);
+    let phi = [1.0, 3.0, 5.0].map(DVec3::splat);
+    let nothing = Sources { scattered: vec![DVec3::ZERO; 3], carried: vec![[DVec3::ZERO; 3]; 3] };
+    let light = DiffuseLight::of_fluence(&of, &grid, &[0.0; 3], &nothing, &phi);
+    for [_, x, y, z] in &light.cells {
+        assert!((x.x + 4.0 * 3.0 / 7.0).abs() < 1e-14 && y.x == 0.0 && z.x == 0.0);
+    }
+    assert_eq!(light.at(DVec3::new(0.5, 9.0, -9.0))[0], DVec3::splat(2.0));
+    assert_eq!(light.at(DVec3::new(9.0, 0.0, 0.0))[0], DVec3::splat(5.0));
+}

@@ -1,0 +1,143 @@
+//! Clouds as a medium: even light, vanishing and huge optical depths, clouds that scatter nothing.
+
+use std::f64::consts::FRAC_1_PI;
+
+use glam::DVec3;
+
+use super::case::{Case, Comparison};
+use super::context::StressContext;
+use super::scenes::{blob, blob_cluster, cloud_of, surface_scene};
+use crate::error::Result;
+use crate::model::cloud::{CloudSource, Particle};
+use crate::model::scene::{LightingMode, Scene};
+use crate::reference::rounding::U_F32;
+
+/// The cases of this file, in the order in which they run.
+pub const CASES: &[Case] = &[
+    Case {
+        name: "scattering/furnace",
+        what: "a white cloud in even light, of optical depth 1e-6 to 1e4: as bright as the light, \
+            by diffusion",
+        bound: "128 u, relative: (cells across)^2 / 8",
+        check: furnace,
+    },
+    Case {
+        name: "scattering/thin",
+        what: "a blob of optical depth 1e-12 in even light: as bright as the light, scattered once",
+        bound: "16 u, relative",
+        check: thin,
+    },
+    Case {
+        name: "scattering/thick",
+        what: "blobs of optical depth 1e5, in all modes: finite light, not negative, none beyond \
+            the phase function's peak",
+        bound: "finite, at least 0",
+        check: thick,
+    },
+    Case {
+        name: "scattering/black",
+        what: "a cloud that scatters nothing, in all modes: no light at all",
+        bound: "0",
+        check: black,
+    },
+    Case {
+        name: "scattering/forward",
+        what: "a cloud that scatters straight on only (g = 1), in all modes: finite light",
+        bound: "finite, at least 0",
+        check: forward,
+    },
+];
+
+/// Light of radiance 1/π from everywhere: the share from above alone is 1e-7 of it.
+const EVEN: &str =
+    "[[light]]\nkind = 'sky'\nirradiance = [1e-7, 1e-7, 1e-7]\nconstant = 10000000.0\n";
+const SUN: &str = "[[light]]\nkind = 'directional'\ndirection = [-0.5, -0.8, -0.3]\n\
+    irradiance = [1, 1, 1]\n";
+const MEDIA: [LightingMode; 4] = [
+    LightingMode::Single,
+    LightingMode::Similarity,
+    LightingMode::Octaves,
+    LightingMode::Diffusion,
+];
+
+fn scene(
+    mode: LightingMode,
+    lights: &str,
+    material: &str,
+    particles: Vec<Particle>,
+) -> Result<Scene> {
+    let lighting = "grid = 32\ndiffusion_cycles = 24";
+    let mut scene = surface_scene(lighting, lights, material, [])?;
+    scene.lighting.mode = mode;
+    scene.clouds.push(cloud_of(CloudSource::Particles(particles)));
+    Ok(scene)
+}
+
+fn cluster(tau: f64) -> Vec<Particle> {
+    let white = |p: Particle| Particle { kappa: p.kappa * tau, color: DVec3::ONE, ..p };
+    blob_cluster(60).into_iter().map(white).collect()
+}
+
+fn furnace(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    for tau in [1e-6, 1.0, 1e4] {
+        let scene = scene(LightingMode::Diffusion, EVEN, "albedo = [1, 1, 1]\n", cluster(tau))?;
+        let frame = ctx.render(&scene, 0)?;
+        for (i, lit) in frame.lit.iter().enumerate() {
+            let what = format_args!("radiance of blob {i}, depth {tau:e}");
+            c.add(f64::from(lit.first[0]), FRAC_1_PI, 128.0 * U_F32 * FRAC_1_PI, what);
+        }
+    }
+    Ok(())
+}
+
+fn thin(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    let one = vec![blob([0.0; 3], 0.5, 1e-12)];
+    let scene = scene(LightingMode::Single, EVEN, "albedo = [1, 1, 1]\n", one)?;
+    let frame = ctx.render(&scene, 0)?;
+    // 1e-7 of the light comes from above alone.
+    let bound = (16.0 * U_F32 + 2e-7) * FRAC_1_PI;
+    c.add(f64::from(frame.lit[0].first[0]), FRAC_1_PI, bound, "radiance of the blob");
+    Ok(())
+}
+
+/// Draws in all modes; light must be finite and not negative. Returns the greatest radiance.
+fn all_modes(
+    ctx: &mut StressContext,
+    c: &mut Comparison,
+    material: &str,
+    particles: &[Particle],
+) -> Result<f64> {
+    let lights = [EVEN, SUN].concat();
+    let mut most = 0.0f64;
+    for mode in MEDIA {
+        let frame = ctx.render(&scene(mode, &lights, material, particles.to_vec())?, 0)?;
+        let mut light = frame.lit.iter().flat_map(|l| l.direct.into_iter().chain(l.first));
+        let what = format!("finite light, not negative, {}", mode.name());
+        c.holds(light.all(|v| v.is_finite() && v >= 0.0), what);
+        c.finite(&frame.rgba, "picture");
+        let radiance = frame.lit.iter().flat_map(|l| l.first).map(f64::from);
+        most = radiance.fold(most, f64::max);
+    }
+    Ok(most)
+}
+
+fn thick(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    let most = all_modes(ctx, c, "albedo = [1, 1, 1]\n", &cluster(1e5))?;
+    // The sun's light at the phase function's peak, and the even light in eight octaves.
+    let peak = (1.0 + 0.85) / (4.0 * std::f64::consts::PI * 0.15f64.powi(2));
+    c.holds(most > 0.0 && most <= 2.0 * (peak + FRAC_1_PI), "light below the peak");
+    Ok(())
+}
+
+fn black(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    let most = all_modes(ctx, c, "albedo = [0, 0, 0]\n", &cluster(1.0))?;
+    c.add(most, 0.0, 0.0, "radiance");
+    Ok(())
+}
+
+fn forward(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    let lit = "albedo = [1, 1, 1]\nphase = 0.999\n";
+    all_modes(ctx, c, lit, &cluster(1.0))?;
+    all_modes(ctx, c, lit, &[blob([0.0; 3], 0.5, 1e4)])?;
+    Ok(())
+}

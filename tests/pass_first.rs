@@ -211,10 +211,14 @@ fn wrong_light_is_noticed() {
         ("include/light.glsl", "cone * cone", "cone"),
         ("include/light.glsl", "dot(toward, light.toward)", "dot(toward, -light.toward)"),
         ("include/first.glsl", "0.318309886183791", "0.3183"),
-        ("first.comp", "* facet.color", ""),
-        ("first.comp", "region_at(facet.i_region)", "region_at(0u)"),
-        ("first.comp", "j * push.n_lights + l", "l * push.n_facets + j"),
-        ("first.comp", "arrival_at(light, facet.position)", "arrival_at(light, vec3(0.0))"),
+        ("include/reflect.glsl", "* facet.color", ""),
+        ("include/reflect.glsl", "region_at(facet.i_region)", "region_at(0u)"),
+        ("include/reflect.glsl", "j * n_lights + l", "l * push.n_facets + j"),
+        (
+            "include/reflect.glsl",
+            "arrival_at(light, facet.position)",
+            "arrival_at(light, vec3(0.0))",
+        ),
     ] {
         let values = numbers(&case.run(&mut gpu, Some(&Gpu::wrong_compiler(file, from, to))));
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
@@ -293,9 +297,9 @@ fn lobes_shine_toward_the_eye_from_the_front_side() {
     let lit_up = (0..N_FACETS).filter(|j| shine(&case, *j)[1].0 > 0.0).count();
     assert!(lit_up > N_FACETS / 20, "{lit_up} facets shine");
     for (file, from, to) in [
-        ("first.comp", "dot(outgoing, facet.normal) > 0.0", "true"),
-        ("first.comp", "a.toward, outgoing", "outgoing, outgoing"),
-        ("first.comp", "light.kind == LIGHT_SKY ? 0u : n_shiny", "n_shiny"),
+        ("include/reflect.glsl", "dot(outgoing, facet.normal) > 0.0", "true"),
+        ("include/reflect.glsl", "a.toward, outgoing", "outgoing, outgoing"),
+        ("include/reflect.glsl", "light.kind == LIGHT_SKY ? 0u : n_shiny", "n_shiny"),
         ("include/lobe.glsl", "t - float(i)", "0.0"),
         ("include/lobe.glsl", "0.5 * dot(chord, chord)", "0.501 * dot(chord, chord)"),
     ] {

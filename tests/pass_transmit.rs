@@ -178,16 +178,21 @@ fn wrong_transmittance_is_noticed() {
     }
     // The errors of the transmittance (0), and of the clouds' part alone (1).
     for (k, file, from, to) in [
-        (0, "transmit.comp", "(t0 + 0.5 * ds)", "t0"),
-        (0, "transmit.comp", "min(step_length, length_total - t0)", "step_length"),
-        (0, "transmit.comp", "push.backward * TOTAL(tau)", "TOTAL(tau)"),
+        (0, "include/march.glsl", "(t0 + 0.5 * ds)", "t0"),
+        (0, "include/march.glsl", "min(step_length, length_total - t0)", "step_length"),
+        (0, "transmit.comp", "push.backward * tau", "tau"),
         (0, "transmit.comp", "k / push.n_lights", "k % push.n_facets"),
-        (0, "transmit.comp", "leave = distance", "leave = 3.4e38"),
-        (0, "transmit.comp", "enter = max(enter, min(a, b))", "enter = enter"),
+        (0, "include/march.glsl", "leave = distance", "leave = 3.4e38"),
+        (0, "include/march.glsl", "enter = max(enter, min(a, b))", "enter = enter"),
         (0, "include/reach.glsl", "i != i_own && ", ""),
         (0, "include/reach.glsl", "light.kind == LIGHT_POINT ?", "light.kind == 77 ?"),
         (0, "include/reach.glsl", "i = 0; i < n_surfaces", "i = 1; i < n_surfaces"),
-        (0, "transmit.comp", "bool is_on = any", "bool is_on = true || any"),
+        (
+            0,
+            "transmit.comp",
+            "bool is_on = any(notEqual(light.energy, vec3(0.0)))",
+            "bool is_on = true",
+        ),
         (1, "transmit.comp", "through[k] = dimmed", "through[k] = is_center_clear ? dimmed : 0.0"),
         (0, "include/occlude.glsl", "<= dot(r.v, r.v)", "<= dot(r.u, r.u)"),
         (0, "include/occlude.glsl", "(a / (a - b))", "(a / (a + b))"),

@@ -1,38 +1,34 @@
 //! The game step: computes the camera, the clouds and, with `simulate = "cpu"`, every particle at a
 //! frame's time.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 use tracing::info_span;
 
 use super::clock::ms;
-use super::features::{
-    denser_at_most, has_diffusion, has_impostors, has_live, is_glossy, tau_bound,
-};
+use super::features::{denser_at_most, has_impostors, has_live, is_glossy, tau_bound};
 use super::live::{disc_records, live_particles};
+use super::media::{self, KeptMedium};
 use super::packet::Packet;
 use super::tensor_shape::{Shape, basis_of, is_edited, kind_of};
 use super::visibility::drawn_groups;
 use crate::error::Result;
 use crate::layout::facet::{KeyBits, NO_LOBE, RegionBoundsRecord, RegionRecord, lobe_width};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
-use crate::layout::medium::MediumRecord;
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
-use crate::model::cloud::{Cloud, Group, SQRT_TAU, mass, max_blob_mass};
+use crate::model::cloud::{Group, SQRT_TAU, mass, max_blob_mass};
 use crate::model::frame_state::FrameState;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::gust::Mode;
 use crate::model::gust_lanes::{LANES, Lanes, Waves};
 use crate::model::material::{Brdf, Material};
-use crate::model::medium::{MeanMedium, Medium};
 use crate::model::overlap::slice_length;
-use crate::model::scene::{Lighting, Scene};
+use crate::model::scene::Scene;
 use crate::passes::blobs::Extent;
-use crate::passes::diffusion::DiffusionParams;
 
 /// The game side of a scene, which makes the packet of any frame.
 pub struct Game {
@@ -53,8 +49,7 @@ pub struct Game {
     culls: bool,
     /// The pose that replaces the scene's camera.
     viewpoint: Option<Viewpoint>,
-    /// The mean medium of clouds that no edit changes.
-    mean_medium: OnceLock<MeanMedium>,
+    mean_medium: KeptMedium,
 }
 
 /// A function that returns the camera's pose. It is called at every step, on the game thread; the
@@ -85,7 +80,7 @@ impl Game {
             rest,
             culls: true,
             viewpoint: None,
-            mean_medium: OnceLock::new(),
+            mean_medium: KeptMedium::default(),
         }
     }
 
@@ -178,9 +173,8 @@ impl Game {
             coefficients: self.coefficients(time_s),
             bounds: self.bounds(&setting),
             regions: self.regions(time_s, setting.light_origin),
-            media: self.media(time_s),
-            diffusion: has_diffusion(&self.scene)
-                .then(|| DiffusionParams::new(&self.mean_medium(time_s), &setting.grid)),
+            media: media::records(&self.scene, time_s),
+            diffusion: self.mean_medium.params(&self.scene, &self.groups, time_s, &setting.grid),
             lights: self
                 .scene
                 .lights
@@ -205,25 +199,6 @@ impl Game {
         info_span!("live")
             .in_scope(|| live_particles(&self.scene, &self.groups, rest, time_s))
             .map(Some)
-    }
-
-    /// Returns what scatters in each cloud, if clouds are a medium.
-    fn media(&self, time_s: f64) -> Vec<MediumRecord> {
-        let Lighting { mode, forward, .. } = self.scene.lighting;
-        let of = |cloud: &Cloud| {
-            let material = &self.scene.materials[cloud.i_material];
-            MediumRecord::new(&Medium::new(material, time_s, forward), mode)
-        };
-        if mode.is_medium() { self.scene.clouds.iter().map(of).collect() } else { vec![] }
-    }
-
-    /// Returns the mean medium, which lists of particles make slow to find.
-    fn mean_medium(&self, time_s: f64) -> MeanMedium {
-        let is_edited = |c: &Cloud| self.scene.materials[c.i_material].is_edited();
-        if self.scene.clouds.iter().any(is_edited) {
-            return MeanMedium::new(&self.scene, &self.groups, time_s);
-        }
-        *self.mean_medium.get_or_init(|| MeanMedium::new(&self.scene, &self.groups, time_s))
     }
 
     /// Returns a bound of every blob's mass; moving particles are looked at one by one.

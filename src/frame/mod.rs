@@ -26,6 +26,7 @@ mod light_notes;
 pub mod limits;
 mod live;
 mod low_res;
+mod media;
 mod morton_sort;
 mod packet;
 pub mod parallel;

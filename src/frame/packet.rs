@@ -4,13 +4,13 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use crate::layout::diffusion::DiffusionParams;
 use crate::layout::disc::DiscRecord;
 use crate::layout::facet::{RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::medium::MediumRecord;
 use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::passes::blobs::Extent;
-use crate::passes::diffusion::DiffusionParams;
 
 /// The state of a scene at a frame's time.
 #[derive(Debug, Clone)]

@@ -237,7 +237,8 @@ impl FramePasses {
                 n_lights: c.march.n_lights,
                 n_solids: c.n_solids,
                 forward: c.forward,
-                terms: c.terms,
+                n_terms: c.terms.n,
+                term: [c.terms.light, c.terms.depth, c.terms.phase],
             };
             scatter.record(rec, &buffers, &packet.grid, &of)
         })

@@ -1,4 +1,4 @@
-//! Records of clouds as a medium, and of the grids on which their light diffuses.
+//! Records of clouds as a medium.
 
 use crate::layout::record;
 use crate::model::medium::{Medium, without};
@@ -54,15 +54,5 @@ impl MediumRecord {
                 ..record
             },
         }
-    }
-}
-
-record! {
-    /// One of the grids of the diffusion solver.
-    pub struct LevelRecord {
-        /// Cells along each axis.
-        n_cells: [u32; 3],
-        /// Place of its first cell in the buffers of all grids.
-        i_first: u32,
     }
 }

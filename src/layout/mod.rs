@@ -2,6 +2,7 @@
 //! compares names, offsets and sizes with the declarations here.
 
 pub mod cull;
+pub mod diffusion;
 pub mod disc;
 pub mod facet;
 pub mod frame;

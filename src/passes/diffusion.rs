@@ -5,15 +5,11 @@
 //! multigrid cycles. Source: model.md §18, passes.md. Error: of a cycle about an eighth of what
 //! the cycle before left; of rounding 2e-6 of φ.
 
-use glam::{DVec3, UVec3};
-
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
+use crate::layout::diffusion::{DiffusionParams, LEVELS_ROOM, LevelRecord, LevelStep, levels};
 use crate::layout::frame::GridRecord;
-use crate::layout::medium::LevelRecord;
 use crate::layout::record;
-use crate::model::grid::{GridSpec, coarser};
-use crate::model::medium::MeanMedium;
 
 record! {
     /// Push constants of `diffusion_sources.comp`.
@@ -131,38 +127,6 @@ bindings! {
     }
 }
 
-/// Numbers of the medium, rounded once. They change with materials and the grid.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DiffusionParams {
-    /// ϖ.
-    pub albedo: [f32; 3],
-    /// 1 − ϖ.
-    pub absorbed: [f32; 3],
-    /// 1 − ϖg.
-    pub kept: [f32; 3],
-    /// g.
-    pub g: f32,
-    /// f.
-    pub straight: f32,
-    /// c, 1/length.
-    pub inverse_chord: f32,
-}
-
-impl DiffusionParams {
-    /// Returns the numbers of a medium on a grid.
-    pub fn new(mean: &MeanMedium, grid: &GridSpec) -> DiffusionParams {
-        let f32s = |v: DVec3| v.as_vec3().to_array();
-        DiffusionParams {
-            albedo: f32s(mean.albedo),
-            absorbed: f32s(DVec3::ONE - mean.albedo),
-            kept: f32s(DVec3::ONE - mean.albedo * mean.g),
-            g: mean.g as f32,
-            straight: mean.straight as f32,
-            inverse_chord: grid.inverse_chord() as f32,
-        }
-    }
-}
-
 /// The march toward suns and lamps, and the cycles.
 #[derive(Debug, Clone, Copy)]
 pub struct DiffusionWork {
@@ -188,10 +152,9 @@ pub struct Room {
 }
 
 impl Room {
-    /// Returns the room for a grid of at most `n_cells`. A level has at most two thirds of the
-    /// cells of the finer one.
+    /// Returns the room for a grid of at most `n_cells`.
     pub fn new(n_cells: u64, n_sets: u32) -> Room {
-        Room { n_cells: 3 * n_cells, n_sets }
+        Room { n_cells: LEVELS_ROOM * n_cells, n_sets }
     }
 }
 
@@ -208,13 +171,6 @@ buffers! {
         /// Right-hand sides by cell.
         source: Buffer => [f32; 4], room.n_cells, "diffusion.source", Texels;
     }
-}
-
-/// A level and how it is merged to the next.
-#[derive(Debug, Clone, Copy)]
-struct Step {
-    level: LevelRecord,
-    halved: [u32; 3],
 }
 
 /// The pipelines and scratch buffers of the pass.
@@ -274,7 +230,7 @@ impl Diffusion {
         of: &DiffusionParams,
         work: &DiffusionWork,
     ) -> Result<()> {
-        let (steps, n_all) = steps(grid);
+        let (steps, n_all) = levels(grid);
         if u64::from(n_all) > self.room.n_cells {
             return Err(Error::limit(format!(
                 "diffusion on {n_all} cells of all levels, where there is room for {}",
@@ -283,7 +239,7 @@ impl Diffusion {
         }
         let DiffusionBuffers { lights, regions, density, field } = *buffers;
         let Scratch { operators, phi, next_phi, source } = &self.scratch;
-        let n_cells = n_of(&steps[0].level);
+        let n_cells = steps[0].level.n_total();
         let push = SourcesPush {
             grid: *grid,
             albedo: of.albedo,
@@ -308,7 +264,7 @@ impl Diffusion {
         rec.dispatch(&self.system, &system, &push, n_cells)?;
         for pair in steps.windows(2) {
             let push = pair_push(pair, n_all);
-            rec.dispatch(&self.coarsen, &[operators], &push, n_of(&pair[1].level))?;
+            rec.dispatch(&self.coarsen, &[operators], &push, pair[1].level.n_total())?;
         }
         for i in 0..work.n_cycles {
             self.record_cycle(rec, &steps, n_all, i == 0)?;
@@ -322,7 +278,7 @@ impl Diffusion {
     fn record_cycle(
         &self,
         rec: &mut Recorder<'_>,
-        steps: &[Step],
+        steps: &[LevelStep],
         n_all: u32,
         is_first: bool,
     ) -> Result<()> {
@@ -334,7 +290,7 @@ impl Diffusion {
             }
             self.record_sweep(rec, &self.sweep, [phi, next_phi], &push, SHORT_STEP)?;
             let buffers = [operators, source, next_phi, phi];
-            rec.dispatch(&self.restrict, &buffers, &push, n_of(&pair[1].level))?;
+            rec.dispatch(&self.restrict, &buffers, &push, pair[1].level.n_total())?;
         }
         let level = steps[steps.len() - 1].level;
         let push = CoarsestPush { level, n_all, n_sweeps: COARSEST_SWEEPS };
@@ -357,55 +313,10 @@ impl Diffusion {
     ) -> Result<()> {
         let Scratch { operators, source, .. } = &self.scratch;
         let push = SweepPush { level: fine, coarse, halved, n_all, step };
-        rec.dispatch(kernel, &[operators, source, from, to], &push, n_of(&fine))
+        rec.dispatch(kernel, &[operators, source, from, to], &push, fine.n_total())
     }
 }
 
-fn n_of(level: &LevelRecord) -> u32 {
-    level.n_cells.iter().product()
-}
-
-fn pair_push(pair: &[Step], n_all: u32) -> PairPush {
+fn pair_push(pair: &[LevelStep], n_all: u32) -> PairPush {
     PairPush { fine: pair[0].level, coarse: pair[1].level, halved: pair[0].halved, n_all }
-}
-
-/// Returns all levels, the finest first, and the number of their cells.
-fn steps(grid: &GridRecord) -> (Vec<Step>, u32) {
-    let (mut steps, mut i_first) = (Vec::new(), 0);
-    let mut n = UVec3::from(grid.n_cells);
-    let mut edges = DVec3::new(1.0, f64::from(grid.aspect), 1.0);
-    loop {
-        let level = LevelRecord { n_cells: n.to_array(), i_first };
-        i_first += n_of(&level);
-        let next = coarser(n, edges);
-        let halved = next.map_or([false; 3], |(_, halved)| halved).map(u32::from);
-        steps.push(Step { level, halved });
-        let Some((coarse, _)) = next else { return (steps, i_first) };
-        n = coarse;
-        edges *= UVec3::from(halved).as_dvec3() + 1.0;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn levels_follow_one_another_and_have_room() {
-        for (n, aspect) in
-            [([32, 20, 14], 1.0), ([3, 3, 300], 1.0), ([5, 5, 5], 0.1), ([1; 3], 1.0)]
-        {
-            let grid = GridRecord { n_cells: n, aspect, ..GridRecord::default() };
-            let (steps, n_all) = steps(&grid);
-            let mut expected = 0;
-            for step in &steps {
-                assert_eq!(step.level.i_first, expected);
-                expected += n_of(&step.level);
-            }
-            assert_eq!(expected, n_all);
-            let n_finest = u64::from(n_of(&steps[0].level));
-            assert!(u64::from(n_all) <= Room::new(n_finest, 1).n_cells);
-            assert!(n_of(&steps[steps.len() - 1].level) <= 64);
-        }
-    }
 }

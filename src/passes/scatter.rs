@@ -9,7 +9,6 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
-use crate::model::scene::Octaves;
 
 record! {
     /// Push constants of `scatter.comp`.
@@ -72,8 +71,10 @@ pub struct ScatterParams {
     pub n_solids: u32,
     /// g of the ways to surfaces and ground.
     pub forward: f64,
-    /// Terms of the light that is scattered once.
-    pub terms: Octaves,
+    /// Number of terms of the light that is scattered once.
+    pub n_terms: u32,
+    /// Light, optical depth and mean cosines of a term over those of the one before.
+    pub term: [f64; 3],
 }
 
 /// The pipeline of the pass.
@@ -104,6 +105,7 @@ impl Scatter {
         grid: &GridRecord,
         of: &ScatterParams,
     ) -> Result<()> {
+        let [term_light, term_depth, term_phase] = of.term.map(|v| v as f32);
         let push = Push {
             grid: *grid,
             eye: of.eye,
@@ -111,10 +113,10 @@ impl Scatter {
             n_lights: of.n_lights,
             n_solids: of.n_solids,
             backward: (1.0 - of.forward) as f32,
-            n_terms: of.terms.n,
-            term_light: of.terms.light as f32,
-            term_depth: of.terms.depth as f32,
-            term_phase: of.terms.phase as f32,
+            n_terms: of.n_terms,
+            term_light,
+            term_depth,
+            term_phase,
         };
         let buffers: [&Buffer; 8] = buffers.by_binding();
         let n_buffers = if self.is_diffuse { 8 } else { 7 };

@@ -1,0 +1,111 @@
+//! Records of the grids on which light diffuses, and the numbers of the medium there.
+
+use glam::{DVec3, UVec3};
+
+use crate::layout::frame::GridRecord;
+use crate::layout::record;
+use crate::model::grid::{GridSpec, coarser};
+use crate::model::medium::MeanMedium;
+
+record! {
+    /// One of the grids of the diffusion solver.
+    pub struct LevelRecord {
+        /// Cells along each axis.
+        n_cells: [u32; 3],
+        /// Place of its first cell in the buffers of all grids.
+        i_first: u32,
+    }
+}
+
+impl LevelRecord {
+    /// Returns the number of cells.
+    pub fn n_total(&self) -> u32 {
+        self.n_cells.iter().product()
+    }
+}
+
+/// A level and how it is merged to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelStep {
+    /// The level.
+    pub level: LevelRecord,
+    /// 1 along the axes that are halved.
+    pub halved: [u32; 3],
+}
+
+/// All levels together have at most this many times the cells of the finest one: a level has at
+/// most two thirds of the cells of the one before.
+pub const LEVELS_ROOM: u64 = 3;
+
+/// Returns all levels, the finest first, and the number of their cells.
+pub fn levels(grid: &GridRecord) -> (Vec<LevelStep>, u32) {
+    let (mut steps, mut i_first) = (Vec::new(), 0);
+    let mut n = UVec3::from(grid.n_cells);
+    let mut edges = DVec3::new(1.0, f64::from(grid.aspect), 1.0);
+    loop {
+        let level = LevelRecord { n_cells: n.to_array(), i_first };
+        i_first += level.n_total();
+        let next = coarser(n, edges);
+        let halved = next.map_or([false; 3], |(_, halved)| halved).map(u32::from);
+        steps.push(LevelStep { level, halved });
+        let Some((coarse, _)) = next else { return (steps, i_first) };
+        n = coarse;
+        edges *= UVec3::from(halved).as_dvec3() + 1.0;
+    }
+}
+
+/// Numbers of the medium, rounded once. They change with materials and the grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DiffusionParams {
+    /// ϖ.
+    pub albedo: [f32; 3],
+    /// 1 − ϖ.
+    pub absorbed: [f32; 3],
+    /// 1 − ϖg.
+    pub kept: [f32; 3],
+    /// g.
+    pub g: f32,
+    /// f.
+    pub straight: f32,
+    /// c, 1/length.
+    pub inverse_chord: f32,
+}
+
+impl DiffusionParams {
+    /// Returns the numbers of a medium on a grid.
+    pub fn new(mean: &MeanMedium, grid: &GridSpec) -> DiffusionParams {
+        let f32s = |v: DVec3| v.as_vec3().to_array();
+        DiffusionParams {
+            albedo: f32s(mean.albedo),
+            absorbed: f32s(DVec3::ONE - mean.albedo),
+            kept: f32s(DVec3::ONE - mean.albedo * mean.g),
+            g: mean.g as f32,
+            straight: mean.straight as f32,
+            inverse_chord: grid.inverse_chord() as f32,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_follow_one_another_and_have_room() {
+        for (n, aspect) in
+            [([32, 20, 14], 1.0), ([3, 3, 300], 1.0), ([5, 5, 5], 0.1), ([1; 3], 1.0)]
+        {
+            let grid = GridRecord { n_cells: n, aspect, ..GridRecord::default() };
+            let (steps, n_all) = levels(&grid);
+            let mut expected = 0;
+            for step in &steps {
+                assert_eq!(step.level.i_first, expected);
+                expected += step.level.n_total();
+            }
+            assert_eq!(expected, n_all);
+            let n_finest = u64::from(steps[0].level.n_total());
+            assert!(u64::from(n_all) <= LEVELS_ROOM * n_finest);
+            assert!(steps[steps.len() - 1].level.n_total() <= 64);
+        }
+    }
+}

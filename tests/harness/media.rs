@@ -1,0 +1,149 @@
+//! Scenes whose clouds are a medium, and their light on the device and by the f64 twin.
+
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use nimbus::frame::{Game, Renderer};
+use nimbus::gpu::Compiler;
+use nimbus::io::scene_file;
+use nimbus::model::frame_state::FrameState;
+use nimbus::model::scene::{LightingMode, Scene};
+use nimbus::reference::picture::FrameReference;
+
+use crate::harness::Gpu;
+
+/// Colours, sizes, ellipsoids.
+const POINTS: &str = "x,y,z,sigma,kappa,r,g,b\n\
+    -0.8,0.1,0.2,0.35,4,1,1,1\n0.1,0.4,-0.3,0.3,6,1,0.8,0.6\n0.7,-0.2,0.3,0.25,9,0.7,0.9,1\n\
+    0.2,-0.5,0.1,0.4,2,1,1,1\n-0.3,0.7,0.4,0.2,12,0.9,0.9,0.9\n0.9,0.5,-0.2,0.15,3,1,1,1\n";
+
+const LIGHTS: &str = "[[light]]\nkind = 'directional'\ndirection = [-0.5, -0.8, -0.3]\n\
+    irradiance = [3, 2.9, 2.7]\n[[light]]\nkind = 'sky'\nirradiance = [0.8, 0.87, 1]\n\
+    constant = 0.3\n[[light]]\nkind = 'point'\nposition = [1.5, 1.2, 1]\nintensity = [2, 1, 0.5]\n\
+    [[light]]\nkind = 'spot'\nposition = [-2, 1, 2]\ndirection = [2, -1, -2]\n\
+    intensity = [1, 2, 3]\ninner_deg = 10\nouter_deg = 25\n";
+
+/// Scenes by name: coloured balls among lamps and surfaces, droplets in facets of several, flat
+/// blobs over one another, boxes.
+pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
+    let dir = tempfile::tempdir().expect("a folder");
+    let write = |file: &str, text: &str| std::fs::write(dir.path().join(file), text).expect("room");
+    write("points.csv", POINTS);
+    write(
+        "flat.csv",
+        "x,y,z,sigma,sigma_y,kappa,r,g,b\n0,0,0,0.5,0.1,5,1,1,1\n\
+        0.2,0.15,0.1,0.6,0.12,4,1,1,1\n-0.5,-0.2,0.3,0.4,0.08,9,1,1,1\n",
+    );
+    write("boxes.dat", "120\n2\n60, 2, 1, 1, -0.5, 0, 0, 0.6\n60, 1, 1, 2, 0.8, 0.3, 0, 0.5\n");
+    let (material, cloud) = match name {
+        "coloured" => (
+            "kd = [0.9, 0.8, 0.7]\n",
+            "[[cloud]]\nfrom = 'particles'\nfile = 'points.csv'\nmaterial = 'm'\n[[surface]]\n\
+             center = [0, -1.5, 0]\nu = [0, 0, 2]\nv = [2, 0, 0]\nmaterial = 'm'\n\
+             subdivide = [3, 3]\n[[surface]]\ncenter = [1.2, 1.0, 0.5]\nu = [0.3, 0, 0]\n\
+             v = [0, 0, 0.3]\nmaterial = 'm'\n",
+        ),
+        "droplets" => (
+            "albedo = [0.999, 0.99, 0.95]\nphase = 'mie'\ndroplet_um = 8\n",
+            "[[cloud]]\nfrom = 'boxes'\nfile = 'boxes.dat'\nmaterial = 'm'\noptical_depth = 2\n",
+        ),
+        "flat" => (
+            "kd = [0.95, 0.95, 0.95]\n",
+            "[[cloud]]\nfrom = 'particles'\nfile = 'flat.csv'\nmaterial = 'm'\n",
+        ),
+        _ => (
+            "kd = [0.9, 0.9, 0.9]\n",
+            "[[cloud]]\nfrom = 'boxes'\nfile = 'boxes.dat'\nmaterial = 'm'\noptical_depth = 1\n",
+        ),
+    };
+    let grouped = if name == "droplets" { "facets_per_cloud = 30\n" } else { "" };
+    let text = format!(
+        "[film]\nwidth = 64\nheight = 48\n[camera]\nposition = [0.5, 1, 6]\ntarget = [0, 0, 0]\n\
+         [lighting]\nmode = '{mode}'\ngrid = 20\n{grouped}{LIGHTS}[[material]]\nname = 'm'\n\
+         {material}{cloud}"
+    );
+    write("scene.toml", &text);
+    let more: Vec<String> = more.iter().map(|s| (*s).to_owned()).collect();
+    let loaded = scene_file::load(&dir.path().join("scene.toml"), &more, None);
+    loaded.unwrap_or_else(|e| panic!("{name}: {e}")).scene
+}
+
+/// Light of the clouds' facets.
+pub struct Lit {
+    /// Fluence of suns and lamps by facet.
+    pub direct: Vec<DVec3>,
+    /// Radiance toward the eye.
+    pub radiance: Vec<DVec3>,
+}
+
+/// Returns the light of the clouds' facets on the device.
+pub fn on_device(gpu: &Gpu, compiler: &Compiler, scene: &Scene) -> Lit {
+    let mut renderer =
+        Renderer::new(&gpu.device, compiler, &Arc::new(scene.clone()), true).expect("a renderer");
+    let mut game = Game::new(Arc::new(scene.clone()), None);
+    renderer.step(game.step(0).expect("a packet")).expect("a frame");
+    let (_, lit) = renderer.facets(&gpu.device).expect("facets");
+    let of_clouds = &lit[scene.n_solid_facets() as usize..];
+    let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    Lit {
+        direct: of_clouds.iter().map(|l| vector(l.direct)).collect(),
+        radiance: of_clouds.iter().map(|l| vector(l.first)).collect(),
+    }
+}
+
+/// Returns the light of the clouds' facets by the twin.
+pub fn by_twin(scene: &Scene) -> Lit {
+    let frame = FrameReference::new(scene, 0.0).expect("a reference");
+    let n = scene.n_solid_facets() as usize;
+    Lit { direct: frame.irradiance[n..].to_vec(), radiance: frame.radiance[n..].to_vec() }
+}
+
+/// Greatest difference as a share of the greatest value; infinite where one is no number.
+pub fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let most = b.iter().map(|v| v.max_element()).fold(0.0, f64::max);
+    assert!(most > 0.0, "there is light");
+    let differences = a.iter().zip(b).map(|(a, b)| (*a - *b).abs().max_element());
+    differences.fold(0.0, |m: f64, d| if d.is_nan() { f64::INFINITY } else { m.max(d) }) / most
+}
+
+/// The densities of the grid are within 2.5e-6 a weight and axis (passes.md, "grid"): 7.5e-6. What
+/// arrives, e^-x, errs by x e^-x of that, at most 0.37; exponents and phase functions add some
+/// 40 roundings of 6e-8. Diffuse light depends on the density twice: its sources are such
+/// numbers, and D is inverse to the density. Rounding of its equations adds to it by (cells across)²/8 roundings: that is how much
+/// an error in every cell's equation makes φ rise in the middle.
+pub fn bound(scene: &Scene) -> f64 {
+    let groups = scene.groups();
+    let state = FrameState::at(scene, &groups, 0.0).expect("a state");
+    let across = f64::from(state.grid.n_cells.max_element());
+    match scene.lighting.mode {
+        LightingMode::Diffusion => 2.0 * 1.2e-5 + across * across / 8.0 * 6e-8,
+        _ => 1.2e-5,
+    }
+}
+
+/// Checks that the device has the light of the twin.
+pub fn check(gpu: &Gpu, name: &str, mode: &str) {
+    let scene = scene(name, mode, &[]);
+    let (found, truth) = (on_device(gpu, &gpu.compiler, &scene), by_twin(&scene));
+    let off = [apart(&found.direct, &truth.direct), apart(&found.radiance, &truth.radiance)];
+    println!("{name}, {mode}: {off:?}");
+    assert!(off.iter().all(|off| *off < bound(&scene)), "{name}, {mode}: {off:?}");
+}
+
+/// A scene and its mode; a shader's file, and what is replaced in it.
+pub type Wrong = (&'static str, &'static str, &'static str, &'static str, &'static str);
+
+/// Checks that wrong shaders are beyond the bound.
+pub fn check_found(gpu: &Gpu, wrong: &[Wrong]) {
+    for (name, mode, file, from, to) in wrong {
+        let scene = scene(name, mode, &[]);
+        let wrong = Gpu::wrong_compiler(file, from, to);
+        let (found, truth) = (on_device(gpu, &wrong, &scene), by_twin(&scene));
+        let off = apart(&found.radiance, &truth.radiance).max(apart(&found.direct, &truth.direct));
+        println!("{name}, {mode}, {file}, {from} -> {to}: {off:e}");
+        assert!(off > bound(&scene), "{name}, {mode}, {file}, {from} -> {to}: {off:e}");
+    }
+}

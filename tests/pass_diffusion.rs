@@ -1,0 +1,105 @@
+//! diffusion against its f64 twin: every facet's light on the device is that of the twin, wrong
+//! shaders are found, and what stands still is not computed again.
+
+mod harness;
+#[path = "harness/media.rs"]
+mod media;
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use harness::Gpu;
+use media::scene;
+use nimbus::frame::plan::{Pass, Plan};
+use nimbus::frame::{Game, Renderer};
+use nimbus::io::scene_file;
+use nimbus::model::scene::Scene;
+
+#[test]
+fn every_facet_has_the_light_of_the_twin() {
+    let gpu = Gpu::new();
+    for name in ["coloured", "droplets", "flat", "boxes"] {
+        media::check(&gpu, name, "diffusion");
+    }
+}
+
+#[test]
+fn wrong_shaders_are_found() {
+    let wrong = [
+        ("coloured", "diffusion", "diffusion_sources.comp", "z -= e", "z += e"),
+        (
+            "coloured",
+            "diffusion",
+            "diffusion_sources.comp",
+            "is_clear(p, light",
+            "true || is_clear(p, light",
+        ),
+        ("coloured", "diffusion", "diffusion_system.comp", "next[2][set]", "next[1][set]"),
+        ("flat", "diffusion", "diffusion_system.comp", "axis == 1 ? 0.0", "axis == 0 ? 0.0"),
+        (
+            "boxes",
+            "diffusion",
+            "diffusion_system.comp",
+            "sink += through;\n                right += 4.0",
+            "right += 4.0",
+        ),
+        ("boxes", "diffusion", "diffusion_system.comp", "push.absorbed", "push.absorbed * 0.0"),
+        (
+            "flat",
+            "diffusion",
+            "diffusion_coarsen.comp",
+            "equal(ivec3(x, y, z) - first, halved)",
+            "bvec3(true)",
+        ),
+        ("boxes", "diffusion", "diffusion_restrict.comp", "- all * PHI(from)", ""),
+        ("boxes", "diffusion", "diffusion_coarsest.comp", "% 2u == 0u", "% 2u == 2u"),
+        ("boxes", "diffusion", "include/equations.glsl", "if (at[axis] > 0)", "if (at[axis] > 1)"),
+        ("boxes", "diffusion", "diffusion_sweep.comp", "(at) >> halved()", "(at)"),
+        ("boxes", "diffusion", "diffusion_flux.comp", "-= reach * slope", "+= reach * slope"),
+        ("boxes", "diffusion", "scatter.comp", "w.y * field[c + 2]", "w.y * field[c + 3]"),
+    ];
+    media::check_found(&Gpu::new(), &wrong);
+}
+
+fn plan_of(renderer: &mut Renderer, game: &mut Game, i_frame: u32) -> Plan {
+    renderer.step(game.step(i_frame).expect("a packet")).expect("a frame").plan
+}
+
+#[test]
+fn what_stands_still_is_not_computed_again() {
+    let gpu = Gpu::new();
+    let runs = |scene: &Scene| {
+        let scene = Arc::new(scene.clone());
+        let mut renderer =
+            Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+        let mut game = Game::new(scene, None);
+        let plans = [0, 1].map(|i| plan_of(&mut renderer, &mut game, i));
+        let passes = [Pass::Grid, Pass::Facets, Pass::Transmit, Pass::Diffusion, Pass::Scatter];
+        plans.map(|plan| passes.map(|pass| plan.runs(pass)))
+    };
+    assert_eq!(runs(&scene("boxes", "diffusion", &[])), [[true; 5], [false; 5]]);
+    // The phase function depends on the eye, and the diffuse light does not.
+    let mut flown = scene("boxes", "diffusion", &[]);
+    flown.camera = scene_with_path().camera;
+    assert_eq!(runs(&flown), [[true; 5], [false, false, false, false, true]]);
+    // An edit of the material marches nothing.
+    let mut edited = scene("boxes", "diffusion", &[]);
+    let mut key = edited.materials[0].keys[0];
+    key.time_s = 1.0;
+    key.brdf.kd = DVec3::splat(0.5);
+    edited.materials[0].keys.push(key);
+    assert_eq!(runs(&edited), [[true; 5], [false, false, false, true, true]]);
+    let reflecting = runs(&scene("boxes", "first", &[]));
+    assert_eq!(reflecting, [[true, true, true, false, false], [false; 5]]);
+}
+
+/// A scene whose camera moves.
+fn scene_with_path() -> Scene {
+    let dir = tempfile::tempdir().expect("a folder");
+    let text = "[camera]\npath = [{ time_s = 0, position = [0, 0, 5], target = [0, 0, 0] }, \
+        { time_s = 1, position = [1, 0, 5], target = [0, 0, 0] }]\n[[light]]\nkind = 'sky'\n\
+        irradiance = [1, 1, 1]\n";
+    let file = dir.path().join("scene.toml");
+    std::fs::write(&file, text).expect("room");
+    scene_file::load(&file, &[], None).unwrap_or_else(|e| panic!("{e}")).scene
+}

@@ -1,0 +1,34 @@
+//! scatter against its f64 twin, in modes that scatter light once: every facet's light on the device
+//! is that of the twin, and wrong shaders are found.
+
+mod harness;
+#[path = "harness/media.rs"]
+mod media;
+
+use harness::Gpu;
+
+#[test]
+fn every_facet_has_the_light_of_the_twin() {
+    let gpu = Gpu::new();
+    for name in ["coloured", "droplets", "flat", "boxes"] {
+        for mode in ["single", "similarity", "octaves"] {
+            media::check(&gpu, name, mode);
+        }
+    }
+}
+
+#[test]
+fn wrong_shaders_are_found() {
+    let wrong = [
+        ("boxes", "single", "scatter.comp", "a.toward + outgoing", "a.toward - outgoing"),
+        ("boxes", "single", "scatter.comp", "return law.albedo * sum", "return sum"),
+        ("boxes", "octaves", "scatter.comp", "phase *= push.term_phase", "phase *= 0.49"),
+        ("boxes", "octaves", "scatter.comp", "depth * tau * law.depth", "tau * law.depth"),
+        ("boxes", "single", "scatter.comp", "- 0.5) * up", "- 0.5) * -up"),
+        ("boxes", "similarity", "include/medium.glsl", "1.0 - albedo * m.straight", "vec3(1.0)"),
+        ("coloured", "single", "include/medium.glsl", "1.17 * r", "1.16 * r"),
+        ("droplets", "single", "include/medium.glsl", "c * m.draine_lobe", "c * m.lobe"),
+        ("droplets", "single", "include/medium.glsl", "2.0 * g * g) * (1.0", "g * g) * (1.0"),
+    ];
+    media::check_found(&Gpu::new(), &wrong);
+}

@@ -33,9 +33,9 @@ void main() {
         memoryBarrierBuffer();
         barrier();
         if (is_cell && (uint(at.x + at.y + at.z) + i) % 2u == 0u) {
-            vec3 flows, all;
-            around(level, at, flows, all);
-            phi[k] = vec4((source[k].rgb + flows) / all, 0.0);
+            vec3 own = phi[k].rgb, flows, all;
+            around(level, at, own, flows, all);
+            phi[k] = vec4(own + (source[k].rgb + flows) / all, 0.0);
         }
     }
 }

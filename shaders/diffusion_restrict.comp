@@ -49,8 +49,8 @@ void main() {
                 for (int x = first.x; x < end.x; ++x) {
                     ivec3 from = ivec3(x, y, z);
                     vec3 flows, all;
-                    around(push.fine, from, flows, all);
-                    left += source[index_of(push.fine, from)].rgb + flows - all * PHI(from);
+                    around(push.fine, from, PHI(from), flows, all);
+                    left += source[index_of(push.fine, from)].rgb + flows;
                 }
             }
         }

@@ -40,10 +40,9 @@ void main() {
     FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
         ivec3 at = place_of(level, i);
         int c = index_of(level, at);
-        vec3 flows, all;
-        around(level, at, flows, all);
-        vec3 own = PHI(at);
+        vec3 own = PHI(at), flows, all;
+        around(level, at, own, flows, all);
         vec3 right = uintBitsToFloat(TEXEL(source, c)).rgb;
-        after[c] = vec4(own + push.step * ((right + flows) / all - own), 0.0);
+        after[c] = vec4(own + push.step * (right + flows) / all, 0.0);
     }
 }

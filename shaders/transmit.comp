@@ -75,7 +75,7 @@ LightPath light_path(Light light, vec3 p) {
 // Returns (1-g)tau from p to the light; with DEPTHS tau itself.
 float depth_to(PLACE p, LightPath way) {
     // There is no march without losses.
-    WEIGHT tau = depth_along(p, way.toward, way.distance, push.backward > 0.0);
+    REAL tau = depth_along(p, way.toward, way.distance, push.backward > 0.0);
     return float(push.backward * tau);
 }
 

@@ -51,7 +51,7 @@ fn wrong_shaders_are_found() {
             "equal(ivec3(x, y, z) - first, halved)",
             "bvec3(true)",
         ),
-        ("boxes", "diffusion", "diffusion_restrict.comp", "- all * PHI(from)", ""),
+        ("boxes", "diffusion", "diffusion_restrict.comp", "source[index_of(push.fine, from)].rgb + flows", "flows"),
         ("boxes", "diffusion", "diffusion_coarsest.comp", "% 2u == 0u", "% 2u == 2u"),
         ("boxes", "diffusion", "include/equations.glsl", "if (at[axis] > 0)", "if (at[axis] > 1)"),
         ("boxes", "diffusion", "diffusion_sweep.comp", "(at) >> halved()", "(at)"),

@@ -24,23 +24,24 @@ vec4 factors(int c) { return operator_at(c, 0); }
 vec3 factor(vec4 of, int k) { return vec3(of[k]); }
 #endif
 
-// Sets `flows` to sum w phi_n over the neighbours of a cell, and `all` to the sum of w and sink.
-void around(Level level, ivec3 at, out vec3 flows, out vec3 all) {
+// Sets `flows` to sum w (phi_n - phi) - sink phi of a cell, and `all` to the sum of w and sink.
+// Differences of neighbours keep the digits that their values share.
+void around(Level level, ivec3 at, vec3 own_phi, out vec3 flows, out vec3 all) {
     int c = index_of(level, at);
     ivec3 stride = strides_of(level);
     FACTORS own = factors(c);
-    flows = vec3(0.0);
     all = factor(own, 3);
+    flows = -all * own_phi;
     for (int axis = 0; axis < 3; ++axis) {
         ivec3 to = ivec3(axis == 0, axis == 1, axis == 2);
         if (at[axis] + 1 < int(level.n_cells[axis])) {
             vec3 w = factor(own, axis);
-            flows += w * PHI(at + to);
+            flows += w * (PHI(at + to) - own_phi);
             all += w;
         }
         if (at[axis] > 0) {
             vec3 w = factor(factors(c - stride[axis]), axis);
-            flows += w * PHI(at - to);
+            flows += w * (PHI(at - to) - own_phi);
             all += w;
         }
     }

@@ -21,7 +21,7 @@ WEIGHTS2 crossing(PLACE p, PLACE d, WEIGHT distance) {
 
 // Returns the optical depth from p along d, by midpoint samples. There is nothing to march for
 // where the ray misses the box.
-WEIGHT depth_along(PLACE p, PLACE d, WEIGHT distance, bool is_wanted) {
+REAL depth_along(PLACE p, PLACE d, WEIGHT distance, bool is_wanted) {
     WEIGHTS2 part = crossing(p, d, distance);
     WEIGHT length_total = part.y - part.x;
     bool is_marched = is_wanted && length_total > 0.0;

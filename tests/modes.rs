@@ -274,8 +274,8 @@ fn a_still_scene_skips_and_a_moving_one_does_not() {
         .iter()
         .map(|p| p.name())
         .filter(|p| {
-            !["live", "contract", "texture", "terrain", "impostors", "sprites", "upsample"]
-                .contains(p)
+            let others = ["live", "contract", "texture", "terrain", "impostors", "sprites"];
+            !others.contains(p) && !["upsample", "diffusion", "scatter"].contains(p)
         })
         .collect();
     assert_eq!(moving, all);

@@ -96,6 +96,13 @@ fn finder(what: &str) -> &'static [&'static str] {
         | "a slice closed as if it were thin" => {
             &["scenes/cubes-554.toml", "--set", "draw.overlap='slices'"]
         }
+        "no light leaves the box of diffusion"
+        | "diffuse light is not averaged over all directions" => {
+            &["scenes/cubes-554.toml", "--set", "lighting.mode='diffusion'"]
+        }
+        "the sky's light from everywhere is too bright" => {
+            &["scenes/cubes-554.toml", "--set", "lighting.mode='single'"]
+        }
         _ => &["scenes/cubes-554.toml"],
     }
 }

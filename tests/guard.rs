@@ -149,8 +149,8 @@ const WRITES: &[(Fault, &str, &str)] = &[
 const READS: &[Fault] = &[
     fault(
         "first.comp",
-        "transmittance[j * push.n_lights + l]",
-        "transmittance[(j + push.n_facets) * push.n_lights + l]",
+        "ARRIVING(k) transmittance[k]",
+        "ARRIVING(k) transmittance[(k) + push.n_facets * push.n_lights]",
         "hello",
         &[],
     ),

@@ -239,10 +239,10 @@ pub const FAULTS: &[Fault] = &[
         "scattering/furnace",
     ),
     (
-        "the sky's light from everywhere is a little too bright",
+        "the sky's light from everywhere is too bright",
         "scatter.comp",
         "light * (share + constant)",
-        "light * (share + 1.00001 * constant)",
+        "light * (share + 1.1 * constant)",
         "scattering/thin",
     ),
 ];

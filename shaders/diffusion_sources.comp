@@ -5,6 +5,7 @@
 #include "each.glsl"
 #include "light.glsl"
 #include "occlude.glsl"
+#include "diffusion.glsl"
 
 // Computes the light of suns and lamps that is scattered for the first time in every cell
 // (model.md §18, passes.md "diffusion").
@@ -37,10 +38,9 @@ WRITES(3, vec4, field)
 #include "medium.glsl"
 
 void main() {
-    uvec3 n = push.grid.n_cells;
-    FOR_EACH(c, n.x * n.y * n.z) {
-        uint row = c / n.x;
-        vec3 at = vec3(c - row * n.x, row % n.y, row / n.y) + 0.5;
+    Level level = Level(push.grid.n_cells, 0u);
+    FOR_EACH(c, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
+        vec3 at = vec3(place_of(level, c)) + 0.5;
         vec3 p = push.grid.low + push.grid.cell * vec3(1.0, push.grid.aspect, 1.0) * at;
         float sigma = cell_at(int(c));
         vec3 weakened = 1.0 - push.albedo * push.straight;

@@ -18,7 +18,7 @@ layout(push_constant) uniform Push {
     // 1 along the axes that are halved.
     uvec3 halved;
     uint n_all;
-    float step;
+    uint is_long;
 } push;
 TEXELS(0, operators)
 TEXELS(1, source)
@@ -43,6 +43,7 @@ void main() {
         vec3 own = PHI(at), flows, all;
         around(level, at, own, flows, all);
         vec3 right = uintBitsToFloat(TEXEL(source, c)).rgb;
-        after[c] = vec4(own + push.step * (right + flows) / all, 0.0);
+        float step = push.is_long != 0u ? LONG_STEP : SHORT_STEP;
+        after[c] = vec4(own + step * (right + flows) / all, 0.0);
     }
 }

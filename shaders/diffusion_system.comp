@@ -21,8 +21,6 @@ layout(push_constant) uniform Push {
 READS(0, Light, lights)
 FLOATS(1, density)
 READS(2, vec4, field)
-const float LONG_STEP = 1.6;
-
 // [set][cell]
 WRITES(3, vec4, operators)
 WRITES(4, vec4, phi)

@@ -38,10 +38,8 @@ READS(7, vec4, field)
 
 #include "first.glsl"
 
-// Vulkan's exp(0) may be three ulp off 1.
 float arriving(float tau) {
-    float depth = push.backward * tau;
-    return depth > 0.0 ? exp(-min(depth, OPAQUE_DEPTH)) : 1.0;
+    return tau < BARRED_DEPTH ? through(vec3(push.backward * tau)).x : 0.0;
 }
 #define ARRIVING(k) arriving(transmittance[k])
 #include "reflect.glsl"
@@ -114,6 +112,9 @@ void main() {
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
             float tau = transmittance[j * push.n_lights + l];
+            if (tau >= BARRED_DEPTH) {
+                continue;
+            }
             if (light.kind == LIGHT_SKY) {
 #if !DIFFUSE
                 radiance += light.energy * INV_PI

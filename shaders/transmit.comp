@@ -22,7 +22,7 @@ layout(constant_id = 0) const uint APART = 0;
 #endif
 // Result of a way that a surface bars, or that leads to a light without energy.
 #if DEPTHS
-const float BARRED = 1e30;
+const float BARRED = BARRED_DEPTH;
 #else
 const float BARRED = 0.0;
 #endif

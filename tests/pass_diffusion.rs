@@ -61,6 +61,7 @@ fn wrong_shaders_are_found() {
         ("boxes", "diffusion", "diffusion_coarsest.comp", "% 2u == 0u", "% 2u == 2u"),
         ("boxes", "diffusion", "include/equations.glsl", "if (at[axis] > 0)", "if (at[axis] > 1)"),
         ("boxes", "diffusion", "diffusion_sweep.comp", "(at) >> halved()", "(at)"),
+        ("boxes", "diffusion", "include/diffusion.glsl", "SHORT_STEP = 0.6", "SHORT_STEP = 0.5"),
         ("boxes", "diffusion", "diffusion_flux.comp", "-= reach * slope", "+= reach * slope"),
         ("boxes", "diffusion", "scatter.comp", "w.y * field[c + 2]", "w.y * field[c + 3]"),
     ];

@@ -32,3 +32,23 @@ fn wrong_shaders_are_found() {
     ];
     media::check_found(&Gpu::new(), &wrong);
 }
+
+#[test]
+fn surfaces_have_the_light_of_the_first_reflection() {
+    let gpu = Gpu::new();
+    for forward in ["lighting.forward=0.85", "lighting.forward=1.0"] {
+        let light = |mode: &str| {
+            let scene = media::scene("coloured", mode, &[forward, "lighting.octave_depth=0.0"]);
+            media::on_device(&gpu, &gpu.compiler, &scene).of_solids
+        };
+        let first = light("first");
+        let shade = first.iter().map(|e| e.x).fold(f64::INFINITY, f64::min);
+        let most = first.iter().map(|e| e.x).fold(0.0, f64::max);
+        assert!(shade < 0.5 * most, "a shadow of the roof or the cloud");
+        for mode in ["single", "similarity", "octaves", "diffusion"] {
+            // (1 - g) tau and its exponent, rounded alike but for some units in the last place.
+            let off = media::apart(&light(mode), &first);
+            assert!(off < 1e-6, "{mode}, {forward}: {off:e}");
+        }
+    }
+}

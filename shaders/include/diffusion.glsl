@@ -7,6 +7,10 @@ struct Level {
     uint i_first;
 };
 
+// The steps of a pair of sweeps: together they damp what two neighbours do not share best.
+const float LONG_STEP = 1.6;
+const float SHORT_STEP = 0.6;
+
 // 3: channels have equations of their own; 1: one for all.
 #ifndef N_SETS
 #define N_SETS 1

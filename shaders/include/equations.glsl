@@ -3,10 +3,6 @@
 // toward the next cell along each axis, and sink. n_all in the push constants is the number of
 // cells of all levels.
 
-// The steps of a pair of sweeps: together they damp what two neighbours do not share best.
-const float LONG_STEP = 1.6;
-const float SHORT_STEP = 0.6;
-
 vec4 operator_at(int c, int set) {
     return uintBitsToFloat(TEXEL(operators, c + set * int(push.n_all)));
 }

@@ -1,5 +1,9 @@
 // How a light reaches a point with nothing in between (src/model/light.rs).
 
+// Optical depth of a way that a surface bars, and to a light without energy. No factor on depths,
+// be it 0, lets light through.
+const float BARRED_DEPTH = 1e30;
+
 struct Arrival {
     vec3 toward;
     float distance;

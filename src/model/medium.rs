@@ -70,7 +70,8 @@ impl ScatterLaw {
         let (f, albedo) = (medium.straight(lighting.mode), medium.albedo(color));
         let depth = DVec3::ONE - albedo * f;
         ScatterLaw {
-            albedo: albedo * (1.0 - f) / depth,
+            // Where all goes straight on, 0/0 is 0.
+            albedo: albedo * (1.0 - f) / depth.max(DVec3::splat(f64::MIN_POSITIVE)),
             depth,
             phase: without(medium.phase, f),
             terms: terms(lighting),

@@ -161,7 +161,8 @@ pub fn albedo_of(reflected: DVec3, g: f64) -> DVec3 {
         let b = 1.139 + 1.17 * r;
         let s = 2.0 * (1.0 - r) / (b + (b * b - 0.556 * (1.0 - r)).max(0.0).sqrt());
         let squared = (s * s).min(1.0);
-        (1.0 - squared) / (1.0 - g * squared)
+        // Where nothing is reflected and all goes forward, 0/0 is 0.
+        (1.0 - squared) / (1.0 - g * squared).max(f64::MIN_POSITIVE)
     }))
 }
 

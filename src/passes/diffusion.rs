@@ -78,8 +78,8 @@ record! {
         halved: [u32; 3],
         /// Cells of all levels.
         n_all: u32,
-        /// Length of the step, 1 to the solution of the cell's own equation.
-        step: f32,
+        /// 1: the long step of a pair of sweeps, else the short one.
+        is_long: u32,
     }
 }
 
@@ -109,9 +109,6 @@ record! {
 
 /// Sweeps of the coarsest grid.
 const COARSEST_SWEEPS: u32 = 16;
-/// Steps of a pair of sweeps.
-const LONG_STEP: f32 = 1.6;
-const SHORT_STEP: f32 = 0.6;
 
 bindings! {
     /// The buffers of the pass that others share.
@@ -286,9 +283,9 @@ impl Diffusion {
         for (i, pair) in steps.windows(2).enumerate() {
             let push = pair_push(pair, n_all);
             if i == 0 && !is_first {
-                self.record_sweep(rec, &self.sweep, [next_phi, phi], &push, LONG_STEP)?;
+                self.record_sweep(rec, &self.sweep, [next_phi, phi], &push, true)?;
             }
-            self.record_sweep(rec, &self.sweep, [phi, next_phi], &push, SHORT_STEP)?;
+            self.record_sweep(rec, &self.sweep, [phi, next_phi], &push, false)?;
             let buffers = [operators, source, next_phi, phi];
             rec.dispatch(&self.restrict, &buffers, &push, pair[1].level.n_total())?;
         }
@@ -297,8 +294,8 @@ impl Diffusion {
         rec.dispatch_groups(&self.coarsest, &[operators, source, next_phi], &push, 1)?;
         for pair in steps.windows(2).rev() {
             let push = pair_push(pair, n_all);
-            self.record_sweep(rec, &self.corrected, [next_phi, phi], &push, LONG_STEP)?;
-            self.record_sweep(rec, &self.sweep, [phi, next_phi], &push, SHORT_STEP)?;
+            self.record_sweep(rec, &self.corrected, [next_phi, phi], &push, true)?;
+            self.record_sweep(rec, &self.sweep, [phi, next_phi], &push, false)?;
         }
         Ok(())
     }
@@ -309,10 +306,10 @@ impl Diffusion {
         kernel: &Kernel,
         [from, to]: [&Buffer; 2],
         &PairPush { fine, coarse, halved, n_all }: &PairPush,
-        step: f32,
+        is_long: bool,
     ) -> Result<()> {
         let Scratch { operators, source, .. } = &self.scratch;
-        let push = SweepPush { level: fine, coarse, halved, n_all, step };
+        let push = SweepPush { level: fine, coarse, halved, n_all, is_long: u32::from(is_long) };
         rec.dispatch(kernel, &[operators, source, from, to], &push, fine.n_total())
     }
 }

@@ -15,10 +15,10 @@ pub const BARRED: f64 = 1e30;
 
 /// Returns the fluence Σ E F e^{−sτ} of suns and lamps at `p`, to which depths are `taus`.
 pub fn fluence(law: &ScatterLaw, p: DVec3, taus: &[f64], lights: &[Light]) -> DVec3 {
-    let of = |(light, tau): (&Light, &f64)| {
-        light.energy() * light.arrival(p).falloff * (-*tau * law.depth).exp()
+    let of = |(light, tau): (&Light, f64)| {
+        light.energy() * light.arrival(p).falloff * (-tau * law.depth).exp()
     };
-    lights.iter().zip(taus).filter(|(light, _)| !light.is_sky()).map(of).sum()
+    arriving(lights, taus).filter(|(light, _)| !light.is_sky()).map(of).sum()
 }
 
 /// Returns the radiance that a blob at `p` scatters once toward `eye`. Without `has_sky` the sky is
@@ -32,7 +32,7 @@ pub fn radiance(
     has_sky: bool,
 ) -> DVec3 {
     let outgoing = (eye - p).try_normalize().unwrap_or(UP);
-    let of = |(light, &tau): (&Light, &f64)| match *light {
+    let of = |(light, tau): (&Light, f64)| match *light {
         Light::Sky { irradiance, constant } if has_sky => {
             irradiance / PI * law.of_sky(outgoing.dot(UP), constant, tau)
         }
@@ -43,5 +43,11 @@ pub fn radiance(
             light.energy() * arrival.falloff * law.toward_eye(cosine, tau)
         }
     };
-    lights.iter().zip(taus).map(of).sum()
+    arriving(lights, taus).map(of).sum()
+}
+
+/// Returns the lights whose ways are not barred, with their depths. No factor on depths, be it 0,
+/// lets barred light through.
+fn arriving<'a>(lights: &'a [Light], taus: &'a [f64]) -> impl Iterator<Item = (&'a Light, f64)> {
+    lights.iter().zip(taus.iter().copied()).filter(|(_, tau)| *tau < BARRED)
 }

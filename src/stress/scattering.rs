@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::case::{Case, Comparison};
 use super::context::StressContext;
-use super::scenes::{blob, blob_cluster, cloud_of, surface_scene};
+use super::scenes::{SUN_ABOVE, blob, blob_cluster, cloud_of, rectangle, surface_scene};
 use crate::error::Result;
 use crate::model::cloud::{CloudSource, Particle};
 use crate::model::scene::{LightingMode, Scene};
@@ -42,9 +42,16 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "scattering/forward",
-        what: "a cloud that scatters nearly straight on (g = 0.99), in all modes: finite light",
+        what: "a cloud that scatters straight on (g = 0.99 and 1), in all modes: finite light",
         bound: "finite, at least 0",
         check: forward,
+    },
+    Case {
+        name: "scattering/barred",
+        what: "a cloud and a floor under a roof that hides the sun, in all modes, with factors of 0 \
+            on optical depths: no light at all",
+        bound: "0",
+        check: barred,
     },
 ];
 
@@ -55,6 +62,8 @@ const EVEN: &str =
 const UNEVEN: f64 = 1e-6;
 const SUN: &str = "[[light]]\nkind = 'directional'\ndirection = [-0.5, -0.8, -0.3]\n\
     irradiance = [1, 1, 1]\n";
+/// Mean cosine of the phase function where nothing else is said.
+const G: f64 = 0.85;
 const MEDIA: [LightingMode; 4] = [
     LightingMode::Single,
     LightingMode::Similarity,
@@ -106,13 +115,15 @@ fn thin(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
 fn all_modes(
     ctx: &mut StressContext,
     c: &mut Comparison,
-    material: &str,
+    (material, forward): (&str, f64),
     particles: &[Particle],
 ) -> Result<f64> {
     let lights = [EVEN, SUN].concat();
     let mut most = 0.0f64;
     for mode in MEDIA {
-        let frame = ctx.render(&scene(mode, &lights, material, particles.to_vec())?, 0)?;
+        let mut scene = scene(mode, &lights, material, particles.to_vec())?;
+        scene.lighting.forward = forward;
+        let frame = ctx.render(&scene, 0)?;
         let mut light = frame.lit.iter().flat_map(|l| l.direct.into_iter().chain(l.first));
         let what = format!("finite light, not negative, {}", mode.name());
         c.holds(light.all(|v| v.is_finite() && v >= 0.0), what);
@@ -124,22 +135,41 @@ fn all_modes(
 }
 
 fn thick(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
-    let most = all_modes(ctx, c, "albedo = [1, 1, 1]\n", &cluster(1e5))?;
+    let most = all_modes(ctx, c, ("albedo = [1, 1, 1]\n", G), &cluster(1e5))?;
     // The sun's light at the phase function's peak, and the even light in eight octaves.
-    let peak = (1.0 + 0.85) / (4.0 * std::f64::consts::PI * 0.15f64.powi(2));
+    let peak = (1.0 + G) / (4.0 * std::f64::consts::PI * (1.0 - G).powi(2));
     c.holds(most > 0.0 && most <= 2.0 * (peak + FRAC_1_PI), "light below the peak");
     Ok(())
 }
 
 fn black(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
-    let most = all_modes(ctx, c, "albedo = [0, 0, 0]\n", &cluster(1.0))?;
+    let most = all_modes(ctx, c, ("albedo = [0, 0, 0]\n", G), &cluster(1.0))?;
     c.add(most, 0.0, 0.0, "radiance");
     Ok(())
 }
 
 fn forward(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
-    let lit = "albedo = [1, 1, 1]\nphase = 0.99\n";
-    all_modes(ctx, c, lit, &cluster(1.0))?;
-    all_modes(ctx, c, lit, &[blob([0.0; 3], 0.5, 1e4)])?;
+    // A material's mean cosine is at most 0.99, and lighting.forward 1.
+    for material in [("albedo = [1, 1, 1]\nphase = 0.99\n", G), ("albedo = [1, 1, 1]\n", 1.0)] {
+        all_modes(ctx, c, material, &cluster(1.0))?;
+        all_modes(ctx, c, material, &[blob([0.0; 3], 0.5, 1e4)])?;
+    }
+    Ok(())
+}
+
+fn barred(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    for mode in MEDIA {
+        let mut scene = scene(mode, SUN_ABOVE, "albedo = [1, 1, 1]\n", cluster(1.0))?;
+        let flat = |y: f64, n: u32| rectangle([0.0, y, 0.0], [0.0, 0.0, 50.0], [50.0, 0.0, 0.0], n);
+        scene.surfaces = vec![flat(-4.0, 8), flat(4.0, 1)];
+        const N_FLOOR: usize = 64;
+        (scene.lighting.forward, scene.lighting.octaves.depth) = (1.0, 0.0);
+        let frame = ctx.render(&scene, 0)?;
+        // The facets of the floor come first, and then the roof's, which the sun reaches.
+        for (i, lit) in frame.lit.iter().enumerate().filter(|(i, _)| *i != N_FLOOR) {
+            let light = lit.direct.into_iter().chain(lit.first).fold(0.0, f32::max);
+            c.add(f64::from(light), 0.0, 0.0, format_args!("light of facet {i}, {}", mode.name()));
+        }
+    }
     Ok(())
 }

@@ -42,8 +42,8 @@ pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
             "kd = [0.9, 0.8, 0.7]\n",
             "[[cloud]]\nfrom = 'particles'\nfile = 'points.csv'\nmaterial = 'm'\n[[surface]]\n\
              center = [0, -1.5, 0]\nu = [0, 0, 2]\nv = [2, 0, 0]\nmaterial = 'm'\n\
-             subdivide = [3, 3]\n[[surface]]\ncenter = [1.2, 1.0, 0.5]\nu = [0.3, 0, 0]\n\
-             v = [0, 0, 0.3]\nmaterial = 'm'\n",
+             subdivide = [3, 3]\n[[surface]]\ncenter = [1.2, 1.0, 0.5]\nu = [0.6, 0, 0]\n\
+             v = [0, 0, 0.6]\nmaterial = 'm'\n",
         ),
         "droplets" => (
             "albedo = [0.999, 0.99, 0.95]\nphase = 'mie'\ndroplet_um = 8\n",
@@ -70,34 +70,42 @@ pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
     loaded.unwrap_or_else(|e| panic!("{name}: {e}")).scene
 }
 
-/// Light of the clouds' facets.
+/// Light of facets.
 pub struct Lit {
-    /// Fluence of suns and lamps by facet.
+    /// Irradiance of the surfaces' facets.
+    pub of_solids: Vec<DVec3>,
+    /// Fluence of suns and lamps by facet of the clouds.
     pub direct: Vec<DVec3>,
-    /// Radiance toward the eye.
+    /// Their radiance toward the eye.
     pub radiance: Vec<DVec3>,
 }
 
-/// Returns the light of the clouds' facets on the device.
+/// Returns the light of the facets on the device.
 pub fn on_device(gpu: &Gpu, compiler: &Compiler, scene: &Scene) -> Lit {
     let mut renderer =
         Renderer::new(&gpu.device, compiler, &Arc::new(scene.clone()), true).expect("a renderer");
     let mut game = Game::new(Arc::new(scene.clone()), None);
     renderer.step(game.step(0).expect("a packet")).expect("a frame");
     let (_, lit) = renderer.facets(&gpu.device).expect("facets");
-    let of_clouds = &lit[scene.n_solid_facets() as usize..];
+    let (of_solids, of_clouds) = lit.split_at(scene.n_solid_facets() as usize);
     let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
     Lit {
+        of_solids: of_solids.iter().map(|l| vector(l.direct)).collect(),
         direct: of_clouds.iter().map(|l| vector(l.direct)).collect(),
         radiance: of_clouds.iter().map(|l| vector(l.first)).collect(),
     }
 }
 
-/// Returns the light of the clouds' facets by the twin.
+/// Returns the light of the facets by the twin. That of surfaces is by areas, without the grid.
 pub fn by_twin(scene: &Scene) -> Lit {
     let frame = FrameReference::new(scene, 0.0).expect("a reference");
     let n = scene.n_solid_facets() as usize;
-    Lit { direct: frame.irradiance[n..].to_vec(), radiance: frame.radiance[n..].to_vec() }
+    let of_solids = frame.irradiance[..n].to_vec();
+    Lit {
+        of_solids,
+        direct: frame.irradiance[n..].to_vec(),
+        radiance: frame.radiance[n..].to_vec(),
+    }
 }
 
 /// Greatest difference as a share of the greatest value; infinite where one is no number.

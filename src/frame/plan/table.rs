@@ -103,7 +103,7 @@ passes! {
         needs |f, same| unlit(f, same).or_else(|| unless(!f.is_medium, "clouds are a medium")),
         unless |same| same.response && same.eye => "facets and lights are the same";
     /// Computes the diffuse light by cell.
-    Diffusion "diffusion", Facets,
+    Diffusion "diffusion", Particles,
         needs |f, _| unless(f.has_diffusion, "lighting.mode is not \"diffusion\""),
         unless |same| same.diffusion => "the medium and its lights are the same";
     /// Computes the light that clouds scatter as a medium.
@@ -117,6 +117,7 @@ passes! {
     /// Sums the light tensors.
     Contract "contract", Facets,
         needs |f, same| match f.tensors {
+            _ if f.is_medium => Some(Reason::Of("clouds are a medium")),
             Tensors::Kept => unlit(f, same),
             Tensors::Needless => {
                 Some(Reason::Of("no material is edited: light is gathered at once"))

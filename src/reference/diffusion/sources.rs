@@ -6,6 +6,7 @@ use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 use crate::model::medium::MeanMedium;
 use crate::reference::parallel::parallel_map;
+use crate::reference::scatter::BARRED;
 use crate::reference::transmit::{Obstacles, Receiver};
 
 /// Numbers that diffusion depends on, besides densities and lights.
@@ -53,6 +54,9 @@ impl Sources {
             for light in lights.iter().filter(|light| !light.is_sky()) {
                 let way = light.arrival(p);
                 let tau = obstacles.depths(&[receiver], std::slice::from_ref(light))[0];
+                if tau >= BARRED {
+                    continue;
+                }
                 let e = light.energy() * way.falloff * (-tau * depth).exp();
                 fluence += e;
                 // A column an axis.

@@ -222,6 +222,7 @@ impl LedgerStudy<'_> {
             Err(error) => return Err(error),
         };
         let from = match self.n_reflections {
+            _ if scene.lighting.mode.is_medium() => scene.lighting.mode.name().to_owned(),
             1 => "one reflection".to_owned(),
             n => format!("{n} reflections"),
         };

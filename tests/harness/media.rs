@@ -117,11 +117,15 @@ pub fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
     differences.fold(0.0, |m: f64, d| if d.is_nan() { f64::INFINITY } else { m.max(d) }) / most
 }
 
-/// The densities of the grid are within 2.5e-6 a weight and axis (passes.md, "grid"): 7.5e-6. What
-/// arrives, e^-x, errs by x e^-x of that, at most 0.37; exponents and phase functions add some
-/// 40 roundings of 6e-8. Diffuse light depends on the density twice: its sources are such
-/// numbers, and D is inverse to the density. Rounding of its equations adds to it by (cells across)²/8 roundings: that is how much
-/// an error in every cell's equation makes φ rise in the middle.
+/// Bound of the difference from the twin, as a share of the brightest facet.
+///
+/// The densities of the grid are within 2.5e-6 a weight and axis (passes.md, "grid"): 7.5e-6. The
+/// transmitted share e^-x errs by x e^-x of that, which is at most 0.37. Exponents and phase
+/// functions add some 40 roundings of 6e-8.
+///
+/// Diffuse light depends on the density twice: its sources are such numbers, and D is inverse to
+/// the density. An error in every cell's equation makes φ rise in the middle by (cells across)²/8
+/// times it, so that as many roundings are added.
 pub fn bound(scene: &Scene) -> f64 {
     let groups = scene.groups();
     let state = FrameState::at(scene, &groups, 0.0).expect("a state");

@@ -95,7 +95,7 @@ fn elimination_solves_the_equations() {
         // Some hundred roundings of a cell's terms.
         assert!(left < 1e-12 * most, "{c}: {left:e}");
     }
-    // What comes in is absorbed or leaves.
+    // Incoming light is absorbed or leaves.
     let [in_all, out_all] = [
         system.source.iter().sum::<DVec3>(),
         system.sink.iter().zip(&phi).map(|(sink, phi)| *sink * *phi).sum::<DVec3>(),

@@ -48,8 +48,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "scattering/barred",
-        what: "a cloud and a floor under a roof that hides the sun, in all modes, with factors of 0 on \
-            depths: no light at all",
+        what: "a cloud and a floor under a roof that hides the sun, in all modes, with \
+            factors of 0 on depths: no light at all",
         bound: "0",
         check: barred,
     },

@@ -5,7 +5,8 @@
 #include "diffusion.glsl"
 
 // Writes fluence and flux of the diffuse light (model.md §18, passes.md "diffusion").
-// In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi. The slope
+// In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi; what
+// stands beside Q0 stays. The slope
 // is that between the cells on both sides; at the faces of the box it is one-sided.
 
 layout(push_constant) uniform Push {
@@ -25,7 +26,7 @@ void main() {
         ivec3 at = place_of(level, i), stride = strides_of(level);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 reach = 1.0 / (3.0 * FLOAT(density, c) * push.kept + push.inverse_chord);
-        field[4 * c] = phi[c];
+        field[4 * c].rgb = phi[c].rgb;
         for (int axis = 0; axis < 3; ++axis) {
             int after = at[axis] + 1 < int(level.n_cells[axis]) ? c + stride[axis] : c;
             int prior = at[axis] > 0 ? c - stride[axis] : c;

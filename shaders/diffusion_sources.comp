@@ -11,7 +11,13 @@
 // (model.md §18, passes.md "diffusion").
 // In: lights, regions, the density grid (1/length). Out: by cell Q0 (W/m^3), and q = 3 D Q1 along
 // each axis (W/m^2). Law: Q0 = albedo (1-f) sigma U, Q1 = albedo (g-f) sigma F of the light that
-// arrives, weakened by e^{-s tau}. Bound: that of the march.
+// arrives, weakened by e^{-s tau}. The mean of U over the channels stands beside Q0. Bound: that of
+// the march.
+
+// 1: U is wanted in cells without extinction, too.
+#ifndef SLOPES
+#define SLOPES 0
+#endif
 
 layout(push_constant) uniform Push {
     Grid grid;
@@ -47,7 +53,7 @@ void main() {
         vec3 fluence = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
-            bool is_on = light.kind != LIGHT_SKY && sigma > 0.0
+            bool is_on = light.kind != LIGHT_SKY && (SLOPES != 0 || sigma > 0.0)
                          && any(notEqual(light.energy, vec3(0.0)));
             if (is_on && is_clear(p, light, 0xFFFFFFFFu, push.n_surfaces)) {
                 Arrival a = arrival_at(light, p);
@@ -61,7 +67,8 @@ void main() {
         }
         vec3 reach = 1.0 / (3.0 * sigma * (1.0 - push.albedo * push.g) + push.inverse_chord);
         vec3 carried = 3.0 * reach * push.albedo * (push.g - push.straight) * sigma;
-        field[4 * c] = vec4(push.albedo * (1.0 - push.straight) * sigma * fluence, 0.0);
+        vec3 scattered = push.albedo * (1.0 - push.straight) * sigma * fluence;
+        field[4 * c] = vec4(scattered, dot(fluence, vec3(1.0 / 3.0)));
         field[4 * c + 1] = vec4(carried * x, 0.0);
         field[4 * c + 2] = vec4(carried * y, 0.0);
         field[4 * c + 3] = vec4(carried * z, 0.0);

@@ -8,12 +8,17 @@
 // Computes the radiance that clouds scatter toward the eye as a medium, and the first reflection of
 // surfaces and ground (model.md §18, passes.md "scatter").
 // In: facets, lights, optical depths [facet][light], regions, the lobe table, media by cloud; with
-// DIFFUSE the diffuse light by cell. Out: fluence and radiance of every facet, linear RGB.
+// DIFFUSE the diffuse light by cell. Out: fluence and radiance of every facet, linear RGB, and with
+// SLOPES the relative slopes of the clouds' radiance, 1/length.
 // Law: albedo' sum E F sum_i a^i p(c^i g) e^{-b^i s tau}, and (phi + 3 g F.w) albedo'/4pi.
 
 // 1: light is scattered further by diffusion.
 #ifndef DIFFUSE
 #define DIFFUSE 0
+#endif
+// 1: and the slopes of the light are wanted.
+#ifndef SLOPES
+#define SLOPES 0
 #endif
 
 layout(push_constant) uniform Push {
@@ -31,9 +36,12 @@ layout(push_constant) uniform Push {
 } push;
 UPDATES(5, Lit, lit)
 READS(6, Medium, media)
-// phi and the flux along each axis, by cell.
+// phi beside U, and the flux along each axis, by cell.
 #if DIFFUSE
 READS(7, vec4, field)
+#endif
+#if SLOPES
+WRITES(8, Slope, slopes)
 #endif
 
 #include "first.glsl"
@@ -73,24 +81,45 @@ vec3 of_sky(Medium m, Law law, float up, float constant, float tau) {
 }
 
 #if DIFFUSE
-// Returns phi + 3 g F.w at p, trilinear between the cells' centres and beyond the outermost as on
-// them.
-vec3 diffuse_along(vec3 p, vec3 w, float g) {
+// Returns phi + 3 g F.w, at least 0, and U at p: trilinear between the cells' centres and beyond
+// the outermost as on them.
+vec4 diffuse_along(vec3 p, vec3 w, float g) {
     ivec3 n = ivec3(push.grid.n_cells);
     vec3 at = (p - push.grid.low) * push.grid.inv_cell * vec3(1.0, push.grid.inv_aspect, 1.0) - 0.5;
     at = clamp(at, vec3(0.0), vec3(n - 1));
     ivec3 base = ivec3(at);
     vec3 part = at - vec3(base);
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     for (int corner = 0; corner < 8; ++corner) {
         ivec3 to = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
         vec3 share = mix(1.0 - part, part, equal(to, ivec3(1)));
         ivec3 i = min(base + to, n - 1);
         int c = 4 * (i.x + n.x * (i.y + n.y * i.z));
         vec3 along = w.x * field[c + 1].rgb + w.y * field[c + 2].rgb + w.z * field[c + 3].rgb;
-        sum += share.x * share.y * share.z * (field[c].rgb + 3.0 * g * along);
+        sum += share.x * share.y * share.z * (field[c] + vec4(3.0 * g * along, 0.0));
     }
-    return sum;
+    return vec4(max(sum.rgb, vec3(0.0)), sum.w);
+}
+#endif
+
+#if SLOPES
+float mean_of(vec3 v) { return dot(v, vec3(1.0 / 3.0)); }
+
+// Returns the change of the light along each axis, relative to it: differences over a cell, of U
+// for the light that is scattered once.
+vec3 slope_at(vec3 p, vec3 w, float g, vec3 albedo, vec3 once, vec3 diffuse) {
+    vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
+    float first = mean_of(once), all = first + mean_of(diffuse);
+    vec3 rise = vec3(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+        vec3 half_step = vec3(0.0);
+        half_step[axis] = 0.5 * edges[axis];
+        vec4 after = diffuse_along(p + half_step, w, g), prior = diffuse_along(p - half_step, w, g);
+        float both = after.w + prior.w;
+        rise[axis] = INV_FOUR_PI * mean_of(albedo * (after.rgb - prior.rgb));
+        rise[axis] += both > 0.0 ? 2.0 * first * (after.w - prior.w) / both : 0.0;
+    }
+    return all > 0.0 ? rise / (all * edges) : vec3(0.0);
 }
 #endif
 
@@ -130,8 +159,14 @@ void main() {
             }
         }
 #if DIFFUSE
-        vec3 diffuse = diffuse_along(facet.position, outgoing, m.mean);
-        radiance += law.albedo * max(diffuse, vec3(0.0)) * INV_FOUR_PI;
+        vec3 diffuse =
+            law.albedo * diffuse_along(facet.position, outgoing, m.mean).rgb * INV_FOUR_PI;
+#if SLOPES
+        slopes[j].relative =
+            slope_at(facet.position, outgoing, m.mean, law.albedo, radiance, diffuse);
+        slopes[j].position = facet.position;
+#endif
+        radiance += diffuse;
 #endif
         lit[j].direct = fluence;
         lit[j].first = radiance;

@@ -5,6 +5,8 @@
 #include "variants.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
+#include "seen.glsl"
+#include "target.glsl"
 
 TEXELS(8, pool)
 #define SAMPLES_TEXTURE
@@ -18,6 +20,8 @@ TEXELS(8, pool)
 
 // 1: writes the layer's optical depth, 1, 0 and its depth near/z in place of colour and opacity.
 layout(constant_id = 8) const uint SUMS = 0;
+// 1: the light changes linearly across a blob.
+layout(constant_id = 12) const uint SHADED = 0;
 
 layout(location = 0) flat in vec4 in_blob;
 layout(location = 1) flat in vec3 in_radiance;
@@ -27,6 +31,7 @@ layout(location = 4) flat in vec3 in_gain;
 layout(location = 5) flat in float in_lowest;
 layout(location = 6) flat in vec4 in_conic;
 layout(location = 7) flat in vec4 in_screen;
+layout(location = 8) flat in vec3 in_shade;
 layout(location = 0) out vec4 out_color;
 
 const float LOG2_E = 1.44269504089;
@@ -60,6 +65,7 @@ void main() {
         }
     }
     float alpha = 0.0;
+    vec3 radiance = in_radiance;
     vec4 sums = vec4(0.0);
     if (exponent >= lowest) {
         if (TEXTURED != 0) {
@@ -67,9 +73,15 @@ void main() {
         }
         tau *= exp2(exponent);
         alpha = THIN != 0 ? thin_opacity(tau) : one_minus_exp(tau);
+        if (SHADED != 0) {
+            float seen = min(tau, DEEPEST_SEEN);
+            seen *= SEEN_BEFORE.x + SEEN_BEFORE.y * seen;
+            radiance *= max(1.0 + dot(in_shade, vec3(delta, seen)), 0.0);
+            radiance = in_target(radiance);
+        }
         if (SUMS != 0) {
             sums = vec4(tau, 1.0, 0.0, gl_FragCoord.z);
         }
     }
-    out_color = SUMS != 0 ? sums : vec4(in_radiance * alpha, alpha);
+    out_color = SUMS != 0 ? sums : vec4(radiance * alpha, alpha);
 }

@@ -2,6 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 #include "blob.glsl"
+#include "shade.glsl"
 #include "strip.glsl"
 #include "target.glsl"
 #include "philox.glsl"
@@ -22,11 +23,15 @@ READS(4, uint, i_facet)
 READS(5, uint, i_group)
 READS(6, Drawn, drawn)
 READS(7, Textured, textured)
+READS(9, Slope, slopes)
 
 // 0: a quad a blob, a strip of four vertices; 1: a point, which is a square.
 layout(constant_id = 10) const uint POINTS = 0;
 
 const float LOG2_E = 1.44269504089;
+// Greatest radiance of a part of a blob over that of its centre: 1 + ¼ σ at up to 4 σ to the side,
+// where a slope's angle may double that, and before the centre.
+const float BRIGHTER = 3.5;
 // A device may round the side of a point. The host takes points only where it rounds by no more
 // than this (max_point_size).
 const float POINT_STEP = 1.0 / 8.0;
@@ -45,6 +50,8 @@ layout(location = 5) flat out float out_lowest;
 layout(location = 6) flat out vec4 out_conic;
 // Sides of a pixel, as slopes, and the camera's tangents.
 layout(location = 7) flat out vec4 out_screen;
+// Changes of the light; only where blobs are shaded.
+layout(location = 8) flat out vec3 out_shade;
 
 // Draws nothing: a place that is clipped.
 void draw_nothing() {
@@ -80,13 +87,23 @@ void main() {
     out_place = texture_sample.place;
     out_gain = texture_sample.gain;
     uint facet = GROUPED != 0 ? i_facet[i] : push.i_first_facet + i;
-    out_radiance = in_target(LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color);
+    vec3 radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color;
+    float most = 1.0;
+    out_shade = vec3(0.0);
+    if (SHADED != 0) {
+        Shade shade =
+            shade_of(push.camera, slopes[facet], shape, placed[i].position, v, sigma);
+        radiance *= shade.base;
+        out_shade = shade.seen;
+        most = BRIGHTER;
+    }
+    out_radiance = in_target(radiance);
     float cut = 0.5 * push.cutoff * push.cutoff;
     if (THRESHOLD != 0) {
         cut = min(cut, max(log(tau * push.inv_threshold), push.least_cut));
     }
     if (BYTES != 0 && TEXTURED == 0) {
-        cut = min(cut, log(tau * inv_least_shown(out_radiance)));
+        cut = min(cut, log(tau * inv_least_shown(most * out_radiance)));
     }
     out_lowest = -LOG2_E * cut;
     out_screen = vec4(push.pixel, push.camera.tan_x, push.camera.tan_y);

@@ -4,6 +4,7 @@
 #include "records.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
+#include "seen.glsl"
 #include "tiles.glsl"
 #include "one_subgroup.glsl"
 #if ONE_SUBGROUP
@@ -55,6 +56,13 @@ TEXELS(9, pool)
 #endif
 #if ELLIPSOIDS
 TEXELS(10, conics)
+#endif
+// 1: the light changes linearly across a splat.
+#ifndef SHADED
+#define SHADED 0
+#endif
+#if SHADED
+TEXELS(11, shades)
 #endif
 // 1: every splat has its own exponent at which it ends, the same for all its pixels. It is computed
 // where the splat is loaded: once, and not once for every row.

@@ -5,6 +5,7 @@
 #include "blob.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
+#include "shade.glsl"
 #include "texture.glsl"
 #include "tiles.glsl"
 #include "one_subgroup.glsl"
@@ -57,6 +58,9 @@ WRITES(12, SplatTexture, splat_textures)
 READS(13, Kept, kept)
 // Ellipsoids' conics, in powers of two, and 1/a^2.
 WRITES(14, vec4, conics)
+// Slopes of the light by facet, and the changes of the splats' light; only where blobs are shaded.
+READS(15, Slope, slopes)
+WRITES(16, vec4, shades)
 
 #if !ONE_SUBGROUP
 shared uint sums[INVOCATIONS];
@@ -113,6 +117,11 @@ uint project(uint i, uint r) {
         int facet = int(GROUPED != 0 ? i_facet[i] : push.i_first_facet + i);
         radiance = uintBitsToFloat(TEXEL(lit, 4 * facet + 2).xyz)
                    + uintBitsToFloat(TEXEL(lit, 4 * facet + 3).xyz);
+        if (SHADED != 0) {
+            Shade shade = shade_of(push.camera, slopes[facet], shape, place.xyz, v, sigma);
+            radiance *= shade.base;
+            shades[r] = vec4(shade.seen, 0.0);
+        }
     }
     // A Splat, by fours.
     splats[2 * r] = floatBitsToUint(vec4(s, scale, tau));

@@ -27,6 +27,11 @@ fn every_facet_has_the_light_of_the_twin() {
 fn wrong_shaders_are_found() {
     let wrong = [
         ("coloured", "diffusion", "diffusion_sources.comp", "z -= e", "z += e"),
+        ("boxes", "diffusion", "diffusion_sources.comp", "SLOPES != 0 || sigma", "sigma"),
+        ("coloured", "diffusion", "diffusion_sources.comp", "1.0 / 3.0", "0.0, 1.0, 0.0"),
+        ("boxes", "diffusion", "scatter.comp", "0.5 * edges[axis]", "0.55 * edges[axis]"),
+        ("coloured", "diffusion", "scatter.comp", "? 2.0 * first", "? first"),
+        ("flat", "diffusion", "scatter.comp", "(all * edges)", "(all * edges.x)"),
         (
             "coloured",
             "diffusion",

@@ -356,6 +356,7 @@ fn a_target_that_does_not_fit_is_refused() {
                     drawn: &buffer,
                     textured: &buffer,
                     pool: &buffer,
+                    slopes: &buffer,
                 };
                 let view = BlobView {
                     camera: &camera,

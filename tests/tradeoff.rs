@@ -105,7 +105,14 @@ fn study(law: &mut Law, plan: &StudyPlan, found: &mut StudyResults, stop: &Atomi
         seconds: 0.0,
         pixels_s: 0.0,
     };
-    let setup = ErrorStudy { plan, load: &loaded, reference: &reference, pixels: &pixels, stop };
+    let setup = ErrorStudy {
+        plan,
+        load: &loaded,
+        reference: &reference,
+        pixels: &pixels,
+        cloud: None,
+        stop,
+    };
     setup.run(law, found, &mut |_: Event<'_>| Ok(())).unwrap()
 }
 

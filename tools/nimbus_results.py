@@ -1163,7 +1163,7 @@ class Study(_Result):
 
     `configurations`: a row for each setting of the knobs, the unchanged scene first, with the
     columns of configurations.csv and one column for each knob. gpu_ms and frame_ms are in ms;
-    by_base is the time by that of the unchanged scene; rmse, max and relmse are errors. `_low` and
+    by_base is the time by that of the unchanged scene; rmse, max, relmse and cloud are errors. `_low` and
     `_high` are 95 % intervals. `front` is on, near, off or unknown.
 
     `times`: times.csv, a row for each timed frame, in ms. None if the JSON alone was read.
@@ -1174,8 +1174,8 @@ class Study(_Result):
     def __init__(self, metadata: Metadata, record: _Node, times: Optional[Table]) -> None:
         super().__init__(metadata, record)
         self.times = times
-        self.metric = record["metric"].one_of("rmse", "max", "relmse")
-        """The error that decides which configurations are on the front: rmse, max or relmse."""
+        self.metric = record["metric"].one_of("rmse", "max", "relmse", "cloud")
+        """The error that decides which configurations are on the front: rmse, max, relmse or cloud."""
         self.time = record["time"].one_of("gpu", "frame")
         """The time that decides: gpu or frame."""
         self.best = record["best"].value
@@ -1183,7 +1183,7 @@ class Study(_Result):
         configurations = record["configurations"].each()
         rows = [self._row(of) for of in configurations]
         types: Dict[str, type] = {"name": str, "front": str}
-        for name in ("gpu_ms", "frame_ms", "by_base", "rmse"):
+        for name in ("gpu_ms", "frame_ms", "by_base", "rmse", "cloud"):
             types.update((name + end, float) for end in ("", "_low", "_high"))
         types.update(max=float, relmse=float, reference_resolves=float, turns=int, failure=str)
         types.update(picture=str, error_map=str)
@@ -1198,7 +1198,8 @@ class Study(_Result):
         row: Dict[str, Any] = {"name": of["name"].text(), "front": front}
         for name in ("gpu_ms", "frame_ms", "by_base"):
             row.update(_figure(of[name], name))
-        row.update(_figure(error.get("rmse"), "rmse"))
+        for name in ("rmse", "cloud"):
+            row.update(_figure(error.get(name), name))
         row["max"], row["relmse"] = error.get("max").number(), error.get("relmse").number()
         resolves = math.nan if is_resolved.value is None else float(is_resolved.truth())
         row["reference_resolves"], row["turns"] = resolves, of["n_turns"].integer()

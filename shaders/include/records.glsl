@@ -133,6 +133,12 @@ struct Lit {
     vec3 second;
     float unused;
 };
+struct Slope {
+    vec3 relative;
+    uint unused;
+    vec3 position;
+    uint unused_too;
+};
 struct Region {
     vec3 kd;
     uint kind;

@@ -43,6 +43,9 @@ void keep_slices(uint j, uint p) {
 // Returns the share of a unit normal distribution below u.
 float below(float u) { return 0.5 + 0.5 * erf_approx(0.707106781187 * u); }
 
+// Returns the density of a unit normal distribution at u.
+float density(float u) { return 0.398942280401 * exp(-0.5 * min(u * u, 200.0)); }
+
 // Returns the number of the boundary nearest to the splat's centre, but not before an earlier
 // splat's: two keys of the sort may be equal, or rounded.
 int boundary_after(int own, uint t) {
@@ -78,6 +81,9 @@ void find_shares(inout Loaded splat, uint t, bool is_splat) {
     [[unroll]] for (uint m = 0; m < OPEN - 1u; ++m) {
         float u = (float(splat.boundary + int(m) - 2) - at) * slice_in_sigmas;
         splat.within[m] = below(u);
+#if SHADED
+        splat.density[m] = density(u);
+#endif
     }
 #endif
 }
@@ -121,20 +127,44 @@ void close_all() {
     [[unroll]] for (uint m = 0; m < OPEN; ++m) { close_slice(true); }
 }
 
+#if SHADED
+// Light of a splat along the rays through its middle, and its change by sigma toward the eye.
+float across_blob[RUN];
+float nearer;
+#endif
+
+// Adds a part of a splat's optical depth t to slice m of pixel j. `middle` is the mean of z over
+// the part, sigma behind the centre, times its share.
+void add_part(uint m, uint j, float t, float share, float middle, vec3 radiance) {
+#if SHADED
+    float light = max(share * across_blob[j] - nearer * middle, 0.0);
+    open[m][j] += t * vec4(light * radiance, share);
+#else
+    open[m][j] += t * share * vec4(radiance, 1.0);
+#endif
+}
+
 // Adds a splat to the open slices.
 void compose(Loaded splat, float y) {
     vec3 radiance = uintBitsToFloat(splat.fours[1].xyz);
+    vec2 s = uintBitsToFloat(splat.fours[0].xy);
     float tau[RUN];
     bool shows[RUN];
     [[unroll]] for (uint j = 0; j < RUN; ++j) { shows[j] = true; }
     find_depths(splat, y, shows, tau);
     // Nothing shows through so much, and sums with radiances of 1e15 stay finite.
     [[unroll]] for (uint j = 0; j < RUN; ++j) { tau[j] = min(tau[j], 1e15); }
+#if SHADED
+    vec3 shade = uintBitsToFloat(splat.fours[I_SHADE].xyz);
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        across_blob[j] = 1.0 + shade.y * (y - s.y) + shade.x * (x_of[j] - s.x);
+    }
+    nearer = shade.z;
+#endif
 #if ELLIPSOIDS || BEHIND
     // Distance and size along the ray, where they differ from pixel to pixel.
     float distance = splat.distance, in_sigmas = splat.near_in_sigmas;
 #if ELLIPSOIDS
-    vec2 s = uintBitsToFloat(splat.fours[0].xy);
     vec3 vertical = vec3(push.y_right, push.y_up, push.y_forward);
     float inverse = uintBitsToFloat(splat.fours[N_FOURS - 1]).w;
     float flatness = (inverse - 1.0) * dot(vertical, vec3(s, 1.0));
@@ -152,35 +182,57 @@ void compose(Loaded splat, float y) {
         }
 #endif
 #if BEHIND
-        float all = below((wall[j] - distance) * in_sigmas);
+        float to_wall = (wall[j] - distance) * in_sigmas;
+        float all = below(to_wall);
 #else
         float all = 1.0;
 #endif
-        float before = 0.0;
+        float before = 0.0, density_before = 0.0;
         [[unroll]] for (uint m = 0; m < OPEN; ++m) {
-            float within = all;
+            float within = all, density_here = 0.0;
+#if SHADED && BEHIND
+            density_here = density(to_wall);
+#endif
             if (m + 1u < OPEN) {
 #if ELLIPSOIDS
                 float at = float(splat.boundary + int(m) - 2) * slice;
-                within = min(all, below((at - distance) * in_sigmas));
+                float u = (at - distance) * in_sigmas;
+                within = min(all, below(u));
 #else
                 within = min(all, splat.within[m]);
+#endif
+#if SHADED
+                if (within < all) {
+#if ELLIPSOIDS
+                    density_here = density(u);
+#else
+                    density_here = splat.density[m];
+#endif
+                }
 #endif
             }
             // A division that is not monotone would make a share negative.
             within = max(within, before);
-            open[m][j] += tau[j] * (within - before) * vec4(radiance, 1.0);
+            add_part(m, j, tau[j], within - before, density_before - density_here, radiance);
             before = within;
+            density_before = density_here;
         }
     }
 #else
-    float before = 0.0;
+    float before = 0.0, density_before = 0.0;
     [[unroll]] for (uint m = 0; m < OPEN; ++m) {
         // A division that is not monotone would make a share negative.
         float within = max(m + 1u < OPEN ? splat.within[m] : 1.0, before);
-        vec4 share = (within - before) * vec4(radiance, 1.0);
+        float share = within - before, middle = 0.0;
+#if SHADED
+        float density_here = m + 1u < OPEN ? splat.density[m] : 0.0;
+        middle = density_before - density_here;
+        density_before = density_here;
+#endif
         before = within;
-        [[unroll]] for (uint j = 0; j < RUN; ++j) { open[m][j] += tau[j] * share; }
+        [[unroll]] for (uint j = 0; j < RUN; ++j) {
+            add_part(m, j, tau[j], share, middle, radiance);
+        }
     }
 #endif
 }

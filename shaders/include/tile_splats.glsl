@@ -3,8 +3,9 @@
 // tiles.comp.
 
 // A splat as it lies in the buffers, by fours: a Splat, a SplatTexture where splats have textures,
-// and the conic of an ellipsoid.
-const uint N_FOURS = 2 + 3 * TEXTURED + ELLIPSOIDS;
+// the changes of its light where it is shaded, and the conic of an ellipsoid.
+const uint I_SHADE = 2 + 3 * TEXTURED;
+const uint N_FOURS = I_SHADE + SHADED + ELLIPSOIDS;
 // Slices that are open at once (tile_slices.glsl).
 const uint OPEN = 4;
 struct Loaded {
@@ -18,6 +19,10 @@ struct Loaded {
     int boundary;
     // Shares of its optical depth within that boundary and the two before, near to far.
     float within[OPEN - 1];
+#if SHADED
+    // Density of a normal distribution at these boundaries.
+    float density[OPEN - 1];
+#endif
     // Distance of its centre in those of the near plane, and that of the near plane in sigma.
     float distance;
     float near_in_sigmas;
@@ -57,6 +62,9 @@ shared float shared_lowest[INVOCATIONS];
 #if SLICES
 shared int shared_boundary[INVOCATIONS];
 shared float shared_within[OPEN - 1][INVOCATIONS];
+#if SHADED
+shared float shared_density[OPEN - 1][INVOCATIONS];
+#endif
 shared vec2 shared_sizes[INVOCATIONS];
 #endif
 
@@ -96,6 +104,9 @@ Loaded load_splat(int r) {
         splat.fours[2 + k] = TEXEL(splat_textures, 3 * r + k);
     }
 #endif
+#if SHADED
+    splat.fours[I_SHADE] = TEXEL(shades, r);
+#endif
 #if ELLIPSOIDS
     splat.fours[N_FOURS - 1] = TEXEL(conics, r);
 #endif
@@ -116,6 +127,11 @@ Loaded of_invocation(Loaded splat, uint m) {
     [[unroll]] for (uint k = 0; k < OPEN - 1u; ++k) {
         splat.within[k] = subgroupShuffle(splat.within[k], m);
     }
+#if SHADED
+    [[unroll]] for (uint k = 0; k < OPEN - 1u; ++k) {
+        splat.density[k] = subgroupShuffle(splat.density[k], m);
+    }
+#endif
     splat.distance = subgroupShuffle(splat.distance, m);
     splat.near_in_sigmas = subgroupShuffle(splat.near_in_sigmas, m);
 #endif
@@ -127,6 +143,9 @@ Loaded of_invocation(Loaded splat, uint m) {
 #if SLICES
     splat.boundary = shared_boundary[m];
     [[unroll]] for (uint k = 0; k < OPEN - 1u; ++k) { splat.within[k] = shared_within[k][m]; }
+#if SHADED
+    [[unroll]] for (uint k = 0; k < OPEN - 1u; ++k) { splat.density[k] = shared_density[k][m]; }
+#endif
     splat.distance = shared_sizes[m].x;
     splat.near_in_sigmas = shared_sizes[m].y;
 #endif
@@ -153,6 +172,9 @@ void share_splat(Loaded splat, uint t) {
 #if SLICES
     shared_boundary[t] = splat.boundary;
     [[unroll]] for (uint k = 0; k < OPEN - 1u; ++k) { shared_within[k][t] = splat.within[k]; }
+#if SHADED
+    [[unroll]] for (uint k = 0; k < OPEN - 1u; ++k) { shared_density[k][t] = splat.density[k]; }
+#endif
     shared_sizes[t] = vec2(splat.distance, splat.near_in_sigmas);
 #endif
     barrier();

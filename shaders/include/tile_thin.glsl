@@ -23,11 +23,27 @@ void compose(Loaded splat, float y) {
 #endif
     }
     find_depths(splat, y, shows, tau);
+#if SHADED
+    vec2 s = uintBitsToFloat(splat.fours[0].xy);
+    vec3 shade = uintBitsToFloat(splat.fours[I_SHADE].xyz);
+    float middle = 1.0 + shade.y * (y - s.y);
+    vec2 nearer = shade.z * SEEN_BEFORE;
+    float tint[RUN];
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        float seen = min(tau[j], DEEPEST_SEEN);
+        float across = middle + shade.x * (x_of[j] - s.x);
+        tint[j] = max(across + seen * (nearer.x + nearer.y * seen), 0.0);
+    }
+#endif
     [[unroll]] for (uint j = 0; j < RUN; ++j) { tau[j] = opacity(tau[j]); }
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         float here = passed[j] * tau[j];
         alpha[j] += here;
+#if SHADED
+        color[j] += here * tint[j] * light.xyz;
+#else
         color[j] += here * light.xyz;
+#endif
     }
 }
 

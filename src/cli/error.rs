@@ -23,10 +23,12 @@ use crate::model::film::Film;
 use crate::model::scene::Scene;
 use crate::reference::picture::{PathLimits, Pixels, ReferenceRequest};
 use crate::report::charts::{self, Chart};
+use crate::studies::cloud_error::CloudPixels;
 use crate::studies::error::blocks::TimeKind;
 use crate::studies::error::design::{best_within, settings};
 use crate::studies::error::device_runner::{DeviceRunner, FrameChoice};
 use crate::studies::error::files::{self, REFERENCE_FILE};
+use crate::studies::error::front::Metric;
 use crate::studies::error::records::{Budget, Configuration, Study};
 use crate::studies::error::study::{ErrorStudy, Event, StudyPlan, StudyResults};
 use crate::studies::kept_paths::Traced;
@@ -53,6 +55,12 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
         return Err(Error::usage(format!(
             "--reference-error and --paths: only \"transport\" is random; expected neither with \
              --against {}",
+            args.against
+        )));
+    }
+    if args.metric == Metric::Cloud && !args.against.is_random() {
+        return Err(Error::usage(format!(
+            "--metric cloud: only random paths tell it; expected --against transport, found {}",
             args.against
         )));
     }
@@ -115,7 +123,10 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     let mut runner = DeviceRunner::new(&gpu, frames);
     let load = |settings: &[Setting]| load_configuration(args, &options, settings);
     let reference = &cached.reference;
-    let running = ErrorStudy { plan: &plan, load: &load, reference, pixels: &pixels, stop };
+    let cloud =
+        args.against.is_random().then(|| CloudPixels::new(&scene, time_s, &pixels)).transpose()?;
+    let cloud = cloud.as_ref();
+    let running = ErrorStudy { plan: &plan, load: &load, reference, pixels: &pixels, cloud, stop };
     let bar = progress(0, "configurations", args.options.quiet);
     let done = {
         let mut recorder = Recorder {

@@ -80,6 +80,12 @@ fn rows(study: &Study) -> Vec<Vec<String>> {
     let (by_base, of) = ("by base", "95 %");
     let mut rows =
         header(["", "configuration", &time, of, by_base, of, "RMSE", of, "max", "relMSE"]);
+    // Only against random paths.
+    let cloud = |c: &Configuration| c.error.and_then(|e| e.cloud);
+    let has_cloud = study.configurations.iter().any(|c| cloud(c).is_some());
+    if has_cloud {
+        rows.iter_mut().for_each(|row| row.extend(["of cloud".to_owned(), of.to_owned()]));
+    }
     let mut sorted: Vec<&Configuration> = study.configurations.iter().collect();
     let key = |c: &Configuration| c.ms(study.time).map_or(f64::INFINITY, |t| t.value);
     sorted.sort_by(|a, b| key(a).total_cmp(&key(b)));
@@ -112,6 +118,10 @@ fn rows(study: &Study) -> Vec<Vec<String>> {
             max,
             relmse,
         ]);
+        if has_cloud {
+            let own = rows.len() - 1;
+            rows[own].extend(cells(cloud(c), |v| format!("{v:.3}")));
+        }
     }
     rows
 }
@@ -135,7 +145,7 @@ fn best_line(study: &Study, best: &Best) -> String {
         return format!("within {within}: none of them\n");
     };
     let [time, time_interval] = cells(c.ms(study.time), ms);
-    let [error, error_interval] = cells(c.error.map(|e| study.metric.of(&e)), scientific);
+    let [error, error_interval] = cells(c.error.and_then(|e| study.metric.of(&e)), scientific);
     format!(
         "within {within}, {what}: {}, {time} ms ({time_interval}), {metric} {error} \
          ({error_interval})\n",

@@ -1,12 +1,12 @@
 //! The buffers that passes share.
 
-use super::features::{has_diffusion, has_second, is_grouped, is_lit, is_medium};
+use super::features::{has_diffusion, has_second, has_slopes, is_grouped, is_lit, is_medium};
 use super::packet::Packet;
 use super::staging::StagedBuffer;
 use crate::error::Result;
 use crate::gpu::{Buffer, Recorder, buffers};
 use crate::layout::cull::KeptRecord;
-use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
+use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord, SlopeRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::medium::MediumRecord;
 use crate::layout::particle::{
@@ -53,13 +53,16 @@ buffers! {
         /// Medium of each cloud, in modes that have one.
         media: StagedBuffer => MediumRecord,
             n_if(is_medium(scene), scene.clouds.len() as u64), "scatter.media";
-        /// Fluence and flux of diffuse light by cell.
+        /// Fluence and flux of diffuse light by cell, and fluence of suns and lamps.
         field: Buffer => [[f32; 4]; 4], n_if(has_diffusion(scene), n_cells(scene)),
             "diffusion.field";
         regions: StagedBuffer => RegionRecord, scene.n_regions() as u64, "first.regions", Texels;
         /// Lobes by material, then the vectors of the basis, N_NODES numbers each.
         table: StagedBuffer => f32, n_table_rows(scene) * N_NODES as u64, "first.table", Floats;
         lit: Buffer => LitRecord, scene.n_facets(), "first.lit";
+        /// Change of the light inside of blobs, by facet.
+        slopes: Buffer => SlopeRecord, n_if(has_slopes(scene), scene.n_facets()),
+            "scatter.slopes";
         /// Number of kept particles.
         kept: Buffer => KeptRecord, 1, "cull.kept";
         /// The drawn part of each group.
@@ -98,8 +101,19 @@ impl SceneBuffers {
     /// Returns the buffers that blobs are drawn from.
     pub fn of_blobs(&self) -> BlobBuffers<'_> {
         let SceneBuffers { entries, placed, particles, lit, i_facet, i_group, drawn, .. } = self;
-        let (textured, pool) = (&self.textured, &self.pool);
-        BlobBuffers { entries, placed, particles, lit, i_facet, i_group, drawn, textured, pool }
+        let SceneBuffers { textured, pool, slopes, .. } = self;
+        BlobBuffers {
+            entries,
+            placed,
+            particles,
+            lit,
+            i_facet,
+            i_group,
+            drawn,
+            textured,
+            pool,
+            slopes,
+        }
     }
 }
 
@@ -146,7 +160,7 @@ pub(super) fn diffusion_room(scene: &Scene) -> Option<Room> {
     };
     let plain = |c: &Cloud| is_grey(&scene.materials[c.i_material]) && !has_colors(c);
     let n_sets = if scene.clouds.iter().all(plain) { 1 } else { 3 };
-    has_diffusion(scene).then(|| Room::new(n_cells(scene), n_sets))
+    has_diffusion(scene).then(|| Room::new(n_cells(scene), n_sets, has_slopes(scene)))
 }
 
 /// Returns the most cells of a density grid at any time. Clouds that drift apart or grow change its

@@ -24,6 +24,8 @@ pub(super) struct FrameConstants {
     pub forward: f64,
     /// Terms of the light that a medium scatters once.
     pub terms: Octaves,
+    /// The light changes inside of blobs.
+    pub has_slopes: bool,
     /// Cycles of the diffusion solver.
     pub n_cycles: u32,
     pub texture_seed: u32,
@@ -67,6 +69,7 @@ impl FrameConstants {
             n_solids: scene.n_solids() as u32,
             forward: scene.lighting.forward,
             terms: medium::terms(&scene.lighting),
+            has_slopes: scene.lighting.has_slopes(),
             n_cycles: scene.lighting.diffusion.cycles,
             texture_seed: scene.draw.texture_seed,
             edge: scene.draw.edge(),

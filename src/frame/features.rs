@@ -120,6 +120,11 @@ pub fn has_diffusion(scene: &Scene) -> bool {
     scene.lighting.mode == LightingMode::Diffusion
 }
 
+/// Returns whether the light changes inside of each blob.
+pub fn has_slopes(scene: &Scene) -> bool {
+    scene.lighting.has_slopes()
+}
+
 /// Returns whether lit facets stand for several particles.
 pub fn is_grouped(scene: &Scene) -> bool {
     is_lit(scene) && scene.groups_facets()
@@ -193,6 +198,7 @@ pub(super) fn blob_variant(scene: &Scene) -> BlobVariant {
         threshold: scene.draw.edge().has_threshold(),
         ellipsoids: scene.has_ellipsoids(),
         thin: is_thin(scene) && !scene.is_textured(),
+        shaded: has_slopes(scene),
     }
 }
 

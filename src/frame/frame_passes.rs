@@ -3,7 +3,9 @@
 use super::buffers::{SceneBuffers, diffusion_room, n_cells};
 use super::constants::FrameConstants;
 use super::culling::Culling;
-use super::features::{SceneFeatures, has_diffusion, has_second, is_grouped, is_medium};
+use super::features::{
+    SceneFeatures, has_diffusion, has_second, has_slopes, is_grouped, is_medium,
+};
 use super::gather::IndirectGather;
 use super::live::{LiveParticles, PlacedUploads};
 use super::morton_sort::FacetRuns;
@@ -98,7 +100,7 @@ impl FramePasses {
                 .map(|room| Diffusion::new(device, compiler, room))
                 .transpose()?,
             scatter: is_medium(scene)
-                .then(|| Scatter::new(device, compiler, has_diffusion(scene)))
+                .then(|| Scatter::new(device, compiler, [has_diffusion(scene), has_slopes(scene)]))
                 .transpose()?,
             gather,
             tensors,

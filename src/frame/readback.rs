@@ -7,7 +7,7 @@ use super::renderer::Renderer;
 use super::staging::download;
 use crate::error::Result;
 use crate::gpu::{Buffer, Device, Recorder, TargetFormat};
-use crate::layout::facet::{FacetRecord, LitRecord};
+use crate::layout::facet::{FacetRecord, LitRecord, SlopeRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::boxes::MAX_ATTEMPTS;
 
@@ -145,6 +145,17 @@ impl Renderer {
     pub fn facets(&mut self, device: &Device) -> Result<(Vec<FacetRecord>, Vec<LitRecord>)> {
         let n = self.passes.constants.march.n_facets;
         Ok((self.read(device, |b| &b.facets, n)?, self.read(device, |b| &b.lit, n)?))
+    }
+
+    /// Returns the slopes of the last frame's light inside of blobs, by facet. Those of surfaces
+    /// and ground have no meaning. None where the light does not change there.
+    ///
+    /// # Errors
+    /// Fails if a frame is in flight or the device is lost.
+    pub fn slopes(&mut self, device: &Device) -> Result<Vec<SlopeRecord>> {
+        let n = self.passes.constants.march.n_facets;
+        let n = if self.passes.constants.has_slopes { n } else { 0 };
+        self.read(device, |b| &b.slopes, n)
     }
 
     /// Returns the last frame's transmittance from each light to each facet, `[facet][light]`,

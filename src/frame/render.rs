@@ -210,6 +210,7 @@ impl FramePasses {
             lit,
             media,
             field,
+            slopes,
             ..
         } = &self.buffers;
         pass(rec, plan, Pass::Diffusion, |rec| {
@@ -229,8 +230,17 @@ impl FramePasses {
         pass(rec, plan, Pass::Scatter, |rec| {
             let Some(scatter) = scatter else { return Ok(()) };
             let depths = transmittance;
-            let buffers =
-                ScatterBuffers { facets, lights, depths, regions, table, lit, media, field };
+            let buffers = ScatterBuffers {
+                facets,
+                lights,
+                depths,
+                regions,
+                table,
+                lit,
+                media,
+                field,
+                slopes,
+            };
             let of = ScatterParams {
                 eye: packet.camera.eye,
                 n_facets: c.march.n_facets,

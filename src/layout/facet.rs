@@ -72,6 +72,20 @@ record! {
     }
 }
 
+record! {
+    /// Change of the light inside the blobs of a facet (model.md §18).
+    pub struct SlopeRecord {
+        /// Relative change of the radiance, 1/length.
+        relative: [f32; 3],
+        /// Padding.
+        unused: u32,
+        /// Place of the facet, relative to the lighting origin.
+        position: [f32; 3],
+        /// Padding.
+        unused_too: u32,
+    }
+}
+
 /// The kind of a surface's [`RegionRecord`]. The shaders' `REGION_*` have the same values.
 pub const REGION_SURFACE: u32 = 0;
 /// The kind of a cloud.

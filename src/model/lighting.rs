@@ -68,6 +68,8 @@ pub struct Octaves {
 pub struct DiffusionSettings {
     /// Cycles of the multigrid solver.
     pub cycles: u32,
+    /// The light changes linearly inside of each blob.
+    pub slopes: bool,
 }
 
 /// Lighting settings of a scene.
@@ -103,6 +105,13 @@ pub struct Lighting {
     pub octaves: Octaves,
     /// Settings of "diffusion".
     pub diffusion: DiffusionSettings,
+}
+
+impl Lighting {
+    /// Returns whether the light changes inside of each blob.
+    pub fn has_slopes(&self) -> bool {
+        self.mode == LightingMode::Diffusion && self.diffusion.slopes
+    }
 }
 
 /// Greatest number of octaves.

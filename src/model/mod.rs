@@ -36,6 +36,7 @@ pub mod phase;
 pub mod philox;
 pub mod resolution;
 pub mod scene;
+pub mod shade;
 pub mod sort_bits;
 pub mod sums;
 pub mod surface;

@@ -28,6 +28,8 @@ bindings! {
         textured,
         /// `[u32; 4]` by texel: the pool of textures; read where blobs are textured.
         pool,
+        /// `SlopeRecord` by facet; read where blobs are shaded.
+        slopes,
     }
 }
 
@@ -54,14 +56,17 @@ pub struct BlobVariant {
     pub ellipsoids: bool,
     /// No blob's optical depth is above [`THIN`], and none has a texture.
     pub thin: bool,
+    /// The light changes linearly across each blob.
+    pub shaded: bool,
 }
 
 impl BlobVariant {
     /// Returns the specialization constants that the blob shaders share, by id.
-    pub(super) fn constants(self) -> [(u32, u32); 7] {
-        let BlobVariant { lit, grouped, weighted, textured, threshold, ellipsoids, thin } = self;
-        let ids = [0, 2, 3, 4, 5, 6, 9];
-        let are_on = [lit, grouped, weighted, textured, threshold, ellipsoids, thin];
+    pub(super) fn constants(self) -> [(u32, u32); 8] {
+        let BlobVariant { lit, grouped, weighted, textured, threshold, ellipsoids, thin, shaded } =
+            self;
+        let ids = [0, 2, 3, 4, 5, 6, 9, 12];
+        let are_on = [lit, grouped, weighted, textured, threshold, ellipsoids, thin, shaded];
         std::array::from_fn(|k| (ids[k], u32::from(are_on[k])))
     }
 }

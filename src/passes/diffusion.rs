@@ -119,7 +119,8 @@ bindings! {
         regions,
         /// `f32` by cell: extinction per length.
         density,
-        /// Output, four `[f32; 4]` by cell: φ and F along each axis.
+        /// Output, four `[f32; 4]` by cell: φ and F along each axis, and beside φ the mean fluence
+        /// of suns and lamps.
         field,
     }
 }
@@ -146,12 +147,14 @@ pub struct Room {
     pub n_cells: u64,
     /// Sets of equations: 1 where channels share them, else 3.
     pub n_sets: u32,
+    /// The fluence of suns and lamps is wanted in every cell.
+    pub has_slopes: bool,
 }
 
 impl Room {
     /// Returns the room for a grid of at most `n_cells`.
-    pub fn new(n_cells: u64, n_sets: u32) -> Room {
-        Room { n_cells: LEVELS_ROOM * n_cells, n_sets }
+    pub fn new(n_cells: u64, n_sets: u32, has_slopes: bool) -> Room {
+        Room { n_cells: LEVELS_ROOM * n_cells, n_sets, has_slopes }
     }
 }
 
@@ -190,7 +193,7 @@ impl Diffusion {
     /// # Errors
     /// Fails if a shader does not compile or the device cannot hold the buffers.
     pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Diffusion> {
-        let macros = [("N_SETS", room.n_sets)];
+        let macros = [("N_SETS", room.n_sets), ("SLOPES", u32::from(room.has_slopes))];
         let kernel = |name: &str, fields: &_| {
             Kernel::with_macros(device, compiler, name, fields, &[], &macros)
         };

@@ -118,6 +118,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/regions.glsl",
     "include/scan.glsl",
     "include/second.glsl",
+    "include/seen.glsl",
+    "include/shade.glsl",
     "include/shell.glsl",
     "include/sort.glsl",
     "include/sort_blocks.glsl",

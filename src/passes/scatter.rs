@@ -53,8 +53,11 @@ bindings! {
         lit,
         /// `MediumRecord` by cloud.
         media,
-        /// Four `[f32; 4]` by cell: φ and F along each axis; without diffusion not read.
+        /// Four `[f32; 4]` by cell: φ and F along each axis, and beside φ the mean U of suns and
+        /// lamps; without diffusion not read.
         field,
+        /// Output, `SlopeRecord` by facet of a cloud; without slopes not written.
+        slopes,
     }
 }
 
@@ -80,18 +83,24 @@ pub struct ScatterParams {
 /// The pipeline of the pass.
 pub struct Scatter {
     kernel: Kernel,
-    is_diffuse: bool,
+    n_buffers: usize,
 }
 
 impl Scatter {
-    /// Creates the pipeline; `is_diffuse` if light is scattered further by diffusion.
+    /// Creates the pipeline; `is_diffuse` if light is scattered further by diffusion, and then
+    /// `has_slopes` if its slopes are wanted.
     ///
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
-    pub fn new(device: &Device, compiler: &Compiler, is_diffuse: bool) -> Result<Scatter> {
-        let macros = [("DIFFUSE", u32::from(is_diffuse))];
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        [is_diffuse, has_slopes]: [bool; 2],
+    ) -> Result<Scatter> {
+        let macros = [("DIFFUSE", u32::from(is_diffuse)), ("SLOPES", u32::from(has_slopes))];
         let kernel = Kernel::with_macros(device, compiler, "scatter", Push::FIELDS, &[], &macros)?;
-        Ok(Scatter { kernel, is_diffuse })
+        let n_buffers = 7 + usize::from(is_diffuse) + usize::from(has_slopes);
+        Ok(Scatter { kernel, n_buffers })
     }
 
     /// Writes the light of every facet.
@@ -118,8 +127,7 @@ impl Scatter {
             term_depth,
             term_phase,
         };
-        let buffers: [&Buffer; 8] = buffers.by_binding();
-        let n_buffers = if self.is_diffuse { 8 } else { 7 };
-        rec.dispatch(&self.kernel, &buffers[..n_buffers], &push, of.n_facets)
+        let buffers: [&Buffer; 9] = buffers.by_binding();
+        rec.dispatch(&self.kernel, &buffers[..self.n_buffers], &push, of.n_facets)
     }
 }

@@ -69,6 +69,8 @@ buffers! {
             "tiles.sheets";
         /// Shapes of ellipsoids.
         conics: Buffer => [u32; 4], one_unless(variant.blobs.ellipsoids, n_max), "tiles.conics";
+        /// Changes of the light of shaded splats.
+        shades: Buffer => [u32; 4], one_unless(variant.blobs.shaded, n_max), "tiles.shades";
         reaches: Buffer => [u32; 2], n_max, "tiles.reaches";
         before: Buffer => u32, n_max, "tiles.before";
         blocks: Buffer => u32, rounds.n_blocks.into(), "tiles.blocks";
@@ -160,6 +162,7 @@ impl Tiles {
             ("THIN", u32::from(blobs.thin)),
             ("TEXTURED", u32::from(blobs.textured)),
             ("ELLIPSOIDS", u32::from(blobs.ellipsoids)),
+            ("SHADED", u32::from(blobs.shaded)),
             ("THRESHOLD", u32::from(blobs.threshold)),
             ("SLICES", u32::from(slices)),
             ("QUEUE", u32::from(sharing == Sharing::Registers)),
@@ -185,6 +188,7 @@ impl Tiles {
             compose: (rounds.n > 1).then(|| compose(1)).transpose()?,
             division,
             n_compose_bindings: match blobs {
+                BlobVariant { shaded: true, .. } => 12,
                 BlobVariant { ellipsoids: true, .. } => 11,
                 BlobVariant { textured: true, .. } => 10,
                 _ if has_under => 8,
@@ -229,8 +233,9 @@ impl Tiles {
         sort_tile: u32,
     ) -> Result<()> {
         let Division { width, height, tile, n_bins, .. } = self.division;
-        let Scratch { known, splats, sheets, conics, reaches, before, blocks, round, .. } =
-            &self.scratch;
+        let Scratch {
+            known, splats, sheets, conics, shades, reaches, before, blocks, round, ..
+        } = &self.scratch;
         let push = SplatPush {
             camera: *view.camera,
             pixel: self.pixel(view),
@@ -247,11 +252,21 @@ impl Tiles {
             rec.update(known, &KeptRecord::of(n, BLOCK));
         }
         let kept = self.kept(n);
-        let [entries, placed, particles, lit, i_facet, i_group, drawn, textured, _pool] =
-            buffers.by_binding();
+        let BlobBuffers {
+            entries,
+            placed,
+            particles,
+            lit,
+            i_facet,
+            i_group,
+            drawn,
+            textured,
+            slopes,
+            ..
+        } = *buffers;
         let all = [
             entries, placed, particles, lit, i_facet, i_group, drawn, textured, splats, reaches,
-            before, blocks, sheets, kept, conics,
+            before, blocks, sheets, kept, conics, slopes, shades,
         ];
         rec.dispatch_indirect(&self.splat, &all, &push, (kept, KeptRecord::I_SPLAT))?;
         let push = RoundsPush {
@@ -334,7 +349,7 @@ impl Tiles {
         view: &BlobView<'_>,
     ) -> Result<()> {
         let Division { width, height, n_bins_x, n_bins, .. } = self.division;
-        let Scratch { splats, sheets, conics, round, ranges, state, under, depths, .. } =
+        let Scratch { splats, sheets, conics, shades, round, ranges, state, under, depths, .. } =
             &self.scratch;
         let (max_groups, most_tiles) = (self.max_groups, self.max_tiles);
         let push = RangesPush { n_bins, i_round, max_groups, most_tiles };
@@ -356,8 +371,10 @@ impl Tiles {
             y_forward: view.camera.forward[1],
             near_in_slices: view.near_in_slices(),
         };
-        let buffers =
-            [splats, sorted, round, ranges, state, picture, under, depths, sheets, pool, conics];
+        let buffers = [
+            splats, sorted, round, ranges, state, picture, under, depths, sheets, pool, conics,
+            shades,
+        ];
         let buffers = &buffers[..self.n_compose_bindings];
         if i_round == 0 {
             rec.dispatch_indirect(&self.alone, buffers, &push, (round, 16))?;

@@ -8,10 +8,17 @@ use glam::{DVec2, DVec3};
 use super::Blob;
 use super::composite::{OpaquePixel, Rounding};
 use super::parallel::parallel_map;
+use super::shade::{SeenLight, SeenShade};
+use super::shine::Shine;
 use super::view::View;
+use crate::model::shade::Shade;
 
 /// A factor on τ of blob `j`, given the difference of the ray's slopes from its centre's.
 pub type Factor<'a> = &'a (dyn Fn(usize, DVec2) -> f64 + Sync);
+
+/// Bound of the radiance of a part of a blob over that of its facet: twice at its centre, 1 + ¼ σ
+/// at up to 8 σ to the side, where a slope's angle may double that.
+pub(super) const BRIGHTER: f64 = 10.0;
 
 /// Blobs to draw, with their radiance, order and textures.
 #[derive(Clone, Copy)]
@@ -24,11 +31,19 @@ pub struct Sprites<'a> {
     pub order: &'a [u32],
     /// Factor on τ; `None` for plain blobs.
     pub factor: Option<Factor<'a>>,
+    /// Light inside of each blob; `None` where it is the same throughout.
+    pub shades: Option<&'a [Shade]>,
 }
 
 impl Sprites<'_> {
     pub(super) fn factor(&self, j: usize, delta: DVec2) -> f64 {
         self.factor.map_or(1.0, |f| f(j, delta))
+    }
+
+    /// Returns the greatest radiance of any part of a blob.
+    pub(super) fn brightest(&self) -> f64 {
+        let brightest = self.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
+        if self.shades.is_some() { BRIGHTER * brightest } else { brightest }
     }
 }
 
@@ -136,6 +151,16 @@ pub(super) struct Layer {
     pub is_drawn: bool,
     /// Whether rounding decides if the layer is drawn.
     pub is_uncertain: bool,
+    /// Light along the ray, as a factor on the blob's radiance.
+    pub light: SeenLight,
+}
+
+impl Layer {
+    /// Returns the radiance of the layer of a blob of `radiance`, composed as a whole.
+    pub fn shine(&self, radiance: DVec3) -> Shine {
+        let (tint, off) = self.light.whole(self.tau);
+        Shine { radiance: tint * radiance, off: off * radiance.abs() }
+    }
 }
 
 impl Seen {
@@ -179,7 +204,10 @@ impl Seen {
         let off = if is_uncertain { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
         let is_drawn = is_in && self.depth <= opaque && self.above >= 0.0;
         let alpha = if is_drawn { alpha } else { 0.0 };
-        Some(Layer { alpha, off, tau, depth: self.depth, is_drawn, is_uncertain })
+        let light = sprites.shades.map_or(SeenLight::PLAIN, |shades| {
+            SeenShade::new(view, &sprites.blobs[j], self.c, &shades[j]).toward(delta, r)
+        });
+        Some(Layer { alpha, off, tau, depth: self.depth, is_drawn, is_uncertain, light })
     }
 }
 

@@ -3,23 +3,23 @@
 //!
 //! In: blobs and eye relative to O, an order far to near. Out: the same picture as `sprites`.
 
-use glam::DVec3;
-
 use super::composed::{Composed, U};
 use super::composite::OpaquePixel;
+use super::shine::Shine;
 use super::sprites::Bounded;
 use super::tiles::{Composition, render_by};
 
 /// Blends a layer: C ← C + (1 − A) α L, A ← A + (1 − A) α. The device stores A, so the error of the
 /// transmittance is a share of 1, not of itself.
-fn under(pixel: &mut Composed, alpha: f64, off: f64, radiance: DVec3) {
+fn under(pixel: &mut Composed, alpha: f64, off: f64, shine: Shine) {
+    let Shine { radiance, off: off_radiance } = shine;
     let here = pixel.passed * alpha;
     let inherited = pixel.off_passed * (alpha + off) + pixel.passed * off;
     // Blending need only be faithful, 2 U an operation: 1 − A, the product, the sum.
     let off_here = inherited + 4.0 * U * (here + inherited);
     // α L before them is correctly rounded.
     let off_shine = radiance.abs() * (off_here + U * (here + inherited));
-    pixel.off_color += off_shine;
+    pixel.off_color += off_shine + (here + off_here) * off_radiance;
     pixel.color += here * radiance;
     pixel.off_color += 2.0 * U * (pixel.color.abs() + pixel.off_color);
     pixel.passed -= here;
@@ -49,6 +49,8 @@ pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> Bounded {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::model::cloud::SQRT_TAU;
     use crate::reference::Blob;
@@ -74,7 +76,8 @@ mod tests {
         behind: OpaquePixel,
     ) -> ([f64; 4], [f64; 4]) {
         let order: Vec<u32> = (0..blobs.len() as u32).collect();
-        let sprites = Sprites { blobs, radiance: colors, order: &order, factor: None };
+        let sprites =
+            Sprites { blobs, radiance: colors, order: &order, factor: None, shades: None };
         let of = Composition { view: &VIEW, sprites, rounding, saturated: 0.0 };
         let (values, bounds) = render_over(&of, &[behind]);
         (values[0], bounds[0])
@@ -92,8 +95,13 @@ mod tests {
         }
         assert!(bound.iter().all(|b| *b > 0.0 && *b < 2e-6), "{bound:?}");
         let (other, _) = {
-            let sprites =
-                Sprites { blobs: &blobs, radiance: &colors, order: &[0, 1], factor: None };
+            let sprites = Sprites {
+                blobs: &blobs,
+                radiance: &colors,
+                order: &[0, 1],
+                factor: None,
+                shades: None,
+            };
             far_to_near(&VIEW, &[behind], &sprites, &Rounding::NONE)
         };
         assert!(value.iter().zip(other[0]).all(|(a, b)| (a - b).abs() < 1e-15));

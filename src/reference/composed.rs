@@ -4,6 +4,7 @@
 use glam::DVec3;
 
 use super::composite::{OpaquePixel, Rounding};
+use super::shine::Shine;
 
 /// Unit round-off of f32.
 pub(super) const U: f64 = 1.0 / 16_777_216.0;
@@ -27,13 +28,14 @@ impl Composed {
         Composed { color: DVec3::ZERO, passed: 1.0, off_color: DVec3::ZERO, off_passed: 0.0 };
 
     /// Adds a layer of opacity `alpha`, which the device has within `off`.
-    pub(super) fn under(&mut self, alpha: f64, off: f64, radiance: DVec3) {
+    pub(super) fn under(&mut self, alpha: f64, off: f64, shine: Shine) {
+        let Shine { radiance, off: off_radiance } = shine;
         let (passed, here) = (self.passed, self.passed * alpha);
         // T = 1 - A is rounded; (T + dT)(a + da) - T a, rounded once.
         let off_one_minus = U * (passed + self.off_passed);
         let inherited = (self.off_passed + off_one_minus) * (alpha + off) + passed * off;
         let off_here = inherited + U * (here + inherited);
-        self.off_color += radiance.abs() * off_here;
+        self.off_color += radiance.abs() * off_here + (here + off_here) * off_radiance;
         self.color += here * radiance;
         // here L and the sum with it.
         self.off_color +=

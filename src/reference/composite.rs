@@ -1,8 +1,7 @@
 //! Composition of a layer over a pixel, model.md §9: premultiplied "over" on a target that rounds,
 //! with a bound on the difference.
 
-use glam::DVec3;
-
+use super::shine::Shine;
 use crate::model::film::FilmFormat;
 
 /// Permitted departures of a device from the mathematics while drawing.
@@ -107,9 +106,11 @@ impl Layered {
     /// Composes C ← αL + (1−α)C, A ← α + (1−α)A. The target's α is within `off`, and it rounds the
     /// result. It may blend in its own few bits (Vulkan, "Blending": no less precise than the
     /// target): source, factor and product are then rounded, too.
-    pub fn over(&mut self, alpha: f64, off: f64, radiance: DVec3, r: &Rounding) {
-        let source = [radiance.x, radiance.y, radiance.z, 1.0];
-        for ((v, e), s) in self.value.iter_mut().zip(&mut self.bound).zip(source) {
+    pub fn over(&mut self, alpha: f64, off: f64, shine: Shine, r: &Rounding) {
+        let (source, off_source) = (shine.radiance.extend(1.0), shine.off.extend(0.0));
+        let sources = source.to_array().into_iter().zip(off_source.to_array());
+        for ((v, e), (s, off_s)) in self.value.iter_mut().zip(&mut self.bound).zip(sources) {
+            *e += (alpha + off) * off_s;
             if r.step > 0.0 {
                 [*v, *e] = over_steps([*v, *e], s, alpha, off, r);
                 continue;

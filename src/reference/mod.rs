@@ -33,6 +33,8 @@ pub mod place;
 pub mod present;
 pub mod rounding;
 pub mod scatter;
+mod shade;
+mod shine;
 mod slices;
 pub mod sort;
 pub mod sprite_sums;

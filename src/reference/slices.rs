@@ -6,13 +6,13 @@
 //! pixel composed of them.
 
 use std::collections::BTreeMap;
-use std::f64::consts::FRAC_1_SQRT_2;
 
 use glam::DVec3;
 
-use super::blob_layers::{Layer, Raster, Shares, Sprites, composed};
+use super::blob_layers::{BRIGHTER, Layer, Raster, Shares, Sprites, composed};
 use super::composed::{Composed, U};
 use super::composite::{OpaquePixel, Rounding};
+use super::shade::below;
 use super::view::View;
 
 /// Boundaries of slices that part a blob, before and at the one nearest to its centre.
@@ -39,6 +39,10 @@ struct Part {
     tau: f64,
     /// By how much the device's may differ.
     off: f64,
+    /// Optical depth times light, as a factor on the blob's radiance.
+    shine: f64,
+    /// By how much the device's may differ, beyond `off` times the light.
+    off_shine: f64,
 }
 
 /// The blobs in one slice.
@@ -58,8 +62,7 @@ struct Ray<'a> {
     wall: (f64, f64),
 }
 
-/// Returns the pixels of `raster` composed by slices of `view.slice`, over nothing, before
-/// `opaque`.
+/// Returns the pixels of `raster` composed by slices, over nothing, before `opaque`.
 pub(super) fn composed_at(
     view: &View,
     raster: &Raster<'_>,
@@ -85,7 +88,7 @@ pub(super) fn shares_at(
         for mixture in mixtures {
             let tau = mixture.tau();
             let shown = shares.behind * -libm::expm1(-tau);
-            let of = |part: &Part| (part.j, shown * part.tau / tau);
+            let of = |part: &Part| (part.j, shown * part.shine / tau);
             shares.blobs.extend(mixture.parts.iter().filter(|p| p.tau > 0.0).map(of));
             shares.behind *= (-tau).exp();
         }
@@ -143,17 +146,16 @@ fn mixtures(
     let ray = Ray { view, sprites, direction: ray / length, wall };
     let mut slices: BTreeMap<i64, Mixture> = BTreeMap::new();
     for (j, layer) in layers {
-        for (i_slice, tau, off) in ray.dealt(*j, layer, rounding) {
-            slices.entry(i_slice).or_default().parts.push(Part { j: *j as u32, tau, off });
+        for (i_slice, part) in ray.dealt(*j, layer, rounding) {
+            slices.entry(i_slice).or_default().parts.push(part);
         }
     }
     slices.into_values().collect()
 }
 
 impl Ray<'_> {
-    /// Returns what `layer` of blob `j` has in each slice: the slice's number, the optical depth
-    /// and its bound.
-    fn dealt(&self, j: usize, layer: &Layer, r: &Rounding) -> Vec<(i64, f64, f64)> {
+    /// Returns the part that `layer` of blob `j` has in each slice, with the slice's number.
+    fn dealt(&self, j: usize, layer: &Layer, r: &Rounding) -> Vec<(i64, Part)> {
         let (blob, slice) = (&self.sprites.blobs[j], self.view.slice);
         let c = blob.position - self.view.pose.position;
         let distance = c.length();
@@ -168,46 +170,66 @@ impl Ray<'_> {
         let place = (r.depth + N_ROUNDINGS * U) * distance;
         // x e^{−x²/2}/√(2π) is below 1/4: what an error of σ does.
         let off_share = SHARE + STEEPEST * place / width + 0.25 * N_ROUNDINGS * U;
-        let hidden = below((self.wall.0 - foot) / width);
         // Where the opaque pixel is infinitely far, its distance has no error.
         let off_hidden = if self.wall.0.is_finite() {
             off_share + STEEPEST * self.wall.1 / width
         } else {
             off_share
         };
+        let wall = (self.wall.0 - foot) / width;
+        // The share of each slice, and the light of the part times that.
         let at = |i_boundary: i64| {
-            let within = BOUNDARIES
-                .map(|b| below(((i_boundary + b) as f64 * slice - foot) / width).min(hidden));
-            [within[0], within[1] - within[0], within[2] - within[1], hidden - within[2]]
+            let [a, b, c] =
+                BOUNDARIES.map(|k| (((i_boundary + k) as f64 * slice - foot) / width).min(wall));
+            [[f64::NEG_INFINITY, a], [a, b], [b, c], [c, wall]].map(|[from, to]| {
+                let share = below(to) - below(from);
+                (share, layer.light.between([from, to], share, off_share + off_hidden))
+            })
         };
         let place_in_slices = distance / slice;
         let nearest = place_in_slices.round();
-        let mut found: Vec<(i64, f64, f64)> = Vec::new();
+        let mut found: Vec<(i64, Part)> = Vec::new();
         let shares = at(nearest as i64);
         let whole = layer.tau.min(DEEPEST);
-        for (m, share) in shares.iter().enumerate() {
+        for (m, (share, (light, off_light))) in shares.iter().enumerate() {
             let tau = whole * share;
             let off = r.tau * tau + whole * (off_share + off_hidden);
-            found.push((nearest as i64 + m as i64, tau, off));
+            let (shine, off_shine) = (whole * light, whole * off_light);
+            found.push((
+                nearest as i64 + m as i64,
+                Part { j: j as u32, tau, off, shine, off_shine },
+            ));
         }
         // Another boundary may be as near.
         let other = nearest + (place_in_slices - nearest).signum();
         if 0.5 - (place_in_slices - nearest).abs() <= (place + r.order) / slice {
-            for (m, share) in at(other as i64).iter().enumerate() {
-                let (i_slice, tau) = (other as i64 + m as i64, whole * share);
+            for (m, (share, (light, off_light))) in at(other as i64).into_iter().enumerate() {
+                let (i_slice, tau, shine) = (other as i64 + m as i64, whole * share, whole * light);
                 match found.iter_mut().find(|(i, ..)| *i == i_slice) {
-                    Some((_, here, off)) => *off += (tau - *here).abs(),
-                    None => found.push((i_slice, 0.0, tau)),
+                    Some((_, here)) => {
+                        here.off += (tau - here.tau).abs();
+                        let light = if here.tau > 0.0 { here.shine / here.tau } else { 1.0 };
+                        here.off_shine += (shine - here.shine - light * (tau - here.tau)).abs();
+                    }
+                    None => {
+                        let off_shine = (shine - tau).abs() + whole * off_light;
+                        let part = Part { j: j as u32, tau: 0.0, off: tau, shine: 0.0, off_shine };
+                        found.push((i_slice, part));
+                    }
                 }
             }
             // A slice that only the nearest boundary has.
             let lost = |i: i64| !(0..4).contains(&(i - other as i64));
-            found.iter_mut().filter(|(i, ..)| lost(*i)).for_each(|(_, tau, off)| *off += *tau);
+            for (_, part) in found.iter_mut().filter(|(i, _)| lost(*i)) {
+                part.off += part.tau;
+            }
         }
-        for (_, tau, off) in &mut found {
+        for (_, part) in &mut found {
             // Only rounding may draw the layer, or leave it out.
-            *off += if layer.is_uncertain { *tau } else { 0.0 };
-            *tau *= f64::from(u8::from(layer.is_drawn));
+            part.off += if layer.is_uncertain { part.tau } else { 0.0 };
+            if !layer.is_drawn {
+                (part.tau, part.shine) = (0.0, 0.0);
+            }
         }
         found
     }
@@ -225,27 +247,27 @@ fn compose(mixtures: Vec<Mixture>, radiance: &[DVec3]) -> Composed {
     for mixture in mixtures {
         let tau = mixture.tau();
         let n = mixture.parts.len() as f64;
-        let of = |part: &Part| radiance[part.j as usize];
+        let own = |part: &Part| radiance[part.j as usize];
+        let of = |p: &Part| if p.tau > 0.0 { p.shine / p.tau * own(p) } else { own(p) };
         let sum = |f: &dyn Fn(&Part) -> DVec3| mixture.parts.iter().map(f).sum::<DVec3>();
-        let mean = if tau > 0.0 { sum(&|p| p.tau * of(p)) / tau } else { DVec3::ZERO };
+        let mean = if tau > 0.0 { sum(&|p| p.shine * own(p)) / tau } else { DVec3::ZERO };
         let off_tau = mixture.parts.iter().map(|p| p.off).sum::<f64>() + (n + 2.0) * U * tau;
         let alpha = -libm::expm1(-tau);
         let off_alpha = (-(tau - off_tau).max(0.0)).exp() * off_tau + OPACITY * alpha;
         // d mean = Σ dp (L − mean)/t to first order; the sum that divides may be less by its own
         // error. The mean is never outside the radiances.
-        let moved = sum(&|p| p.off * (of(p) - mean).abs()) / (tau - off_tau).max(1e-300);
+        let least = (tau - off_tau).max(1e-300);
+        let moved = sum(&|p| p.off * (of(p) - mean).abs()) / least;
         let widest =
             mixture.parts.iter().map(|p| (of(p) - mean).abs()).fold(DVec3::ZERO, DVec3::max);
-        let off_mean = moved.min(widest) + (n + 6.0) * U * mean.abs();
+        let brightest = mixture.parts.iter().map(|p| own(p).abs()).fold(DVec3::ZERO, DVec3::max);
+        let of_light = sum(&|p| p.off_shine * own(p).abs()) / least;
+        let of_light = of_light.min(BRIGHTER * brightest);
+        let off_mean = moved.min(widest) + of_light + (n + 6.0) * U * mean.abs();
         pixel.off_color += (pixel.passed + pixel.off_passed) * (alpha + off_alpha) * off_mean;
-        pixel.under(alpha, off_alpha, mean);
+        pixel.under(alpha, off_alpha, mean.into());
     }
     pixel
-}
-
-/// Returns the share of the unit normal distribution below `x`.
-fn below(x: f64) -> f64 {
-    0.5 * libm::erfc(-x * FRAC_1_SQRT_2)
 }
 
 #[cfg(test)]
@@ -270,8 +292,13 @@ mod tests {
             let z = |k: &u32| blobs[*k as usize].position.length();
             z(j).total_cmp(&z(i))
         });
-        let sprites =
-            Sprites { blobs, radiance: &colors[..blobs.len()], order: &order, factor: None };
+        let sprites = Sprites {
+            blobs,
+            radiance: &colors[..blobs.len()],
+            order: &order,
+            factor: None,
+            shades: None,
+        };
         let drawn = render_over(view, &[behind], &sprites, &Rounding::NONE).0[0];
         // Shares are those of the picture.
         let raster = Raster { first: [0, 0], n_columns: 1, cell: 1, at: &[[0, 0]] };
@@ -350,8 +377,13 @@ mod tests {
         let off = |z: f64| {
             let blobs = [at(z, 0.9, 1.0), blobs[1]];
             let (radiance, order) = ([DVec3::X, DVec3::Y], [0, 1]);
-            let sprites =
-                Sprites { blobs: &blobs, radiance: &radiance, order: &order, factor: None };
+            let sprites = Sprites {
+                blobs: &blobs,
+                radiance: &radiance,
+                order: &order,
+                factor: None,
+                shades: None,
+            };
             let behind = [OpaquePixel::EMPTY];
             let (value, bound) = render_over(&VIEW, &behind, &sprites, &rounding);
             (value[0], bound[0])

@@ -67,7 +67,7 @@ fn layered(
     on_row: &(dyn Fn(usize) + Sync),
 ) -> Vec<Layered> {
     if view.slice > 0.0 {
-        let brightest = sprites.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
+        let brightest = sprites.brightest();
         // Half a step of the target below 1 hides what is behind.
         let saturated = 0.5 * rounding.unit.max(0.5 * rounding.step);
         let pixels = slices::composed_at(view, raster, opaque, sprites, rounding, on_row);
@@ -78,7 +78,7 @@ fn layered(
         return pixels.iter().zip(opaque).map(over).collect();
     }
     let over = |pixel: &mut Layered, j: usize, layer: &Layer| {
-        pixel.over(layer.alpha, layer.off, sprites.radiance[j], rounding);
+        pixel.over(layer.alpha, layer.off, layer.shine(sprites.radiance[j]), rounding);
     };
     let start = |behind: &OpaquePixel| Layered::from(behind);
     let whole = |_: usize, pixel: Layered| pixel;
@@ -96,21 +96,22 @@ pub fn shares_at(
     if view.slice > 0.0 {
         return slices::shares_at(view, raster, opaque, sprites);
     }
-    let start = |_: &OpaquePixel| Shares { blobs: Vec::new(), behind: 1.0 };
-    let over = |pixel: &mut Shares, j: usize, layer: &Layer| {
-        pixel.blobs.push((j as u32, layer.alpha));
+    let over = |pixel: &mut Vec<(u32, f64, f64)>, j: usize, layer: &Layer| {
+        pixel.push((j as u32, layer.alpha, layer.light.whole(layer.tau).0));
     };
     let exact = (sprites, &Rounding::NONE);
-    let whole = |_: usize, pixel: Shares| pixel;
-    let mut pixels = composed(view, raster, opaque, exact, start, over, whole, &|_| ());
-    for pixel in &mut pixels {
-        for (_, alpha) in pixel.blobs.iter_mut().rev() {
-            let share = *alpha * pixel.behind;
-            pixel.behind *= 1.0 - *alpha;
-            *alpha = share;
-        }
-    }
-    pixels
+    let whole = |_: usize, layers: Vec<(u32, f64, f64)>| {
+        let mut behind = 1.0;
+        let share = |&(j, alpha, light): &(u32, f64, f64)| {
+            let share = alpha * behind * light;
+            behind *= 1.0 - alpha;
+            (j, share)
+        };
+        let mut blobs: Vec<(u32, f64)> = layers.iter().rev().map(share).collect();
+        blobs.reverse();
+        Shares { blobs, behind }
+    };
+    composed(view, raster, opaque, exact, |_| Vec::new(), over, whole, &|_| ())
 }
 
 #[cfg(test)]
@@ -130,7 +131,8 @@ mod tests {
         let kappa = std::f64::consts::LN_2 / (SQRT_TAU * 0.25);
         let at = |z: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
         let blobs = [at(2.0), at(4.0)];
-        let sprites = Sprites { blobs: &blobs, radiance: &[], order: &[1, 0], factor: None };
+        let sprites =
+            Sprites { blobs: &blobs, radiance: &[], order: &[1, 0], factor: None, shades: None };
         let of = |depth: f64| {
             let raster = Raster { first: [0, 0], n_columns: 1, cell: 1, at: &[[0, 0]] };
             let behind = OpaquePixel { depth, ..OpaquePixel::EMPTY };
@@ -162,8 +164,13 @@ mod tests {
                 ..OpaquePixel::EMPTY
             };
             let (value, bound) = {
-                let sprites =
-                    Sprites { blobs: &blobs, radiance: &colors, order: &[1, 0], factor: None };
+                let sprites = Sprites {
+                    blobs: &blobs,
+                    radiance: &colors,
+                    order: &[1, 0],
+                    factor: None,
+                    shades: None,
+                };
                 render_over(&VIEW, &[behind], &sprites, &Rounding::NONE)
             };
             (value[0], bound[0])

@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::blob_layers::{Bounded, Seen, Sprites};
 use super::composed::Composed;
 use super::composite::{OpaquePixel, Rounding};
+use super::shine::Shine;
 use super::slices;
 use super::view::View;
 use crate::model::film::FilmFormat;
@@ -21,7 +22,7 @@ pub fn off_alpha(format: FilmFormat) -> f64 {
 
 /// Adds a layer of an exact opacity under the composed ones; the device's opacity is within the
 /// second number.
-pub(super) type AddLayer = fn(&mut Composed, f64, f64, DVec3);
+pub(super) type AddLayer = fn(&mut Composed, f64, f64, Shine);
 
 /// A composition of sprites on a device.
 #[derive(Clone, Copy)]
@@ -45,8 +46,7 @@ pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> Bounded {
 
 /// Composes as a device that uses another form of the law, with errors of its own.
 pub(super) fn render_by(of: &Composition<'_>, behind: &[OpaquePixel], layer: AddLayer) -> Bounded {
-    let (view, most) =
-        (of.view, of.sprites.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max));
+    let (view, most) = (of.view, of.sprites.brightest());
     let pixel = |(i_pixel, under): (usize, &OpaquePixel)| {
         let (i, j) = (i_pixel as u32 % view.width, i_pixel as u32 / view.width);
         compose(of, view.ray(i, j), under, layer).over(under, &of.rounding, of.saturated, most)
@@ -71,7 +71,9 @@ fn compose(of: &Composition<'_>, ray: DVec3, under: &OpaquePixel, layer: AddLaye
         };
         match seen.layer(view, sprites, j, ray, hides, rounding) {
             Some(found) if is_sliced => layers.push((j, found)),
-            Some(found) => layer(&mut pixel, found.alpha, found.off, sprites.radiance[j]),
+            Some(found) => {
+                layer(&mut pixel, found.alpha, found.off, found.shine(sprites.radiance[j]));
+            }
             None => {}
         }
     }
@@ -116,8 +118,13 @@ mod tests {
         for under in [OpaquePixel::EMPTY, OpaquePixel { depth: 9.0, ..under }, under] {
             let behind = [under; 6];
             let none = Rounding::NONE;
-            let sprites =
-                Sprites { blobs: &blobs, radiance: &colors, order: &[1, 0], factor: None };
+            let sprites = Sprites {
+                blobs: &blobs,
+                radiance: &colors,
+                order: &[1, 0],
+                factor: None,
+                shades: None,
+            };
             let of = Composition { view: &view, sprites, rounding: none, saturated: 0.0 };
             let (near_first, bound) = render_over(&of, &behind);
             let (far_first, _) = sprites::render_over(&view, &behind, &sprites, &none);

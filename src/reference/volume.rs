@@ -11,8 +11,10 @@ mod tests;
 use glam::DVec3;
 
 use super::Blob;
-use super::composite::OpaquePixel;
+use super::composite::{OpaquePixel, Rounding};
+use super::shade::{SeenLight, SeenShade};
 use super::view::View;
+use crate::model::shade::Shade;
 use piece::{RayBlob, RayIntegral, RayIntegrator};
 
 /// A pixel of the volume.
@@ -38,6 +40,8 @@ pub struct Volume<'a> {
     view: View,
     blobs: &'a [Blob],
     radiance: &'a [DVec3],
+    /// Light inside of each blob; `None` where it is the same throughout.
+    shades: Option<&'a [Shade]>,
     /// Columns and rows of every blob's rays.
     places: Vec<[(u32, u32); 2]>,
     /// Greatest magnitude of a channel of a blob's radiance.
@@ -58,7 +62,12 @@ impl<'a> Volume<'a> {
         };
         let places = blobs.iter().map(place).collect();
         let brightest = radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
-        Volume { view: *view, blobs, radiance, places, brightest, omitted }
+        Volume { view: *view, blobs, radiance, shades: None, places, brightest, omitted }
+    }
+
+    /// Returns the volume with light inside of each blob.
+    pub fn shaded(self, shades: Option<&'a [Shade]>) -> Volume<'a> {
+        Volume { shades, ..self }
     }
 
     /// Integrates some pixels of row `j`, given by column and background.
@@ -86,14 +95,12 @@ impl<'a> Volume<'a> {
             (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
         let reach = reach(depth, self.omitted) * width;
         let (from, to) = ((center - reach).max(self.view.near), (center + reach).min(end));
-        (from < to).then_some(RayBlob {
-            center,
-            width,
-            depth,
-            radiance: self.radiance[k],
-            from,
-            to,
-        })
+        let light = self.shades.map_or(SeenLight::PLAIN, |shades| {
+            let delta = self.view.slopes_of(ray) - self.view.slopes_of(c);
+            SeenShade::new(&self.view, blob, c, &shades[k]).toward(delta, &Rounding::NONE)
+        });
+        let radiance = self.radiance[k];
+        (from < to).then_some(RayBlob { center, width, depth, radiance, light, from, to })
     }
 
     fn pixel(

@@ -26,6 +26,10 @@ pub struct PictureError {
     pub relmse: f64,
     /// Whether the reference's own error is at most a tenth of `rmse`.
     pub is_resolved: bool,
+    /// Root mean square over the pixels of cloud, by their mean; only against random paths
+    /// ([`super::cloud_error`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cloud: Option<Figure>,
 }
 
 /// Returns the error of a picture against `reference`; none if a value of either is not finite.
@@ -54,7 +58,7 @@ pub fn picture_error(
         high: interval.map(|i| i.high + own_error),
     };
     let is_resolved = own_error * RESOLVED <= whole.rmse;
-    Some(PictureError { rmse, max: whole.max_abs, relmse: whole.rel_mse, is_resolved })
+    Some(PictureError { rmse, max: whole.max_abs, relmse: whole.rel_mse, is_resolved, cloud: None })
 }
 
 /// The difference of one pixel by its drawing, and two independent estimates of the difference by
@@ -137,8 +141,11 @@ fn square(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / 4.0
 }
 
-/// Returns, for every part of the picture, the sum of the squares that it has and their number.
-fn parts(pixels: &Pixels, squares: impl Iterator<Item = Option<f64>>) -> Vec<(f64, f64)> {
+/// Returns, for every part of the picture, the sum of the values that it has and their number.
+pub(super) fn parts(
+    pixels: &Pixels,
+    squares: impl Iterator<Item = Option<f64>>,
+) -> Vec<(f64, f64)> {
     let side = pixels.width.max(pixels.height).div_ceil(N_PARTS).max(1);
     let columns = pixels.width.div_ceil(side) as usize;
     let mut parts = vec![(0.0, 0.0); columns * pixels.height.div_ceil(side) as usize];

@@ -78,6 +78,8 @@ pub struct Lit {
     pub direct: Vec<DVec3>,
     /// Their radiance toward the eye.
     pub radiance: Vec<DVec3>,
+    /// Slopes of that, where light changes inside of blobs.
+    pub slopes: Vec<DVec3>,
 }
 
 /// Returns the light of the facets on the device.
@@ -86,13 +88,20 @@ pub fn on_device(gpu: &Gpu, compiler: &Compiler, scene: &Scene) -> Lit {
         Renderer::new(&gpu.device, compiler, &Arc::new(scene.clone()), true).expect("a renderer");
     let mut game = Game::new(Arc::new(scene.clone()), None);
     renderer.step(game.step(0).expect("a packet")).expect("a frame");
-    let (_, lit) = renderer.facets(&gpu.device).expect("facets");
+    let (facets, lit) = renderer.facets(&gpu.device).expect("facets");
+    let slopes = renderer.slopes(&gpu.device).expect("slopes");
+    let n_solids = scene.n_solid_facets() as usize;
+    let slopes = slopes.iter().zip(&facets).skip(n_solids).map(|(slope, facet)| {
+        assert_eq!(slope.position, facet.position);
+        DVec3::from(slope.relative.map(f64::from))
+    });
     let (of_solids, of_clouds) = lit.split_at(scene.n_solid_facets() as usize);
     let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
     Lit {
         of_solids: of_solids.iter().map(|l| vector(l.direct)).collect(),
         direct: of_clouds.iter().map(|l| vector(l.direct)).collect(),
         radiance: of_clouds.iter().map(|l| vector(l.first)).collect(),
+        slopes: slopes.collect(),
     }
 }
 
@@ -105,6 +114,7 @@ pub fn by_twin(scene: &Scene) -> Lit {
         of_solids,
         direct: frame.irradiance[n..].to_vec(),
         radiance: frame.radiance[n..].to_vec(),
+        slopes: frame.slopes.iter().skip(n).copied().collect(),
     }
 }
 
@@ -115,6 +125,18 @@ pub fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
     assert!(most > 0.0, "there is light");
     let differences = a.iter().zip(b).map(|(a, b)| (*a - *b).abs().max_element());
     differences.fold(0.0, |m: f64, d| if d.is_nan() { f64::INFINITY } else { m.max(d) }) / most
+}
+
+/// Greatest difference of slopes, as the error of the light that makes it: a share of the brightest
+/// facet. A slope is four such numbers by the facet's own light and the shortest edge of a cell.
+fn slopes_apart(scene: &Scene, found: &Lit, truth: &Lit) -> f64 {
+    assert_eq!(found.slopes.len(), truth.slopes.len());
+    let state = FrameState::at(scene, &scene.groups(), 0.0).expect("a state");
+    let edge = state.grid.edges().min_element();
+    let own: Vec<f64> = truth.radiance.iter().map(|v| v.element_sum() / 3.0).collect();
+    let most = own.iter().copied().fold(0.0, f64::max);
+    let all = found.slopes.iter().zip(&truth.slopes).zip(own);
+    all.map(|((a, b), own)| (*a - *b).length() * edge * own / (4.0 * most)).fold(0.0, f64::max)
 }
 
 /// Bound of the difference from the twin, as a share of the brightest facet.
@@ -140,7 +162,12 @@ pub fn bound(scene: &Scene) -> f64 {
 pub fn check(gpu: &Gpu, name: &str, mode: &str) {
     let scene = scene(name, mode, &[]);
     let (found, truth) = (on_device(gpu, &gpu.compiler, &scene), by_twin(&scene));
-    let off = [apart(&found.direct, &truth.direct), apart(&found.radiance, &truth.radiance)];
+    let off = [
+        apart(&found.direct, &truth.direct),
+        apart(&found.radiance, &truth.radiance),
+        slopes_apart(&scene, &found, &truth),
+    ];
+    assert_eq!(truth.slopes.is_empty(), mode != "diffusion");
     println!("{name}, {mode}: {off:?}");
     assert!(off.iter().all(|off| *off < bound(&scene)), "{name}, {mode}: {off:?}");
 }
@@ -155,6 +182,7 @@ pub fn check_found(gpu: &Gpu, wrong: &[Wrong]) {
         let wrong = Gpu::wrong_compiler(file, from, to);
         let (found, truth) = (on_device(gpu, &wrong, &scene), by_twin(&scene));
         let off = apart(&found.radiance, &truth.radiance).max(apart(&found.direct, &truth.direct));
+        let off = off.max(slopes_apart(&scene, &found, &truth));
         println!("{name}, {mode}, {file}, {from} -> {to}: {off:e}");
         assert!(off > bound(&scene), "{name}, {mode}, {file}, {from} -> {to}: {off:e}");
     }

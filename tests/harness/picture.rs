@@ -12,12 +12,13 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use nimbus::gpu::TargetFormat;
-use nimbus::layout::facet::LitRecord;
+use nimbus::layout::facet::{LitRecord, SlopeRecord};
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
 use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
+use nimbus::model::shade::Shade;
 use nimbus::reference::Blob;
 use nimbus::reference::composite::{OpaquePixel, Rounding};
 use nimbus::reference::sort::{depths, distances, key32, order};
@@ -55,6 +56,8 @@ pub struct Picture {
     pub in_order: Option<Vec<u32>>,
     /// Radiance of the particles' facets; without it particles have their own colours.
     pub lit: Option<Vec<LitRecord>>,
+    /// Slopes of the light by facet, if blobs are shaded.
+    pub slopes: Option<Vec<SlopeRecord>>,
     /// Facet of each particle, if not in the order of particles.
     pub i_facet: Option<Vec<u32>>,
     /// Group of each particle and the drawn part of each group, if not all particles are drawn.
@@ -93,6 +96,7 @@ impl Picture {
             particles: vec![],
             in_order: None,
             lit: None,
+            slopes: None,
             i_facet: None,
             drawn: None,
             scenery: None,
@@ -168,14 +172,31 @@ impl Picture {
         }
     }
 
+    /// Returns the facet of each particle.
+    fn facets(&self) -> Vec<u32> {
+        self.i_facet.clone().unwrap_or_else(|| (0..self.placed.len() as u32).collect())
+    }
+
+    /// Returns the light inside of each blob.
+    pub fn shades(&self) -> Option<Vec<Shade>> {
+        let slopes = self.slopes.as_ref()?;
+        let of = |(blob, i): (Blob, u32)| {
+            let SlopeRecord { relative, position, .. } = slopes[i as usize];
+            let apart = match self.i_facet {
+                Some(_) => blob.position - double(position),
+                None => DVec3::ZERO,
+            };
+            Shade::new(double(relative), apart, blob.sigma * blob.axes())
+        };
+        Some(self.blobs().into_iter().zip(self.facets()).map(of).collect())
+    }
+
     pub fn radiance(&self) -> Vec<DVec3> {
         match &self.lit {
             // The f32 sum is rounded equally on both sides.
             Some(lit) => {
-                let facets =
-                    self.i_facet.clone().unwrap_or_else(|| (0..self.placed.len() as u32).collect());
                 let of = |l: &LitRecord| double([0, 1, 2].map(|i| l.first[i] + l.second[i]));
-                facets.iter().map(|i| of(&lit[*i as usize])).collect()
+                self.facets().iter().map(|i| of(&lit[*i as usize])).collect()
             }
             None => self.particles.iter().map(|p| double(p.color)).collect(),
         }
@@ -205,10 +226,12 @@ impl Picture {
             Some(_) => self.behind(format).iter().map(|c| self.widened(c)).collect(),
         };
         let sheets = self.sheets();
+        let shades = self.shades();
         let factor = |j: usize, delta: DVec2| self.factor(&sheets, j, delta);
         let (value, bound) = {
             let (blobs, radiance, order) = (&blobs, &radiance, &order);
-            let sprites = Sprites { blobs, radiance, order, factor: Some(&factor) };
+            let (shades, factor) = (shades.as_deref(), Some(&factor as _));
+            let sprites = Sprites { blobs, radiance, order, factor, shades };
             render_over(&self.view, &behind, &sprites, &rounding)
         };
         (value.concat(), bound.concat())

@@ -9,6 +9,7 @@ use nimbus::gpu::{
     BlendMode, Buffer, Compiler, Image, LoadOp, MemoryUsage, Primitives, RecordCount, Recorder,
     Target,
 };
+use nimbus::layout::facet::SlopeRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::edge::Edge;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
@@ -51,7 +52,7 @@ struct Uploaded {
     n_entries: u32,
     n_surface_facets: u32,
     /// Buffers of the sprite path; the fourth holds the facets' light.
-    of_sprites: [Buffer; 9],
+    of_sprites: [Buffer; 10],
     regions: Buffer,
     n_regions: u32,
 }
@@ -224,6 +225,8 @@ impl Picture {
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
         // Facets of surfaces precede those of particles.
         let facets = [&scenery.lit, self.lit.as_deref().unwrap_or(&[])].concat();
+        let none = vec![SlopeRecord::default(); scenery.lit.len()];
+        let slopes = [none, self.slopes.clone().unwrap_or_default()].concat();
         // Facet indices count the surfaces' facets as well.
         let n_before = scenery.lit.len() as u32;
         let named: Vec<u32> = self.i_facet.iter().flatten().map(|i| i + n_before).collect();
@@ -250,6 +253,7 @@ impl Picture {
                 gpu.upload(&of_groups),
                 gpu.upload(&textures),
                 gpu.upload(&words),
+                gpu.upload(&slopes),
             ],
             regions: gpu.upload(&scenery.regions),
             n_regions: scenery.regions.len() as u32,
@@ -264,7 +268,7 @@ impl Picture {
         target: Target<'_>,
         camera: &CameraRecord,
     ) -> Result<()> {
-        let [entries, placed, particles, lit, i_facet, i_group, drawn, textured, pool] =
+        let [entries, placed, particles, lit, i_facet, i_group, drawn, textured, pool, slopes] =
             uploaded.of_sprites.each_ref();
         let from = BlobBuffers {
             entries,
@@ -276,6 +280,7 @@ impl Picture {
             drawn,
             textured,
             pool,
+            slopes,
         };
         let i_first_facet = uploaded.n_surface_facets;
         let n = BlobCount { n: RecordCount::Known(uploaded.n_entries), i_first_facet };
@@ -332,6 +337,7 @@ impl Picture {
             threshold: self.view.edge.has_threshold(),
             ellipsoids: self.has_ellipsoids(),
             thin: self.textured.is_none() && tau_max <= THIN,
+            shaded: self.slopes.is_some(),
         }
     }
 }

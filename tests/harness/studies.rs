@@ -74,6 +74,7 @@ pub fn configuration(settings: &[(&str, &str)], ms: f64, rmse: f64, front: Front
             max: 10.0 * rmse,
             relmse: rmse * rmse,
             is_resolved: rmse > 1e-4,
+            cloud: None,
         }),
         front,
         failure: None,

@@ -56,7 +56,9 @@ impl Picture {
         let sheets = self.sheets();
         let factor = |j: usize, delta: DVec2| self.factor(&sheets, j, delta);
         let (blobs, radiance, order) = (&blobs, &radiance, &order);
-        let sprites = Sprites { blobs, radiance, order, factor: Some(&factor) };
+        let shades = self.shades();
+        let (shades, factor) = (shades.as_deref(), Some(&factor as _));
+        let sprites = Sprites { blobs, radiance, order, factor, shades };
         let of = Composition { view: &self.view, sprites, rounding, saturated };
         let render = if by_tiles { tiles::render_over } else { chunks::render_over };
         let (value, bound) = render(&of, &behind);

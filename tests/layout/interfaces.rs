@@ -3,7 +3,9 @@
 use nimbus::gpu::Field;
 use nimbus::layout::cull::KeptRecord;
 use nimbus::layout::disc::DiscRecord;
-use nimbus::layout::facet::{FacetRecord, LitRecord, RegionBoundsRecord, RegionRecord, RunRecord};
+use nimbus::layout::facet::{
+    FacetRecord, LitRecord, RegionBoundsRecord, RegionRecord, RunRecord, SlopeRecord,
+};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use nimbus::layout::medium::MediumRecord;
 use nimbus::layout::particle::{
@@ -22,7 +24,7 @@ use nimbus::passes::{
 pub type Record = (&'static str, &'static [Field], usize);
 
 /// All records of the host.
-pub const RECORDS: [Record; 26] = [
+pub const RECORDS: [Record; 27] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Disc", DiscRecord::FIELDS, size_of::<DiscRecord>()),
@@ -45,6 +47,7 @@ pub const RECORDS: [Record; 26] = [
     ("Medium", MediumRecord::FIELDS, size_of::<MediumRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
     ("Kept", KeptRecord::FIELDS, size_of::<KeptRecord>()),
+    ("Slope", SlopeRecord::FIELDS, size_of::<SlopeRecord>()),
     ("SplatTexture", SplatTextureRecord::FIELDS, size_of::<SplatTextureRecord>()),
     ("Splat", SplatRecord::FIELDS, size_of::<SplatRecord>()),
     ("Round", RoundRecord::FIELDS, size_of::<RoundRecord>()),
@@ -111,8 +114,8 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("sort_scatter.comp", sort::DigitPush::FIELDS, "4 8 4 8"),
     ("sort_spread.comp", sort::DigitPush::FIELDS, "4 4 4"),
     ("sort_sums.comp", sort::DigitPush::FIELDS, "4 4 4"),
-    ("sprites.frag", sprites::Push::FIELDS, "- - - - - - - - T"),
-    ("sprites.vert", sprites::Push::FIELDS, "8 Placed Particle Lit 4 4 Drawn Textured"),
+    ("sprites.frag", sprites::Push::FIELDS, "- - - - - - - - T -"),
+    ("sprites.vert", sprites::Push::FIELDS, "8 Placed Particle Lit 4 4 Drawn Textured - Slope"),
     ("surfaces.frag", surfaces::Push::FIELDS, "Region Lit"),
     ("surfaces.vert", surfaces::Push::FIELDS, "Region"),
     ("terrain.frag", terrain::Push::FIELDS, ""),
@@ -127,7 +130,7 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     (
         "tiles_splat.comp",
         tiles::SplatPush::FIELDS,
-        "8 T T T 4 4 Drawn Textured 16 8 4 4 SplatTexture Kept 16",
+        "8 T T T 4 4 Drawn Textured 16 8 4 4 SplatTexture Kept 16 Slope 16",
     ),
     ("transmit.comp", transmit::Push::FIELDS, "Facet Light T F 4 4"),
     ("upsample.comp", upsample::Push::FIELDS, "T 4"),

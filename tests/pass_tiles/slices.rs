@@ -131,7 +131,7 @@ fn wrong_slices_are_noticed() {
         ("include/tile_slices.glsl", "int(roundEven(at))", "int(floor(at))", 0),
         ("include/tile_slices.glsl", "int(m) - 2) - at)", "int(m) - 1) - at)", 0),
         ("include/tile_slices.glsl", "1.38629436112", "1.2", 0),
-        ("include/tile_slices.glsl", "(within - before) * vec4", "within * vec4", 0),
+        ("include/tile_slices.glsl", "share = within - before", "share = within", 0),
         ("include/tile_slices.glsl", "clamp(boundary - i_boundary, 0, int(OPEN))", "1", 0),
         ("include/tile_slices.glsl", "here[j] / max(t[j], 1e-30)", "here[j]", 0),
         (

@@ -1,7 +1,7 @@
 //! Table `[lighting]`.
 
 use super::key::{Keys, keys, read_table};
-use super::spec::{Spec, choice, integer, number, pair};
+use super::spec::{Spec, choice, flag, integer, number, pair};
 use crate::error::Result;
 use crate::io::bounds::{Bounds, GREATEST_EXPONENT, SHARE};
 use crate::io::document::section::Section;
@@ -68,6 +68,9 @@ keys! { DIFFUSION: fn diffusion(s) -> DiffusionSettings { DiffusionSettings;
     /// Cycles of the multigrid solver of mode "diffusion". Each leaves about an eighth of the error
     /// of the one before.
     cycles ["diffusion_cycles"]: integer(2, 1, MAX_CYCLES);
+    /// Whether the light of mode "diffusion" changes inside of each blob, as it does in the clouds
+    /// around it.
+    slopes: flag(true);
 }}
 
 keys! { PAIRS: fn pairs(s) -> Pairs { Pairs;

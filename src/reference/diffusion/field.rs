@@ -18,6 +18,8 @@ pub struct DiffuseLight {
     spec: GridSpec,
     /// φ, W m⁻², and F along each axis, W m⁻².
     pub cells: Vec<[DVec3; 4]>,
+    /// U: fluence of suns and lamps, mean over the channels, W m⁻².
+    pub direct: Vec<f64>,
 }
 
 impl DiffuseLight {
@@ -52,17 +54,18 @@ impl DiffuseLight {
             sources.carried[c][axis] - of.reach(cells[c]) * slope
         };
         let of_cell = |c: usize| [phi[c], flux(c, 0), flux(c, 1), flux(c, 2)];
-        DiffuseLight { spec: *grid, cells: (0..cells.len()).map(of_cell).collect() }
+        let (cells, direct) = ((0..cells.len()).map(of_cell).collect(), sources.direct.clone());
+        DiffuseLight { spec: *grid, cells, direct }
     }
 
-    /// Returns φ and F at `p`: trilinear between the cells' centres, and beyond the outermost ones
-    /// as on them.
-    pub fn at(&self, p: DVec3) -> [DVec3; 4] {
+    /// Returns φ and F at `p`, and U: trilinear between the cells' centres, and beyond the
+    /// outermost ones as on them.
+    pub fn at(&self, p: DVec3) -> ([DVec3; 4], f64) {
         let n = self.spec.n_cells.as_usizevec3();
         let at = (p - self.spec.low) / self.spec.edges() - DVec3::splat(0.5);
         let at = at.max(DVec3::ZERO).min((n - 1).as_dvec3());
         let (base, part) = (at.floor().as_usizevec3(), at - at.floor());
-        let mut sum = [DVec3::ZERO; 4];
+        let (mut sum, mut direct) = ([DVec3::ZERO; 4], 0.0);
         for corner in 0..8usize {
             let (mut c, mut weight, mut stride) = (0, 1.0, 1);
             for axis in 0..3 {
@@ -74,16 +77,35 @@ impl DiffuseLight {
             for (sum, value) in sum.iter_mut().zip(self.cells[c]) {
                 *sum += weight * value;
             }
+            direct += weight * self.direct[c];
         }
-        sum
+        (sum, direct)
     }
 
     /// Returns the radiance that a blob at `p` scatters of the diffuse light along `outgoing`:
     /// ϖ'(φ + 3g' F·ω)/4π, at least 0.
     pub fn scattered(&self, law: &ScatterLaw, p: DVec3, outgoing: DVec3) -> DVec3 {
-        let [phi, x, y, z] = self.at(p);
+        let ([phi, x, y, z], _) = self.at(p);
         let along = x * outgoing.x + y * outgoing.y + z * outgoing.z;
         let g = law.phase.mean_cosine();
         law.albedo * (phi + 3.0 * g * along).max(DVec3::ZERO) / (4.0 * PI)
+    }
+
+    /// Returns the relative change of the radiance toward `outgoing` at `p`, 1/length: by
+    /// differences over a cell, of U for the radiance `once` of light that is scattered once.
+    pub fn slope(&self, law: &ScatterLaw, p: DVec3, outgoing: DVec3, once: DVec3) -> DVec3 {
+        let mean = |v: DVec3| v.element_sum() / 3.0;
+        let (first, more) = (mean(once), mean(self.scattered(law, p, outgoing)));
+        let edges = self.spec.edges();
+        let rise = |axis: usize| {
+            let half = 0.5 * edges[axis] * DVec3::AXES[axis];
+            let [after, prior] = [p + half, p - half]
+                .map(|q| (mean(self.scattered(law, q, outgoing)), self.at(q).1));
+            let both = after.1 + prior.1;
+            let of_first = if both > 0.0 { 2.0 * (after.1 - prior.1) / both } else { 0.0 };
+            (first * of_first + after.0 - prior.0) / edges[axis]
+        };
+        let all = first + more;
+        if all > 0.0 { DVec3::from([0, 1, 2].map(rise)) / all } else { DVec3::ZERO }
     }
 }

@@ -39,6 +39,8 @@ pub struct Sources {
     pub scattered: Vec<DVec3>,
     /// q = 3D Q1: D times three times the momentum that it keeps, a row an axis, W m⁻².
     pub carried: Vec<[DVec3; 3]>,
+    /// U: fluence of suns and lamps, mean over the channels, W m⁻².
+    pub direct: Vec<f64>,
 }
 
 impl Sources {
@@ -68,9 +70,10 @@ impl Sources {
             let carried = [0, 1, 2].map(|axis| {
                 3.0 * of.reach(extinction) * albedo * (g - f) * extinction * flux.col(axis)
             });
-            (albedo * (1.0 - f) * extinction * fluence, carried)
+            (albedo * (1.0 - f) * extinction * fluence, (carried, fluence.element_sum() / 3.0))
         });
-        let (scattered, carried) = found.into_iter().unzip();
-        Sources { scattered, carried }
+        let (scattered, rest): (Vec<DVec3>, Vec<_>) = found.into_iter().unzip();
+        let (carried, direct) = rest.into_iter().unzip();
+        Sources { scattered, carried, direct }
     }
 }

@@ -133,7 +133,7 @@ fn finer_grids_converge_at_second_order() {
         let light = DiffuseLight::of_fluence(&of, &grid, &cells, &sources, &phi);
         // Corners of cells on every grid, so that interpolation errs alike on all of them.
         [DVec3::ZERO, DVec3::new(-0.5, 0.0, 0.0), DVec3::new(0.5, -0.5, 0.5)]
-            .map(|p| light.at(p)[0].x)
+            .map(|p| light.at(p).0[0].x)
     };
     let found = [1, 2, 4, 8].map(at);
     let step = |a: [f64; 3], b: [f64; 3]| {
@@ -154,11 +154,16 @@ fn a_flux_by_hand() {
     // c: 1/1.5 + 1/0.5 + 1/0.5, halved.
     assert!((of.inverse_chord - 7.0 / 3.0).abs() < 1e-15);
     let phi = [1.0, 3.0, 5.0].map(DVec3::splat);
-    let nothing = Sources { scattered: vec![DVec3::ZERO; 3], carried: vec![[DVec3::ZERO; 3]; 3] };
+    let nothing = Sources {
+        scattered: vec![DVec3::ZERO; 3],
+        carried: vec![[DVec3::ZERO; 3]; 3],
+        direct: vec![1.0, 2.0, 4.0],
+    };
     let light = DiffuseLight::of_fluence(&of, &grid, &[0.0; 3], &nothing, &phi);
     for [_, x, y, z] in &light.cells {
         assert!((x.x + 4.0 * 3.0 / 7.0).abs() < 1e-14 && y.x == 0.0 && z.x == 0.0);
     }
-    assert_eq!(light.at(DVec3::new(0.5, 9.0, -9.0))[0], DVec3::splat(2.0));
-    assert_eq!(light.at(DVec3::new(9.0, 0.0, 0.0))[0], DVec3::splat(5.0));
+    assert_eq!(light.at(DVec3::new(0.5, 9.0, -9.0)).0[0], DVec3::splat(2.0));
+    assert_eq!(light.at(DVec3::new(9.0, 0.0, 0.0)).0[0], DVec3::splat(5.0));
+    assert_eq!(light.at(DVec3::new(1.0, 0.0, 0.0)).1, 3.0);
 }

@@ -6,7 +6,6 @@ use super::local_scene::LocalScene;
 use crate::error::Result;
 use crate::model::cloud::{Cloud, CloudSource, Group};
 use crate::model::frame_state::FrameState;
-use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::light::{Light, UP};
 use crate::model::medium::{MeanMedium, Medium, ScatterLaw};
 use crate::model::scene::{LightingMode, Scene};
@@ -49,6 +48,9 @@ pub struct FrameReference {
     pub irradiance: Vec<DVec3>,
     /// L1 of every facet toward the eye, and what a medium scatters, W m⁻² sr⁻¹.
     pub radiance: Vec<DVec3>,
+    /// Relative change of `radiance` at every facet, 1/length; empty unless light changes inside of
+    /// blobs.
+    pub slopes: Vec<DVec3>,
     /// I_i of every facet; empty unless the lighting mode is "two-reflection".
     pub indirect: Vec<DVec3>,
     /// L2 of every facet toward the eye; empty unless the lighting mode is "two-reflection".
@@ -146,6 +148,7 @@ impl FrameReference {
             facet_colors: vec![],
             irradiance: vec![],
             radiance: vec![],
+            slopes: vec![],
             indirect: vec![],
             second: vec![],
             second_error: vec![],
@@ -219,11 +222,15 @@ impl FrameReference {
             let once = reference::scatter::radiance(&law, p, eye, &taus, lights, has_sky);
             let outgoing = (eye - p).normalize_or(UP);
             let more = diffuse.as_ref().map(|light| light.scattered(&law, p, outgoing));
-            Some((fluence, once + more.unwrap_or_default()))
+            let slope = diffuse.as_ref().map(|light| light.slope(&law, p, outgoing, once));
+            Some((fluence, once + more.unwrap_or_default(), slope.unwrap_or_default()))
         });
+        let has_slopes = scene.lighting.has_slopes();
+        self.slopes = vec![DVec3::ZERO; if has_slopes { found.len() } else { 0 }];
         for (i, light) in found.into_iter().enumerate() {
-            if let Some((fluence, radiance)) = light {
+            if let Some((fluence, radiance, slope)) = light {
                 (self.irradiance[i], self.radiance[i]) = (fluence, radiance);
+                self.slopes.get_mut(i).into_iter().for_each(|s| *s = slope);
             }
         }
     }
@@ -303,6 +310,9 @@ impl FrameReference {
         let first = parallel_map(n, |i| area_scene.first(&of_surfaces[i].0, of_surfaces[i].1));
         let irradiance = parallel_map(n, |i| area_scene.irradiance(&of_surfaces[i].0));
         self.radiance.splice(0..0, first);
+        if !self.slopes.is_empty() {
+            self.slopes.splice(0..0, std::iter::repeat_n(DVec3::ZERO, flat.len()));
+        }
         self.irradiance.splice(0..0, irradiance);
         self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, flat.len()));
         self.facets.splice(0..0, flat);
@@ -320,48 +330,6 @@ impl FrameReference {
         });
         let shares = [0, 1, 2].map(|k| if all[k] > 0.0 { off[k] / all[k] } else { 0.0 });
         shares.into_iter().fold(0.0, f64::max)
-    }
-
-    /// Returns L1 + L2 of facet `i` toward the eye.
-    pub fn facet_radiance(&self, i: usize) -> DVec3 {
-        self.radiance[i] + self.second.get(i).copied().unwrap_or(DVec3::ZERO)
-    }
-
-    /// Returns the radiance that every particle is drawn with: that of its facet, or its own
-    /// colour if nothing is lit.
-    pub fn particle_radiance(&self, scene: &Scene) -> Vec<DVec3> {
-        if self.facets.is_empty() {
-            return self.colors.clone();
-        }
-        self.particle_facets(scene).into_iter().map(|i| self.facet_radiance(i as usize)).collect()
-    }
-
-    /// Returns the facet that every particle is lit as, whether or not the facets are lit.
-    pub fn particle_facets(&self, scene: &Scene) -> Vec<u32> {
-        let n_before = scene.n_solid_facets() as u32;
-        let n_blobs = self.blobs.len() as u32;
-        if !scene.groups_facets() {
-            return (n_before..n_before + n_blobs).collect();
-        }
-        let order = self.morton_order(scene, &reference::place::regions(&self.groups));
-        let mut found = vec![0; self.blobs.len()];
-        for (k, (first, end)) in (n_before..).zip(scene.facet_runs()) {
-            for place in first..end {
-                found[order[place as usize] as usize] = k;
-            }
-        }
-        found
-    }
-
-    /// Particles in Morton order, cloud by cloud.
-    fn morton_order(&self, scene: &Scene, i_cloud: &[u32]) -> Vec<u32> {
-        let (n_solids, origin) = (scene.n_solids() as u32, self.state.light_origin);
-        let bounds = scene.region_bounds(&self.groups, self.state.time_s, DEPOSIT_CUT_SIGMA);
-        let bounds: Vec<_> =
-            bounds.into_iter().map(|(low, high)| (low - origin, high - origin)).collect();
-        let positions: Vec<DVec3> = self.blobs.iter().map(|b| b.position).collect();
-        let regions: Vec<u32> = i_cloud.iter().map(|i| n_solids + i).collect();
-        reference::morton::order(&positions, &regions, &bounds)
     }
 }
 

@@ -17,6 +17,7 @@ mod limits;
 mod local_scene;
 mod model_light;
 mod model_picture;
+mod particle_light;
 mod pixels;
 mod progress;
 mod render;

@@ -84,7 +84,8 @@ pub fn render_lit_scene(
             errors: vec![ErrorEstimate::from_quadrature(error); pixels.at.len()],
         };
     }
-    let volume = Volume::new(&view, &frame.blobs, &radiance);
+    let shades = frame.particle_shades(scene);
+    let volume = Volume::new(&view, &frame.blobs, &radiance).shaded(shades.as_deref());
     let found = volume_at(&volume, pixels, &opaque, on_progress);
     RenderedPixels::from_volume(found, |_, p| ErrorEstimate::from_quadrature(p.error + light_error))
 }
@@ -105,9 +106,10 @@ fn drawn(
     on_progress: OnProgress,
 ) -> Vec<[f64; 4]> {
     let (blobs, order) = drawn_blobs(scene, frame);
-    let raster = raster(pixels);
+    let (raster, shades) = (raster(pixels), frame.particle_shades(scene));
     with_textures(scene, frame, view, |factor| {
-        let sprites = Sprites { blobs: &blobs, radiance, order: &order, factor };
+        let shades = shades.as_deref();
+        let sprites = Sprites { blobs: &blobs, radiance, order: &order, factor, shades };
         let on_row = |n| on_progress(RenderStage::Drawing, n);
         sprites::render_at(view, &raster, opaque, &sprites, &on_row)
     })

@@ -80,9 +80,10 @@ pub fn pixel_shares(
     let view = view(scene, frame);
     let (opaque, behind) = solid_shares(scene, frame, &view, pixels);
     let (blobs, order) = drawn_blobs(scene, frame);
-    let raster = raster(pixels);
+    let (raster, shades) = (raster(pixels), frame.particle_shades(scene));
     let found = with_textures(scene, frame, &view, |factor| {
-        let sprites = Sprites { blobs: &blobs, radiance: &[], order: &order, factor };
+        let shades = shades.as_deref();
+        let sprites = Sprites { blobs: &blobs, radiance: &[], order: &order, factor, shades };
         sprites::shares_at(&view, &raster, &opaque, &sprites)
     });
     let all = found.iter().zip(&opaque).zip(behind);
@@ -175,9 +176,10 @@ pub fn drawn_by_settings(
     }
     let order = set_order(scene, frame, &blobs);
     let radiance = emitters.of_particles(radiance);
-    let raster = raster(pixels);
+    let (raster, shades) = (raster(pixels), frame.particle_shades(scene));
     with_textures(scene, frame, &view, |factor| {
-        let sprites = Sprites { blobs: &blobs, radiance: &radiance, order: &order, factor };
+        let shades = shades.as_deref();
+        let sprites = Sprites { blobs: &blobs, radiance: &radiance, order: &order, factor, shades };
         sprites::render_over_at(&view, &raster, &opaque, &sprites, &rounding)
     })
 }

@@ -1,12 +1,10 @@
 //! Integration along one ray through overlapping blobs, piece by piece: the part with a closed form
 //! in closed form, the rest by Gauss–Kronrod.
 
-use std::f64::consts::FRAC_1_SQRT_2;
-
 use glam::DVec3;
-use libm::erfc;
 
 use crate::model::cloud::SQRT_TAU;
+use crate::reference::shade::{SeenLight, below};
 
 /// Greatest length of a piece for the rules, σ of its narrowest blob. Over 3 σ the rule of 7 has
 /// three points for each bend of a Gaussian, so it cannot miss one.
@@ -34,6 +32,8 @@ pub(super) struct RayBlob {
     pub depth: f64,
     /// Radiance of the blob.
     pub radiance: DVec3,
+    /// Factor on it along the ray.
+    pub light: SeenLight,
     /// Beginning of the blob: less than `OMITTED` of optical depth lies before it, all blobs
     /// together.
     pub from: f64,
@@ -60,8 +60,14 @@ struct Active {
     below: f64,
     /// Optical depth within the piece.
     tau: f64,
-    /// Its radiance minus the piece's mean.
-    excess: DVec3,
+    /// Greatest difference of its radiance from the piece's mean, greatest channel.
+    excess: f64,
+}
+
+impl RayBlob {
+    fn radiance_at(&self, z: f64) -> DVec3 {
+        self.light.at((z - self.center) / self.width) * self.radiance
+    }
 }
 
 /// Integrator with scratch memory that rays share.
@@ -70,6 +76,8 @@ pub(super) struct RayIntegrator {
     /// Blobs of the pieces from the whole ray down to the current one, one list after the other.
     lists: Vec<usize>,
     active: Vec<Active>,
+    /// The radiance that a piece has in closed form.
+    mean: DVec3,
 }
 
 /// A piece [a, b] of the range, `level` halvings down.
@@ -112,13 +120,13 @@ impl RayIntegrator {
                 self.lists.push(i);
             }
         }
-        let (mean, tau) = self.look(passed, a, b, own);
+        let tau = self.look(passed, a, b, own);
         let through = (-ray.tau).exp();
         let (tolerance, length) = accuracy;
         let share = tolerance * ((b - a) / length).max(LEAST_SHARE);
         // Greatest effect of the blobs' order within the piece.
-        let bound =
-            through * self.active.iter().map(|k| k.tau * k.excess.abs().max_element()).sum::<f64>();
+        let bound = through * self.active.iter().map(|k| k.tau * k.excess).sum::<f64>();
+        let mean = self.mean;
         let found = if bound <= share {
             Some((DVec3::ZERO, bound))
         } else {
@@ -152,9 +160,9 @@ impl RayIntegrator {
         self.lists.truncate(own);
     }
 
-    /// Fills `active` with the blobs listed from `first` on, over [a, b]. Returns their mean
-    /// radiance and optical depth.
-    fn look(&mut self, passed: &[RayBlob], a: f64, b: f64, first: usize) -> (DVec3, f64) {
+    /// Fills `active` with the blobs listed from `first` on, over [a, b], and `mean` with about
+    /// their mean radiance. Returns their optical depth.
+    fn look(&mut self, passed: &[RayBlob], a: f64, b: f64, first: usize) -> f64 {
         self.active.clear();
         let (mut tau, mut weighted) = (0.0, DVec3::ZERO);
         for &i in &self.lists[first..] {
@@ -163,13 +171,19 @@ impl RayIntegrator {
             let from = at(a);
             let own = p.depth * (at(b) - from);
             tau += own;
-            weighted += own * p.radiance;
+            weighted += own * p.radiance_at(0.5 * (a.max(p.from) + b.min(p.to)));
             // The rule's points count from the beginning of the blob or the piece.
-            self.active.push(Active { i, below: from, tau: own, excess: p.radiance });
+            self.active.push(Active { i, below: from, tau: own, excess: 0.0 });
         }
         let mean = if tau > 0.0 { weighted / tau } else { DVec3::ZERO };
-        self.active.iter_mut().for_each(|k| k.excess -= mean);
-        (mean, tau)
+        for k in &mut self.active {
+            // Light is greatest or least at an end: it is linear, or 0.
+            let p = &passed[k.i];
+            let excess = |z: f64| (p.radiance_at(z) - mean).abs().max_element();
+            k.excess = excess(a.max(p.from)).max(excess(b.min(p.to)));
+        }
+        self.mean = mean;
+        tau
     }
 
     /// Removes faint blobs from `active` and returns their greatest effect: as light their share of
@@ -178,7 +192,7 @@ impl RayIntegrator {
         let faint = SHARE_OF_FAINT * share / self.active.len().max(1) as f64;
         let mut left_out = 0.0;
         self.active.retain(|k| {
-            let most = k.tau * (through * k.excess.abs().max_element() + bound);
+            let most = k.tau * (through * k.excess + bound);
             let is_faint = most <= faint;
             left_out += if is_faint { most } else { 0.0 };
             !is_faint
@@ -214,17 +228,13 @@ impl RayIntegrator {
             let x = (z.min(p.to) - p.center) / p.width;
             tau += p.depth * (below(x) - k.below);
             if z < p.to {
-                sum += p.depth / (SQRT_TAU * p.width) * (-0.5 * x * x).exp() * k.excess;
+                sum += p.depth / (SQRT_TAU * p.width)
+                    * (-0.5 * x * x).exp()
+                    * (p.radiance_at(z) - self.mean);
             }
         }
         (-tau).exp() * sum
     }
-}
-
-/// Returns the share of the unit normal distribution below `x`, accurate where it is small, in
-/// front of a dense blob.
-fn below(x: f64) -> f64 {
-    0.5 * erfc(-x * FRAC_1_SQRT_2)
 }
 
 /// Gauss–Kronrod (7, 15) as in QUADPACK (Piessens et al. 1983), dqk15: positive nodes from the

@@ -86,6 +86,7 @@ pub fn metric_name(metric: Metric) -> &'static str {
         Metric::Rmse => "RMSE",
         Metric::Max => "greatest difference",
         Metric::RelMse => "relMSE",
+        Metric::Cloud => "RMS of cloud",
     }
 }
 
@@ -96,7 +97,7 @@ pub fn time_of(study: &Study, configuration: &Configuration) -> Option<Figure> {
 
 /// Returns the error that a study compares, by its metric.
 pub fn error_of(study: &Study, configuration: &Configuration) -> Option<Figure> {
-    configuration.error.map(|error| study.metric.of(&error))
+    configuration.error.and_then(|error| study.metric.of(&error))
 }
 
 /// Numbers the configurations on the front from 1, the fastest first.

@@ -89,6 +89,7 @@ fn configurations(study: &Study) -> Markup {
             figure(c.error.map(|e| e.rmse)),
             value(c.error.map(|e| e.max)),
             value(c.error.map(|e| e.relmse)),
+            figure(c.error.and_then(|e| e.cloud)),
             text(&c.failure.clone().unwrap_or_else(|| remark(c.error).to_owned())),
         ]
     };
@@ -103,6 +104,7 @@ fn configurations(study: &Study) -> Markup {
         "RMSE",
         "max",
         "relMSE",
+        "of cloud",
         "remark",
     ];
     let decides = if study.time == TimeKind::Gpu { "GPU time" } else { "frame time" };

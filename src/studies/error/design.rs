@@ -37,7 +37,7 @@ pub fn settings(axes: &[Axis], design: Design) -> Vec<Vec<Setting>> {
 /// If two settings have the same key, the later one replaces the earlier if it saves more. Squared
 /// errors are assumed to add up, because the errors of different settings are independent.
 pub fn combinations(measured: &[Configuration], metric: Metric) -> Vec<Vec<Setting>> {
-    let error = |c: &Configuration| Some(metric.of(&c.error?).value);
+    let error = |c: &Configuration| Some(metric.of(&c.error?)?.value);
     let Some(base) = measured.first().and_then(error) else { return Vec::new() };
     let mut worth: Vec<(f64, f64, &Setting)> = Vec::new();
     for c in &measured[1..] {
@@ -74,7 +74,7 @@ pub fn best_within(
     value: f64,
 ) -> Best {
     let limited_and_free = |c: &Configuration| {
-        let figures = [c.ms(time)?, metric.of(&c.error?)].map(|f: Figure| f.value);
+        let figures = [c.ms(time)?, metric.of(&c.error?)?].map(|f: Figure| f.value);
         Some(if budget == Budget::Ms { figures } else { [figures[1], figures[0]] })
     };
     let all = configurations.iter().enumerate();
@@ -104,8 +104,13 @@ mod tests {
             high: Some(value + spread),
         };
         let settings: Vec<Setting> = if text.is_empty() { vec![] } else { vec![setting(text)] };
-        let error =
-            PictureError { rmse: figure(error, 0.0), max: error, relmse: error, is_resolved: true };
+        let error = PictureError {
+            rmse: figure(error, 0.0),
+            max: error,
+            relmse: error,
+            is_resolved: true,
+            cloud: None,
+        };
         Configuration {
             by_base: Some(figure(ratio, 0.05)),
             error: Some(error),

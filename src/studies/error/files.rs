@@ -143,6 +143,9 @@ pub struct CsvRow {
     rmse_high: Option<f64>,
     max: Option<f64>,
     relmse: Option<f64>,
+    cloud: Option<f64>,
+    cloud_low: Option<f64>,
+    cloud_high: Option<f64>,
     reference_resolves: Option<bool>,
     turns: usize,
     failure: Option<String>,
@@ -156,6 +159,7 @@ pub fn csv_row(c: &Configuration) -> CsvRow {
     let [frame_ms, frame_ms_low, frame_ms_high] = fields(c.frame_ms);
     let [by_base, by_base_low, by_base_high] = fields(c.by_base);
     let [rmse, rmse_low, rmse_high] = fields(c.error.map(|e| e.rmse));
+    let [cloud, cloud_low, cloud_high] = fields(c.error.and_then(|e| e.cloud));
     CsvRow {
         name: c.name.clone(),
         front: c.front,
@@ -173,6 +177,9 @@ pub fn csv_row(c: &Configuration) -> CsvRow {
         rmse_high,
         max: c.error.map(|e| e.max),
         relmse: c.error.map(|e| e.relmse),
+        cloud,
+        cloud_low,
+        cloud_high,
         reference_resolves: c.error.map(|e| e.is_resolved),
         turns: c.n_turns,
         failure: c.failure.clone(),

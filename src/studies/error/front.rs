@@ -17,6 +17,8 @@ pub enum Metric {
     Max,
     /// Mean square relative to the reference's
     RelMse,
+    /// Root mean square over the pixels that clouds cover, by their mean; against "transport"
+    Cloud,
 }
 
 impl Metric {
@@ -26,15 +28,17 @@ impl Metric {
             Metric::Rmse => "rmse",
             Metric::Max => "max",
             Metric::RelMse => "relmse",
+            Metric::Cloud => "cloud",
         }
     }
 
-    /// Returns this error of a picture; only the RMSE has an interval.
-    pub fn of(self, error: &PictureError) -> Figure {
+    /// Returns this error of a picture, if it has one. "max" and "relmse" have no interval.
+    pub fn of(self, error: &PictureError) -> Option<Figure> {
         match self {
-            Metric::Rmse => error.rmse,
-            Metric::Max => Figure::alone(error.max),
-            Metric::RelMse => Figure::alone(error.relmse),
+            Metric::Rmse => Some(error.rmse),
+            Metric::Max => Some(Figure::alone(error.max)),
+            Metric::RelMse => Some(Figure::alone(error.relmse)),
+            Metric::Cloud => error.cloud,
         }
     }
 }

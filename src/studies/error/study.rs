@@ -11,7 +11,8 @@ use super::records::Configuration;
 use crate::error::{Error, Result};
 use crate::model::scene::Scene;
 use crate::reference::picture::{Pixels, Reference};
-use crate::studies::picture_error::{picture_error, sampled};
+use crate::studies::cloud_error::CloudPixels;
+use crate::studies::picture_error::{PictureError, picture_error, sampled};
 use crate::timing::names::Setting;
 use crate::timing::sweep::Axis;
 
@@ -101,6 +102,8 @@ pub struct ErrorStudy<'a> {
     pub reference: &'a Reference,
     /// The pixels of the reference.
     pub pixels: &'a Pixels,
+    /// Those of cloud, where their error is wanted.
+    pub cloud: Option<&'a CloudPixels>,
     /// Ends the study early once it is set.
     pub stop: &'a AtomicBool,
 }
@@ -220,7 +223,10 @@ impl ErrorStudy<'_> {
             Ok(rgba) => {
                 let Reference { rgba: reference, own_error, .. } = self.reference;
                 let drawn = sampled(self.pixels, &rgba);
-                configuration.error = picture_error(self.pixels, &drawn, reference, *own_error);
+                let cloud =
+                    |cloud: &CloudPixels| cloud.error(self.pixels, &drawn, reference, *own_error);
+                configuration.error = picture_error(self.pixels, &drawn, reference, *own_error)
+                    .map(|error| PictureError { cloud: self.cloud.and_then(cloud), ..error });
                 if configuration.error.is_none() {
                     // All times and errors are relative to the unchanged scene.
                     if i == 0 {
@@ -250,7 +256,8 @@ impl StudyResults {
             c.by_base = if time == TimeKind::Gpu { gpu } else { frame }.map(|t| t.by_base);
             c.n_turns = n_blocks(&self.blocks, i);
         }
-        let cost = |c: &Configuration| Some(Cost { time: c.by_base?, error: metric.of(&c.error?) });
+        let cost =
+            |c: &Configuration| Some(Cost { time: c.by_base?, error: metric.of(&c.error?)? });
         let costs: Vec<Option<Cost>> = self.configurations.iter().map(cost).collect();
         for (c, front) in self.configurations.iter_mut().zip(places(&costs)) {
             c.front = front;

@@ -1,0 +1,64 @@
+//! The light that every particle of a frame is drawn with.
+
+use glam::DVec3;
+
+use super::frame::FrameReference;
+use crate::model::grid::DEPOSIT_CUT_SIGMA;
+use crate::model::scene::Scene;
+use crate::model::shade::Shade;
+use crate::reference::{self, Blob};
+
+impl FrameReference {
+    /// Returns L1 + L2 of facet `i` toward the eye.
+    pub fn facet_radiance(&self, i: usize) -> DVec3 {
+        self.radiance[i] + self.second.get(i).copied().unwrap_or(DVec3::ZERO)
+    }
+
+    /// Returns the radiance that every particle is drawn with: that of its facet, or its own
+    /// colour if nothing is lit.
+    pub fn particle_radiance(&self, scene: &Scene) -> Vec<DVec3> {
+        if self.facets.is_empty() {
+            return self.colors.clone();
+        }
+        self.particle_facets(scene).into_iter().map(|i| self.facet_radiance(i as usize)).collect()
+    }
+
+    /// Returns the light inside of every particle; `None` where it is the same throughout.
+    pub fn particle_shades(&self, scene: &Scene) -> Option<Vec<Shade>> {
+        let shade = |(blob, i): (&Blob, u32)| {
+            let (slope, facet) = (self.slopes[i as usize], self.facets[i as usize].position);
+            let apart = if scene.groups_facets() { blob.position - facet } else { DVec3::ZERO };
+            Shade::new(slope, apart, blob.sigma * blob.axes())
+        };
+        let shades = || self.blobs.iter().zip(self.particle_facets(scene)).map(shade).collect();
+        (!self.slopes.is_empty()).then(shades)
+    }
+
+    /// Returns the facet that every particle is lit as, whether or not the facets are lit.
+    pub fn particle_facets(&self, scene: &Scene) -> Vec<u32> {
+        let n_before = scene.n_solid_facets() as u32;
+        let n_blobs = self.blobs.len() as u32;
+        if !scene.groups_facets() {
+            return (n_before..n_before + n_blobs).collect();
+        }
+        let order = self.morton_order(scene, &reference::place::regions(&self.groups));
+        let mut found = vec![0; self.blobs.len()];
+        for (k, (first, end)) in (n_before..).zip(scene.facet_runs()) {
+            for place in first..end {
+                found[order[place as usize] as usize] = k;
+            }
+        }
+        found
+    }
+
+    /// Particles in Morton order, cloud by cloud.
+    pub(super) fn morton_order(&self, scene: &Scene, i_cloud: &[u32]) -> Vec<u32> {
+        let (n_solids, origin) = (scene.n_solids() as u32, self.state.light_origin);
+        let bounds = scene.region_bounds(&self.groups, self.state.time_s, DEPOSIT_CUT_SIGMA);
+        let bounds: Vec<_> =
+            bounds.into_iter().map(|(low, high)| (low - origin, high - origin)).collect();
+        let positions: Vec<DVec3> = self.blobs.iter().map(|b| b.position).collect();
+        let regions: Vec<u32> = i_cloud.iter().map(|i| n_solids + i).collect();
+        reference::morton::order(&positions, &regions, &bounds)
+    }
+}

@@ -1,0 +1,146 @@
+//! The light inside of blobs (model.md §18): whole pictures against the f64 reference by every way
+//! of drawing, and wrong shaders are found.
+
+#[path = "harness/bounded.rs"]
+mod bounded;
+mod harness;
+#[path = "harness/mixed.rs"]
+mod mixed;
+#[path = "harness/picture.rs"]
+mod picture;
+#[path = "harness/scenery.rs"]
+mod scenery;
+#[path = "harness/sheets.rs"]
+mod sheets;
+#[path = "harness/tiled.rs"]
+mod tiled;
+
+use bounded::{Random, greatest_ratio};
+use harness::{Gpu, assert_within};
+use mixed::{cases, mixed};
+use nimbus::frame::saturation_bound;
+use nimbus::gpu::Compiler;
+use nimbus::layout::facet::{LitRecord, SlopeRecord};
+use nimbus::model::film::FilmFormat;
+use nimbus::passes;
+use nimbus::passes::tiles::Sharing;
+use picture::{FORMATS, Picture, Tiled, Way};
+
+/// Gives every facet a slope: some slight, some steeper than blobs take.
+fn shaded(picture: &Picture) -> Picture {
+    let mut random = Random(5);
+    let n = picture.lit.as_ref().map_or(picture.placed.len(), Vec::len);
+    let white = LitRecord { first: [0.9, 0.8, 1.0], ..LitRecord::default() };
+    let lit = picture.lit.clone().unwrap_or_else(|| vec![white; n]);
+    let slope = |i: usize| {
+        let most = 10f32.powf(random.within(-2.0, 0.7));
+        let relative = [0, 1, 2].map(|_| most * random.within(-1.0, 1.0));
+        let of_facet = |k: u32| k as usize == i;
+        let member =
+            picture.i_facet.as_ref().and_then(|all| all.iter().copied().position(of_facet));
+        let position = picture.placed.get(member.unwrap_or(0)).map_or([0.0; 3], |p| p.position);
+        SlopeRecord { relative, position, ..SlopeRecord::default() }
+    };
+    let slopes = Some((0..n).map(slope).collect());
+    Picture { lit: Some(lit), slopes, ..picture.clone() }
+}
+
+/// Pictures of all kinds, composed one after the other and by slices.
+fn pictures() -> Vec<(String, Picture)> {
+    let mut all: Vec<(String, Picture)> =
+        cases().into_iter().map(|(what, picture, _)| (what, shaded(&picture))).collect();
+    let mut flat = mixed(60, 8, 2.0, -1.0);
+    for (k, particle) in flat.particles.iter_mut().enumerate() {
+        particle.aspect = [1.0, 0.2, 3.0][k % 3];
+    }
+    all.push(("ellipsoids".to_owned(), shaded(&flat)));
+    all.push(("wide".to_owned(), shaded(&mixed(150, 2, 12.0, -1.0))));
+    let sliced = |picture: &Picture| shaded(&picture.clone().sliced(0.7));
+    all.push(("slices".to_owned(), sliced(&mixed(100, 3, 3.0, -1.0))));
+    all.push(("slices of ellipsoids".to_owned(), sliced(&flat)));
+    let over = cases().into_iter().find(|(what, ..)| what == "over surfaces");
+    let (_, over, _) = over.expect("a picture over surfaces");
+    all.push(("slices over surfaces".to_owned(), sliced(&over)));
+    let scenery = over.scenery.clone();
+    let flat_over = Picture { scenery, ..flat };
+    all.push(("slices of ellipsoids over surfaces".to_owned(), sliced(&flat_over)));
+    all
+}
+
+fn tiled(gpu: &Gpu, format: FilmFormat) -> Tiled {
+    let invocations = passes::tiles::invocations(gpu.device.limits());
+    let saturated = saturation_bound(format);
+    Tiled { invocations, sharing: None, max_pairs: None, max_tiles: None, saturated }
+}
+
+#[test]
+fn every_way_draws_the_light_inside_of_blobs() {
+    let mut gpu = Gpu::new();
+    for (what, picture) in pictures() {
+        for (target, format) in FORMATS {
+            let tiled = tiled(&gpu, format);
+            let (truths, bounds) = picture.tiled_truth(format, tiled.saturated);
+            let values = picture.draw_by(&mut gpu, None, target, Way::Tiles(tiled));
+            println!("{what}, {format:?}: {:.3}", greatest_ratio(&values, &truths, &bounds));
+            assert_within(&format!("{what}, {format:?}, tiles"), &values, &truths, &bounds);
+            let barriers = Tiled { sharing: Some(Sharing::Barriers), ..tiled };
+            let alike = picture.draw_by(&mut gpu, None, target, Way::Tiles(barriers));
+            assert!(values == alike, "{what}, {format:?}: without subgroups");
+            if picture.view.slice > 0.0 {
+                continue;
+            }
+            let values = picture.draw(&mut gpu, None, target);
+            let (truths, bounds) = picture.truth(format);
+            assert_within(&format!("{what}, {format:?}, sprites"), &values, &truths, &bounds);
+            let way = Way::Chunks(3, tiled.saturated);
+            let values = picture.draw_by(&mut gpu, None, target, way);
+            let (truths, bounds) = picture.chunked_truth(format, tiled.saturated);
+            assert_within(&format!("{what}, {format:?}, chunks"), &values, &truths, &bounds);
+        }
+    }
+}
+
+#[test]
+fn wrong_shaders_are_found() {
+    let mut gpu = Gpu::new();
+    let all = pictures();
+    let named = |name: &str| {
+        let (_, picture) = all.iter().find(|(what, _)| what == name).expect("a picture");
+        picture.clone()
+    };
+    let thin = "wide";
+    let (shade, sliced) = ("include/shade.glsl", "include/tile_slices.glsl");
+    for (name, by_tiles, file, from, to) in [
+        (thin, true, shade, "STEEPEST / steep", "1.0"),
+        (thin, true, shade, "-along * sigma", "along * sigma"),
+        (thin, true, shade, "along / white_square * w.xy", "0.0"),
+        ("shared facets", true, shade, "slope / base", "slope"),
+        ("shared facets", false, shade, "MOST_OF_FACET);", "9.0);"),
+        ("ellipsoids", true, shade, "* inversesqrt(white_square)", ""),
+        ("ellipsoids", false, shade, "w += (shape.inverse - 1.0)", "w += 0.0"),
+        ("ellipsoids", false, shade, "steep += (shape.square - 1.0)", "steep += 0.0"),
+        (thin, true, "include/seen.glsl", "-0.01546", "-0.012"),
+        (thin, false, "include/seen.glsl", "DEEPEST_SEEN = 8.0", "DEEPEST_SEEN = 1.0"),
+        (thin, true, "include/tile_thin.glsl", "shade.y * (y", "shade.y * (-y"),
+        (thin, false, "sprites.frag", "vec3(delta, seen)", "vec3(delta, 0.0)"),
+        ("slices", true, sliced, "- nearer * middle", ""),
+        ("slices", true, sliced, "exp(-0.5 * min", "exp(-5.0 * min"),
+        ("slices over surfaces", true, sliced, "density_here = density(to_wall)", ""),
+        ("slices of ellipsoids", true, sliced, "density_here = density(u)", "density_here = 0.0"),
+    ] {
+        let picture = named(name);
+        let (target, format) = FORMATS[2];
+        let mut sources = passes::sources();
+        assert!(sources.replace(file, from, to), "{from}");
+        let compiler = Compiler::new(sources, None).expect("shaderc");
+        let tiled = tiled(&gpu, format);
+        let (way, (truths, bounds)) = match by_tiles {
+            true => (Way::Tiles(tiled), picture.tiled_truth(format, tiled.saturated)),
+            false => (Way::Sprites, picture.truth(format)),
+        };
+        let values = picture.draw_by(&mut gpu, Some(&compiler), target, way);
+        let ratio = greatest_ratio(&values, &truths, &bounds);
+        println!("{name}, {from} as {to}: {ratio:.1}");
+        assert!(ratio > 1.0, "{name}: {from} as {to}");
+    }
+}

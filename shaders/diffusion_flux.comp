@@ -16,8 +16,11 @@ layout(push_constant) uniform Push {
     float inverse_chord;
 } push;
 FLOATS(0, density)
-READS(1, vec4, phi)
+// Texels, which llvmpipe fetches for all invocations at once.
+TEXELS(1, phi)
 UPDATES(2, vec4, field)
+
+vec3 phi_at(int c) { return uintBitsToFloat(TEXEL(phi, c).rgb); }
 
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
@@ -26,12 +29,12 @@ void main() {
         ivec3 at = place_of(level, i), stride = strides_of(level);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 reach = 1.0 / (3.0 * FLOAT(density, c) * push.kept + push.inverse_chord);
-        field[4 * c].rgb = phi[c].rgb;
+        field[4 * c].rgb = phi_at(c);
         for (int axis = 0; axis < 3; ++axis) {
             int after = at[axis] + 1 < int(level.n_cells[axis]) ? c + stride[axis] : c;
             int prior = at[axis] > 0 ? c - stride[axis] : c;
             int n_steps = (after - prior) / stride[axis];
-            vec3 rise = phi[after].rgb - phi[prior].rgb;
+            vec3 rise = phi_at(after) - phi_at(prior);
             vec3 slope = n_steps > 0 ? rise / (float(n_steps) * edges[axis]) : vec3(0.0);
             field[4 * c + 1 + axis].rgb -= reach * slope;
         }

@@ -20,11 +20,14 @@ layout(push_constant) uniform Push {
 } push;
 READS(0, Light, lights)
 FLOATS(1, density)
-READS(2, vec4, field)
+// Texels, which llvmpipe fetches for all invocations at once.
+TEXELS(2, field)
 // [set][cell]
 WRITES(3, vec4, operators)
 WRITES(4, vec4, phi)
 WRITES(5, vec4, source)
+
+vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
 
 vec3 reach_of(int c) {
     return 1.0 / (3.0 * FLOAT(density, c) * push.kept + push.inverse_chord);
@@ -48,20 +51,20 @@ void main() {
         ivec3 at = place_of(level, i), stride = strides_of(level);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 own = reach_of(c);
-        vec3 sink = FLOAT(density, c) * push.absorbed, right = field[4 * c].rgb;
+        vec3 sink = FLOAT(density, c) * push.absorbed, right = field_at(4 * c);
         vec3 prior_w = vec3(0.0);
         // w along each axis, by channel.
         vec3 next[3];
         for (int axis = 0; axis < 3; ++axis) {
             float inverse = 1.0 / edges[axis];
             vec3 through = inverse / (2.0 + 0.5 * edges[axis] / own);
-            vec3 carried = field[4 * c + 1 + axis].rgb;
+            vec3 carried = field_at(4 * c + 1 + axis);
             next[axis] = vec3(0.0);
             if (at[axis] + 1 < int(level.n_cells[axis])) {
                 int after = c + stride[axis];
                 vec3 other = reach_of(after);
                 next[axis] = 2.0 * own * other / (own + other) * inverse * inverse;
-                right -= 0.5 * inverse * (carried + field[4 * after + 1 + axis].rgb);
+                right -= 0.5 * inverse * (carried + field_at(4 * after + 1 + axis));
             } else {
                 sink += through;
                 right += 4.0 * through * of_sky(axis == 1 ? 1.0 : 0.5);
@@ -70,7 +73,7 @@ void main() {
                 int prior = c - stride[axis];
                 vec3 other = reach_of(prior);
                 prior_w += 2.0 * own * other / (own + other) * inverse * inverse;
-                right += 0.5 * inverse * (carried + field[4 * prior + 1 + axis].rgb);
+                right += 0.5 * inverse * (carried + field_at(4 * prior + 1 + axis));
             } else {
                 sink += through;
                 right += 4.0 * through * of_sky(axis == 1 ? 0.0 : 0.5);

@@ -38,7 +38,8 @@ UPDATES(5, Lit, lit)
 READS(6, Medium, media)
 // phi beside U, and the flux along each axis, by cell.
 #if DIFFUSE
-READS(7, vec4, field)
+// Texels, which llvmpipe fetches for all invocations at once.
+TEXELS(7, field)
 #endif
 #if SLOPES
 WRITES(8, Slope, slopes)
@@ -81,6 +82,8 @@ vec3 of_sky(Medium m, Law law, float up, float constant, float tau) {
 }
 
 #if DIFFUSE
+vec4 field_at(int k) { return uintBitsToFloat(TEXEL(field, k)); }
+
 // Returns phi + 3 g F.w, at least 0, and U at p: trilinear between the cells' centres and beyond
 // the outermost as on them.
 vec4 diffuse_along(vec3 p, vec3 w, float g) {
@@ -95,8 +98,8 @@ vec4 diffuse_along(vec3 p, vec3 w, float g) {
         vec3 share = mix(1.0 - part, part, equal(to, ivec3(1)));
         ivec3 i = min(base + to, n - 1);
         int c = 4 * (i.x + n.x * (i.y + n.y * i.z));
-        vec3 along = w.x * field[c + 1].rgb + w.y * field[c + 2].rgb + w.z * field[c + 3].rgb;
-        sum += share.x * share.y * share.z * (field[c] + vec4(3.0 * g * along, 0.0));
+        vec3 along = w.x * field_at(c + 1).rgb + w.y * field_at(c + 2).rgb + w.z * field_at(c + 3).rgb;
+        sum += share.x * share.y * share.z * (field_at(c) + vec4(3.0 * g * along, 0.0));
     }
     return vec4(max(sum.rgb, vec3(0.0)), sum.w);
 }

@@ -68,7 +68,7 @@ fn wrong_shaders_are_found() {
         ("boxes", "diffusion", "diffusion_sweep.comp", "(at) >> halved()", "(at)"),
         ("boxes", "diffusion", "include/diffusion.glsl", "SHORT_STEP = 0.6", "SHORT_STEP = 0.5"),
         ("boxes", "diffusion", "diffusion_flux.comp", "-= reach * slope", "+= reach * slope"),
-        ("boxes", "diffusion", "scatter.comp", "w.y * field[c + 2]", "w.y * field[c + 3]"),
+        ("boxes", "diffusion", "scatter.comp", "w.y * field_at(c + 2)", "w.y * field_at(c + 3)"),
     ];
     media::check_found(&Gpu::new(), &wrong);
 }

@@ -55,7 +55,7 @@ buffers! {
             n_if(is_medium(scene), scene.clouds.len() as u64), "scatter.media";
         /// Fluence and flux of diffuse light by cell, and fluence of suns and lamps.
         field: Buffer => [[f32; 4]; 4], n_if(has_diffusion(scene), n_cells(scene)),
-            "diffusion.field";
+            "diffusion.field", Texels;
         regions: StagedBuffer => RegionRecord, scene.n_regions() as u64, "first.regions", Texels;
         /// Lobes by material, then the vectors of the basis, N_NODES numbers each.
         table: StagedBuffer => f32, n_table_rows(scene) * N_NODES as u64, "first.table", Floats;

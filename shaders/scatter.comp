@@ -98,7 +98,8 @@ vec4 diffuse_along(vec3 p, vec3 w, float g) {
         vec3 share = mix(1.0 - part, part, equal(to, ivec3(1)));
         ivec3 i = min(base + to, n - 1);
         int c = 4 * (i.x + n.x * (i.y + n.y * i.z));
-        vec3 along = w.x * field_at(c + 1).rgb + w.y * field_at(c + 2).rgb + w.z * field_at(c + 3).rgb;
+        vec3 along =
+            w.x * field_at(c + 1).rgb + w.y * field_at(c + 2).rgb + w.z * field_at(c + 3).rgb;
         sum += share.x * share.y * share.z * (field_at(c) + vec4(3.0 * g * along, 0.0));
     }
     return vec4(max(sum.rgb, vec3(0.0)), sum.w);

@@ -57,6 +57,11 @@ fn right_pictures_of_all_kinds_pass() {
         ("ground", &["film.format='rgba8'", "lighting.gather='tree'"]),
         ("supercell", &["draw.smallest=1.0", "draw.threshold=1e-3"]),
         ("study-both", &["lighting.mode='none'"]),
+        ("study-both", &["lighting.mode='diffusion'", "draw.overlap='slices'"]),
+        ("cubes-554", &["lighting.mode='diffusion'", "lighting.facets_per_cloud=100"]),
+        // From the light that is kept.
+        ("cubes-554", &["lighting.mode='diffusion'", "draw.path='sprites'"]),
+        ("cubes-554", &["lighting.mode='diffusion'", "draw.cutoff=3.5"]),
         ("threads", &["film.format='rgba32f'", "draw.sort_bits=32"]),
         ("static", &["film.format='rgba32f'", "lighting.summation='pairwise'"]),
     ] {

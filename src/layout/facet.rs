@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::layout::record;
 use crate::model::material::Brdf;
+use crate::model::shade::FacetSlope;
 use crate::model::surface::Surface;
 use crate::model::terrain::{Terrain, TerrainFacet};
 
@@ -83,6 +84,14 @@ record! {
         position: [f32; 3],
         /// Padding.
         unused_too: u32,
+    }
+}
+
+impl SlopeRecord {
+    /// Returns what a device has written.
+    pub fn read(&self) -> FacetSlope {
+        let vector = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+        FacetSlope { relative: vector(self.relative), position: vector(self.position) }
     }
 }
 

@@ -14,6 +14,15 @@ pub const DEEPEST_SEEN: f64 = 8.0;
 /// e^{−τ Φ(z)} dΦ(z).
 pub const SEEN_BEFORE: [f64; 2] = [0.2943, -0.01546];
 
+/// Change of the light of a facet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FacetSlope {
+    /// Relative change per length.
+    pub relative: DVec3,
+    /// Place of the facet, relative to the lighting origin.
+    pub position: DVec3,
+}
+
 /// The light of a blob, as a factor on its facet's radiance: base (1 + slope·(x − p)), at least 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shade {

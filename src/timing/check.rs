@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::measure::figure::Figure;
 use crate::model::scene::Scene;
+use crate::model::shade::FacetSlope;
 
 /// The picture at the end of a block, as the device holds it.
 #[derive(Debug, Clone)]
@@ -26,6 +27,8 @@ pub struct DevicePicture {
     pub rgba: Vec<[f64; 4]>,
     /// First and second reflection of every facet, W m⁻² sr⁻¹; empty if nothing is lit.
     pub light: Vec<[[f32; 3]; 2]>,
+    /// Change of that inside of blobs, by facet; empty where there is none.
+    pub slopes: Vec<FacetSlope>,
 }
 
 /// The stages of pictures, checked with values at the limits of the accepted input.

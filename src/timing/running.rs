@@ -282,8 +282,10 @@ fn keep_drawn(
         LightingMode::None => vec![],
         _ => stage.renderer.facets(&stage.device)?.1.iter().map(|l| [l.first, l.second]).collect(),
     };
+    let slopes = stage.renderer.slopes(&stage.device)?.iter().map(|s| s.read()).collect();
     let (scene, loop_name, hash) = (stage.scene.clone(), of.name(), hash.to_owned());
-    let picture = DevicePicture { i_case, loop_name, hash, scene, i_frame, time_s, rgba, light };
+    let picture =
+        DevicePicture { i_case, loop_name, hash, scene, i_frame, time_s, rgba, light, slopes };
     lock(outcome).drawn.push(picture);
     Ok(())
 }

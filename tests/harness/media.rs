@@ -114,7 +114,7 @@ pub fn by_twin(scene: &Scene) -> Lit {
         of_solids,
         direct: frame.irradiance[n..].to_vec(),
         radiance: frame.radiance[n..].to_vec(),
-        slopes: frame.slopes.iter().skip(n).copied().collect(),
+        slopes: frame.slopes.iter().skip(n).map(|s| s.relative).collect(),
     }
 }
 

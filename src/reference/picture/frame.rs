@@ -9,6 +9,7 @@ use crate::model::frame_state::FrameState;
 use crate::model::light::{Light, UP};
 use crate::model::medium::{MeanMedium, Medium, ScatterLaw};
 use crate::model::scene::{LightingMode, Scene};
+use crate::model::shade::FacetSlope;
 use crate::model::surface::Surface;
 use crate::reference::area::adaptive::{Accuracy, Estimate};
 use crate::reference::area::{AreaScene, DiscFacet, Receiver};
@@ -48,9 +49,8 @@ pub struct FrameReference {
     pub irradiance: Vec<DVec3>,
     /// L1 of every facet toward the eye, and what a medium scatters, W m⁻² sr⁻¹.
     pub radiance: Vec<DVec3>,
-    /// Relative change of `radiance` at every facet, 1/length; empty unless light changes inside of
-    /// blobs.
-    pub slopes: Vec<DVec3>,
+    /// Change of `radiance` at every facet; empty unless light changes inside of blobs.
+    pub slopes: Vec<FacetSlope>,
     /// I_i of every facet; empty unless the lighting mode is "two-reflection".
     pub indirect: Vec<DVec3>,
     /// L2 of every facet toward the eye; empty unless the lighting mode is "two-reflection".
@@ -225,13 +225,17 @@ impl FrameReference {
             let slope = diffuse.as_ref().map(|light| light.slope(&law, p, outgoing, once));
             Some((fluence, once + more.unwrap_or_default(), slope.unwrap_or_default()))
         });
-        let has_slopes = scene.lighting.has_slopes();
-        self.slopes = vec![DVec3::ZERO; if has_slopes { found.len() } else { 0 }];
-        for (i, light) in found.into_iter().enumerate() {
-            if let Some((fluence, radiance, slope)) = light {
+        for (i, light) in found.iter().enumerate() {
+            if let Some((fluence, radiance, _)) = *light {
                 (self.irradiance[i], self.radiance[i]) = (fluence, radiance);
-                self.slopes.get_mut(i).into_iter().for_each(|s| *s = slope);
             }
+        }
+        if scene.lighting.has_slopes() {
+            let slope = |(facet, light): (&Facet, &Option<(DVec3, DVec3, DVec3)>)| FacetSlope {
+                relative: light.map_or(DVec3::ZERO, |(.., slope)| slope),
+                position: facet.position,
+            };
+            self.slopes = self.facets.iter().zip(&found).map(slope).collect();
         }
     }
 
@@ -311,7 +315,8 @@ impl FrameReference {
         let irradiance = parallel_map(n, |i| area_scene.irradiance(&of_surfaces[i].0));
         self.radiance.splice(0..0, first);
         if !self.slopes.is_empty() {
-            self.slopes.splice(0..0, std::iter::repeat_n(DVec3::ZERO, flat.len()));
+            let even = |f: &Facet| FacetSlope { relative: DVec3::ZERO, position: f.position };
+            self.slopes.splice(0..0, flat.iter().map(even));
         }
         self.irradiance.splice(0..0, irradiance);
         self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, flat.len()));

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::frame::FrameReference;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::scene::Scene;
-use crate::model::shade::Shade;
+use crate::model::shade::{FacetSlope, Shade};
 use crate::reference::{self, Blob};
 
 impl FrameReference {
@@ -26,9 +26,9 @@ impl FrameReference {
     /// Returns the light inside of every particle; `None` where it is the same throughout.
     pub fn particle_shades(&self, scene: &Scene) -> Option<Vec<Shade>> {
         let shade = |(blob, i): (&Blob, u32)| {
-            let (slope, facet) = (self.slopes[i as usize], self.facets[i as usize].position);
-            let apart = if scene.groups_facets() { blob.position - facet } else { DVec3::ZERO };
-            Shade::new(slope, apart, blob.sigma * blob.axes())
+            let FacetSlope { relative, position } = self.slopes[i as usize];
+            let apart = if scene.groups_facets() { blob.position - position } else { DVec3::ZERO };
+            Shade::new(relative, apart, blob.sigma * blob.axes())
         };
         let shades = || self.blobs.iter().zip(self.particle_facets(scene)).map(shade).collect();
         (!self.slopes.is_empty()).then(shades)

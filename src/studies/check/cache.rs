@@ -11,10 +11,11 @@ use super::light::Light;
 use crate::io::atomic::write_atomic;
 use crate::io::input_file;
 use crate::model::scene::Scene;
+use crate::model::shade::FacetSlope;
 use crate::reference::picture::{Pixels, ReferenceKind};
 use crate::studies::reference_hash::{digest, hash_of};
 
-/// Largest file: 24 bytes a facet and 40 a second reflection.
+/// Largest file: 72 bytes a facet and 40 a second reflection.
 const LARGEST_FILE: u64 = 512 << 20;
 /// Bytes of the SHA-256 in hex that a file begins with, of all that follows.
 const N_DIGEST: usize = 64;
@@ -25,7 +26,8 @@ pub fn path(folder: &Path, scene: &Scene, time_s: f64, pixels: &Pixels) -> PathB
 }
 
 /// Reads a file; none if it is not there or damaged. *Shape*: little-endian f64, the number of
-/// facets, the grid's error, three numbers a facet, then five a second reflection.
+/// facets, that of slopes, the grid's error, three numbers a facet, six a slope, then five a second
+/// reflection.
 pub fn read(path: &Path, n_facets: u64) -> Option<Light> {
     let bytes = input_file::read(path, LARGEST_FILE).ok()?;
     let (head, numbers) = bytes.split_at_checked(N_DIGEST)?;
@@ -34,18 +36,24 @@ pub fn read(path: &Path, n_facets: u64) -> Option<Light> {
     }
     let value = |b: &[u8]| b.try_into().map(f64::from_le_bytes).ok();
     let values: Vec<f64> = numbers.chunks_exact(8).map(value).collect::<Option<_>>()?;
-    let ([n, grid_error], rest) = values.split_first_chunk()?;
-    let (n, grid_error) = (*n as usize, *grid_error);
-    if n != 0 && n as u64 != n_facets {
+    let ([n, n_slopes, grid_error], rest) = values.split_first_chunk()?;
+    let (n, n_slopes, grid_error) = (*n as usize, *n_slopes as usize, *grid_error);
+    if [n, n_slopes].iter().any(|n| *n != 0 && *n as u64 != n_facets) {
         return None;
     }
-    let (first, second) = rest.split_at_checked(3 * n)?;
+    let (first, rest) = rest.split_at_checked(3 * n)?;
+    let (slopes, second) = rest.split_at_checked(6 * n_slopes)?;
+    let slope = |v: &[f64]| FacetSlope {
+        relative: DVec3::from_slice(v),
+        position: DVec3::from_slice(&v[3..]),
+    };
+    let slopes = slopes.chunks_exact(6).map(slope).collect();
     let first = first.chunks_exact(3).map(DVec3::from_slice).collect();
     let second: BTreeMap<u32, (DVec3, f64)> = second
         .chunks_exact(5)
         .map(|v| (v[0] as u32, (DVec3::from_slice(&v[1..4]), v[4])))
         .collect();
-    Some(Light { first, second, grid_error })
+    Some(Light { first, second, grid_error, slopes })
 }
 
 /// Writes a file. One that cannot be written only costs time.
@@ -53,8 +61,10 @@ pub fn write(path: &Path, light: &Light) {
     let first = light.first.iter().flat_map(|l| l.to_array());
     let second =
         light.second.iter().flat_map(|(i, (l, error))| [f64::from(*i), l.x, l.y, l.z, *error]);
-    let head = [light.first.len() as f64, light.grid_error];
-    let numbers = head.into_iter().chain(first).chain(second);
+    let slopes =
+        light.slopes.iter().flat_map(|s| [s.relative, s.position]).flat_map(|v| v.to_array());
+    let head = [light.first.len() as f64, light.slopes.len() as f64, light.grid_error];
+    let numbers = head.into_iter().chain(first).chain(slopes).chain(second);
     let bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
     let _ = path.parent().map(fs::create_dir_all);
     let _ = write_atomic(path, |file| {
@@ -73,7 +83,8 @@ mod tests {
         let path = dir.path().join("a.light");
         let second = BTreeMap::from([(1, (DVec3::new(0.1, -2.0, 1e-300), 1e-7))]);
         let first = vec![DVec3::ONE, DVec3::new(f64::MAX, 0.3, 0.4)];
-        let light = Light { first, second, grid_error: 0.25 };
+        let slope = FacetSlope { relative: DVec3::X, position: DVec3::new(0.1, 0.2, -0.3) };
+        let light = Light { first, second, grid_error: 0.25, slopes: vec![slope; 2] };
         write(&path, &light);
         assert_eq!(read(&path, 2), Some(light));
         // Of another scene, cut off, and with a flipped bit.

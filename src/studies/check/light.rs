@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 
 use crate::model::philox::{philox4x32_10, uniform};
+use crate::model::shade::FacetSlope;
 use crate::reference::parallel::parallel_map;
 use crate::reference::picture::{FrameReference, PixelShares, SecondOf};
 
@@ -71,6 +72,8 @@ pub struct Light {
     pub second: BTreeMap<u32, (DVec3, f64)>,
     /// The frame's [`FrameReference::grid_error`].
     pub grid_error: f64,
+    /// The frame's [`FrameReference::slopes`].
+    pub slopes: Vec<FacetSlope>,
 }
 
 impl Light {
@@ -83,7 +86,8 @@ impl Light {
         budget: Duration,
     ) -> Light {
         let (first, grid_error) = (frame.radiance.clone(), frame.grid_error);
-        let mut light = Light { first, second: BTreeMap::new(), grid_error };
+        let slopes = frame.slopes.clone();
+        let mut light = Light { first, second: BTreeMap::new(), grid_error, slopes };
         let begin = Instant::now();
         let n_least = N_LEAST.min(plan.drawn.len());
         for pixels in plan.drawn[..n_least].chunks(N_AT_ONCE / 2) {
@@ -196,7 +200,7 @@ mod tests {
         let by_device = (0..50).map(|i| [value(i, 0.3), value(i, 0.7)]).collect();
         let first = (0..50).map(|i| value(i, 0.3) + 0.01).collect();
         let second = (0..50).map(|i| (i, (value(i, 0.7) + 0.05 * value(i, 1.3), 1e-6))).collect();
-        (shares, by_device, Light { first, second, grid_error: 0.0 })
+        (shares, by_device, Light { first, second, grid_error: 0.0, slopes: vec![] })
     }
 
     /// Mean square over the first three numbers of four.

@@ -58,7 +58,8 @@ pub fn check(device: &DevicePicture, plan: &CheckPlan<'_>) -> Result<Check> {
     let pixels = checked_pixels(film.width, film.height);
     let exact = &ReferenceKind::drawn_by(&device.scene).without_approximations(&device.scene);
     if let Err(error) = ReferenceKind::Thin.check(&device.scene, device.time_s) {
-        let frame = FrameReference::unlit(exact, device.time_s)?;
+        let slopes = device.slopes.clone();
+        let frame = FrameReference { slopes, ..FrameReference::unlit(exact, device.time_s)? };
         let found = Drawing::new(device, exact, &frame, &pixels).compare(None);
         let reason = found.reason.or(Some(format!("the light is not checked: {error}")));
         let seconds = begin.elapsed().as_secs_f64();
@@ -69,7 +70,8 @@ pub fn check(device: &DevicePicture, plan: &CheckPlan<'_>) -> Result<Check> {
     let from_cache = kept.is_some();
     let mut found = match kept {
         Some(light) => {
-            let frame = FrameReference::unlit(exact, device.time_s)?;
+            let slopes = light.slopes.clone();
+            let frame = FrameReference { slopes, ..FrameReference::unlit(exact, device.time_s)? };
             let drawing = Drawing::new(device, exact, &frame, &pixels);
             drawing.compare(Some(&light))
         }

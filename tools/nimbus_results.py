@@ -1163,8 +1163,8 @@ class Study(_Result):
 
     `configurations`: a row for each setting of the knobs, the unchanged scene first, with the
     columns of configurations.csv and one column for each knob. gpu_ms and frame_ms are in ms;
-    by_base is the time by that of the unchanged scene; rmse, max, relmse and cloud are errors. `_low` and
-    `_high` are 95 % intervals. `front` is on, near, off or unknown.
+    by_base is the time by that of the unchanged scene; rmse, max, relmse and cloud are errors.
+    `_low` and `_high` are 95 % intervals. `front` is on, near, off or unknown.
 
     `times`: times.csv, a row for each timed frame, in ms. None if the JSON alone was read.
     """
@@ -1175,7 +1175,7 @@ class Study(_Result):
         super().__init__(metadata, record)
         self.times = times
         self.metric = record["metric"].one_of("rmse", "max", "relmse", "cloud")
-        """The error that decides which configurations are on the front: rmse, max, relmse or cloud."""
+        """The error that decides who is on the front: rmse, max, relmse or cloud."""
         self.time = record["time"].one_of("gpu", "frame")
         """The time that decides: gpu or frame."""
         self.best = record["best"].value

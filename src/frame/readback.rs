@@ -147,8 +147,8 @@ impl Renderer {
         Ok((self.read(device, |b| &b.facets, n)?, self.read(device, |b| &b.lit, n)?))
     }
 
-    /// Returns the slopes of the last frame's light inside of blobs, by facet. Those of surfaces
-    /// and ground have no meaning. None where the light does not change there.
+    /// Returns the slopes of the last frame's light inside of blobs, by facet. The slopes of
+    /// surfaces and ground have no meaning. None where the light does not change there.
     ///
     /// # Errors
     /// Fails if a frame is in flight or the device is lost.

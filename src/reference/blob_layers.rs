@@ -16,8 +16,9 @@ use crate::model::shade::Shade;
 /// A factor on τ of blob `j`, given the difference of the ray's slopes from its centre's.
 pub type Factor<'a> = &'a (dyn Fn(usize, DVec2) -> f64 + Sync);
 
-/// Bound of the radiance of a part of a blob over that of its facet: twice at its centre, 1 + ¼ σ
-/// at up to 8 σ to the side, where a slope's angle may double that.
+/// Bound of the radiance of a part of a blob over that of its facet. Its centre has up to twice as
+/// much, and the light changes by ¼ over a σ. A part is up to 8 σ to the side, which the angle of
+/// view may double.
 pub(super) const BRIGHTER: f64 = 10.0;
 
 /// Blobs to draw, with their radiance, order and textures.

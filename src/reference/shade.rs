@@ -43,8 +43,8 @@ pub(super) struct SeenLight {
 impl SeenShade {
     /// Returns the shade of `blob`, whose centre is `c` from the eye.
     ///
-    /// To first order in the angle δ from the centre, the ray's nearest point to it (where the blob
-    /// is made a ball) is z δ − ĉ (w·z δ) away, w = M²ĉ/|Mĉ|².
+    /// δ is the difference of the slopes of ray and centre. To first order the ray's nearest point
+    /// to the centre, where the blob is made a ball, is z δ − ĉ (w·z δ) away, w = M²ĉ/|Mĉ|².
     pub fn new(view: &View, blob: &Blob, c: DVec3, shade: &Shade) -> SeenShade {
         let (pose, toward) = (&view.pose, c.normalize_or(view.pose.forward));
         let (z, white) = (c.dot(pose.forward), blob.whiten(toward));
@@ -64,8 +64,8 @@ impl SeenShade {
     /// Returns the light along the ray at an offset of `delta` in slopes; τ there has the relative
     /// error of `r`.
     ///
-    /// A device's offset has the errors of the place (`edge`, of σ, at up to 4 σ) and of a
-    /// difference of slopes; its slope those of some ten products and sums.
+    /// A device's offset has the error of the place, `edge` of σ at up to 4 σ, and that of a
+    /// difference of slopes. Its slope has those of some ten products and sums.
     pub fn toward(&self, delta: DVec2, r: &Rounding) -> SeenLight {
         let sides = self.lateral * delta;
         let off_place =

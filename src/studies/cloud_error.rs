@@ -29,8 +29,8 @@ impl CloudPixels {
     }
 
     /// Returns the root mean square difference of the covered pixels' red, green and blue, by
-    /// their mean in `reference`; none without such pixels or light in them, or where a value is
-    /// not finite.
+    /// their mean in `reference`. There is none without such pixels or light in them, or where a
+    /// value is not finite.
     ///
     /// The reference's own error, `own_error` over all pixels, is part of the value. Its square is
     /// taken off the lower end of the interval as if all of it were in these pixels.

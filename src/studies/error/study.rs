@@ -102,7 +102,7 @@ pub struct ErrorStudy<'a> {
     pub reference: &'a Reference,
     /// The pixels of the reference.
     pub pixels: &'a Pixels,
-    /// Those of cloud, where their error is wanted.
+    /// The pixels of cloud, where their error is wanted.
     pub cloud: Option<&'a CloudPixels>,
     /// Ends the study early once it is set.
     pub stop: &'a AtomicBool,

@@ -102,9 +102,17 @@ fn finder(what: &str) -> &'static [&'static str] {
             &["scenes/cubes-554.toml", "--set", "draw.overlap='slices'"]
         }
         "no light leaves the box of diffusion"
+        | "a blob's front is lit as its back"
         | "diffuse light is not averaged over all directions" => {
             &["scenes/cubes-554.toml", "--set", "lighting.mode='diffusion'"]
         }
+        "a part of a blob is lit as its middle" => &[
+            "scenes/cubes-554.toml",
+            "--set",
+            "lighting.mode='diffusion'",
+            "--set",
+            "draw.overlap='slices'",
+        ],
         "the sky's light from everywhere is too bright" => {
             &["scenes/cubes-554.toml", "--set", "lighting.mode='single'"]
         }

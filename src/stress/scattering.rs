@@ -2,14 +2,17 @@
 
 use std::f64::consts::FRAC_1_PI;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::case::{Case, Comparison};
 use super::context::StressContext;
-use super::scenes::{SUN_ABOVE, blob, blob_cluster, cloud_of, rectangle, surface_scene};
+use super::scenes::{
+    HEIGHT, SUN_ABOVE, WIDTH, blob, blob_cluster, cloud_of, rectangle, surface_scene,
+};
 use crate::error::Result;
 use crate::model::cloud::{CloudSource, Particle};
-use crate::model::scene::{LightingMode, Scene};
+use crate::model::scene::{Draw, DrawPath, LightingMode, Overlap, Scene};
+use crate::reference::picture::{Emitters, FrameReference, Pixels, drawn_by_settings};
 use crate::reference::rounding::U_F32;
 
 /// The cases of this file, in the order in which they run.
@@ -52,6 +55,13 @@ pub const CASES: &[Case] = &[
             factors of 0 on depths: no light at all",
         bound: "0",
         check: barred,
+    },
+    Case {
+        name: "scattering/inside",
+        what: "clouds of optical depth 1e-6 to 1e4 in the sun, by diffusion: the light inside of \
+            each blob is that in f64, composed as a whole and by slices",
+        bound: "that of the drawing, and 1e-3 of the brightest blob",
+        check: inside,
     },
 ];
 
@@ -169,6 +179,35 @@ fn barred(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
         for (i, lit) in frame.lit.iter().enumerate().filter(|(i, _)| *i != N_FLOOR) {
             let light = lit.direct.into_iter().chain(lit.first).fold(0.0, f32::max);
             c.add(f64::from(light), 0.0, 0.0, format_args!("light of facet {i}, {}", mode.name()));
+        }
+    }
+    Ok(())
+}
+
+fn inside(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    const WAYS: [(DrawPath, Overlap); 3] = [
+        (DrawPath::Sprites, Overlap::Thin),
+        (DrawPath::Tiles, Overlap::Thin),
+        (DrawPath::Tiles, Overlap::Slices),
+    ];
+    for tau in [1e-6, 1.0, 1e4] {
+        for (path, overlap) in WAYS {
+            let mut scene =
+                scene(LightingMode::Diffusion, SUN, "albedo = [1, 1, 1]\n", cluster(tau))?;
+            scene.draw = Draw { path, overlap, ..scene.draw }.exact();
+            let frame = ctx.render(&scene, 0)?;
+            let truth = FrameReference::new(&scene, scene.time.at(0))?;
+            let radiance = Emitters::radiance(&scene, &truth);
+            let brightest = radiance.iter().map(|l| l.max_element()).fold(0.0, f64::max);
+            let emitters = (&Emitters::new(&scene, &truth), &radiance[..]);
+            let pixels = Pixels::all(WIDTH as u32, HEIGHT as u32);
+            let (values, bounds) =
+                drawn_by_settings(&scene, &truth, emitters, &pixels, DVec2::ZERO);
+            let numbers = values.concat().into_iter().zip(bounds.concat());
+            for (i, (found, (value, bound))) in frame.rgba.iter().zip(numbers).enumerate() {
+                let what = format_args!("number {i}, {path:?}, {overlap:?}, depth {tau:e}");
+                c.add(f64::from(*found), value, bound + 1e-3 * brightest, what);
+            }
         }
     }
     Ok(())

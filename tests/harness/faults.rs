@@ -234,9 +234,23 @@ pub const FAULTS: &[Fault] = &[
     (
         "diffuse light is not averaged over all directions",
         "scatter.comp",
-        "max(diffuse, vec3(0.0)) * INV_FOUR_PI",
-        "max(diffuse, vec3(0.0)) * 2.0 * INV_FOUR_PI",
+        ".rgb * INV_FOUR_PI",
+        ".rgb * 2.0 * INV_FOUR_PI",
         "scattering/furnace",
+    ),
+    (
+        "a blob's front is lit as its back",
+        "include/shade.glsl",
+        "-along * sigma",
+        "along * sigma",
+        "scattering/inside",
+    ),
+    (
+        "a part of a blob is lit as its middle",
+        "include/tile_slices.glsl",
+        "- nearer * middle",
+        "",
+        "scattering/inside",
     ),
     (
         "the sky's light from everywhere is too bright",

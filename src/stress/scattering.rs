@@ -59,7 +59,7 @@ pub const CASES: &[Case] = &[
     Case {
         name: "scattering/inside",
         what: "clouds of optical depth 1e-6 to 1e4 in the sun, by diffusion: the light inside of \
-            each blob is that in f64, composed as a whole and by slices",
+            blobs is that in f64",
         bound: "that of the drawing, and 1e-3 of the brightest blob",
         check: inside,
     },

@@ -6,8 +6,8 @@
 
 // Writes fluence and flux of the diffuse light (model.md §18, passes.md "diffusion").
 // In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi; what
-// stands beside Q0 stays. The slope
-// is that between the cells on both sides; at the faces of the box it is one-sided.
+// stands beside Q0 stays. The slope is that between the cells on both sides. At the faces of the
+// box it is one-sided.
 
 layout(push_constant) uniform Push {
     Grid grid;

@@ -30,8 +30,8 @@ layout(constant_id = 10) const uint POINTS = 0;
 
 const float LOG2_E = 1.44269504089;
 // Greatest radiance of a part of a blob over that of its centre. The light changes by 1/4 over a
-// sigma. A part is up to 4 sigma to the side, which the angle of view may double, and before it.
-const float BRIGHTER = 3.5;
+// sigma. A part is up to 8 sigma to the side, which the angle of view may double, and before it.
+const float BRIGHTER = 5.5;
 // A device may round the side of a point. The host takes points only where it rounds by no more
 // than this (max_point_size).
 const float POINT_STEP = 1.0 / 8.0;

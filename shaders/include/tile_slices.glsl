@@ -230,9 +230,15 @@ void compose(Loaded splat, float y) {
         density_before = density_here;
 #endif
         before = within;
+#if SHADED
         [[unroll]] for (uint j = 0; j < RUN; ++j) {
             add_part(m, j, tau[j], share, middle, radiance);
         }
+#else
+        // The same for all pixels.
+        vec4 part = share * vec4(radiance, 1.0);
+        [[unroll]] for (uint j = 0; j < RUN; ++j) { open[m][j] += tau[j] * part; }
+#endif
     }
 #endif
 }

@@ -33,9 +33,6 @@ pub struct Shade {
 }
 
 impl Shade {
-    /// The facet's radiance throughout.
-    pub const PLAIN: Shade = Shade { base: 1.0, slope: DVec3::ZERO };
-
     /// Returns the light of a blob whose σ along each axis is `sigmas`, `from_facet` away from
     /// its facet, where the light changes by `slope` per length.
     pub fn new(slope: DVec3, from_facet: DVec3, sigmas: DVec3) -> Shade {

@@ -19,7 +19,7 @@ pub type Factor<'a> = &'a (dyn Fn(usize, DVec2) -> f64 + Sync);
 /// Bound of the radiance of a part of a blob over that of its facet. Its centre has up to twice as
 /// much, and the light changes by ¼ over a σ. A part is up to 8 σ to the side, which the angle of
 /// view may double.
-pub(super) const BRIGHTER: f64 = 10.0;
+pub(super) const BRIGHTER: f64 = 11.0;
 
 /// Blobs to draw, with their radiance, order and textures.
 #[derive(Clone, Copy)]

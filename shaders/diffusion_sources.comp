@@ -11,12 +11,18 @@
 // (model.md §18, passes.md "diffusion").
 // In: lights, regions, the density grid (1/length). Out: by cell Q0 (W/m^3), and q = 3 D Q1 along
 // each axis (W/m^2). Law: Q0 = albedo (1-f) sigma U, Q1 = albedo (g-f) sigma F of the light that
-// arrives, weakened by e^{-s tau}. The mean of U over the channels stands beside Q0. Bound: that of
-// the march.
+// arrives, weakened by e^{-s tau}. The mean of U over the channels stands beside Q0. With SOLIDS q
+// has D c times the flux of the sky, too, weakened by e^{-(1-albedo g) tau}. Bound: that of the
+// march.
 
 // 1: U is wanted in cells without extinction, too.
 #ifndef SLOPES
 #define SLOPES 0
+#endif
+
+// 1: the scene has surfaces or ground, which the sky reaches through the grid.
+#ifndef SOLIDS
+#define SOLIDS 0
 #endif
 
 layout(push_constant) uniform Push {
@@ -50,19 +56,24 @@ void main() {
         vec3 p = push.grid.low + push.grid.cell * vec3(1.0, push.grid.aspect, 1.0) * at;
         float sigma = cell_at(int(c));
         vec3 weakened = 1.0 - push.albedo * push.straight;
-        vec3 fluence = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
+        vec3 fluence = vec3(0.0), fallen = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
-            bool is_on = light.kind != LIGHT_SKY && (SLOPES != 0 || sigma > 0.0)
-                         && any(notEqual(light.energy, vec3(0.0)));
+            bool is_sky = light.kind == LIGHT_SKY;
+            bool is_wanted = is_sky ? SOLIDS != 0 : SLOPES != 0 || sigma > 0.0;
+            bool is_on = is_wanted && any(notEqual(light.energy, vec3(0.0)));
             if (is_on && is_clear(p, light, 0xFFFFFFFFu, push.n_surfaces)) {
                 Arrival a = arrival_at(light, p);
                 float tau = depth_along(p, a.toward, a.distance, true);
-                vec3 e = light.energy * a.falloff * through(tau * weakened);
-                fluence += e;
-                x -= e * a.toward.x;
-                y -= e * a.toward.y;
-                z -= e * a.toward.z;
+                if (is_sky) {
+                    fallen += light.energy * through(tau * (1.0 - push.albedo * push.g));
+                } else {
+                    vec3 e = light.energy * a.falloff * through(tau * weakened);
+                    fluence += e;
+                    x -= e * a.toward.x;
+                    y -= e * a.toward.y;
+                    z -= e * a.toward.z;
+                }
             }
         }
         vec3 reach = 1.0 / (3.0 * sigma * (1.0 - push.albedo * push.g) + push.inverse_chord);
@@ -70,7 +81,7 @@ void main() {
         vec3 scattered = push.albedo * (1.0 - push.straight) * sigma * fluence;
         field[4 * c] = vec4(scattered, dot(fluence, vec3(1.0 / 3.0)));
         field[4 * c + 1] = vec4(carried * x, 0.0);
-        field[4 * c + 2] = vec4(carried * y, 0.0);
+        field[4 * c + 2] = vec4(carried * y - reach * push.inverse_chord * fallen, 0.0);
         field[4 * c + 3] = vec4(carried * z, 0.0);
     }
 }

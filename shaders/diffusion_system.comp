@@ -2,12 +2,20 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 #include "each.glsl"
+#include "light.glsl"
 #include "diffusion.glsl"
+#include "patches.glsl"
 
 // Writes the equations of the finest cells (model.md §18, passes.md "diffusion").
 // In: lights, the density grid, sources of "diffusion_sources". Out: operators, the right-hand
 // sides, and phi after a sweep from phi = 0. Law: -div(D grad phi) + absorption phi = Q0 - div q,
-// with Marshak's condition phi/4 - F/2 = J at the faces of the box. Error: some ulp.
+// with Marshak's condition phi/4 + F/2 = J at the faces of the box, F inward. With SOLIDS J has the
+// light of surfaces and ground, too. Error: some ulp.
+
+// 1: the scene has surfaces or ground.
+#ifndef SOLIDS
+#define SOLIDS 0
+#endif
 
 layout(push_constant) uniform Push {
     Grid grid;
@@ -26,12 +34,39 @@ TEXELS(2, field)
 WRITES(3, vec4, operators)
 WRITES(4, vec4, phi)
 WRITES(5, vec4, source)
+// By patch of the box: light of surfaces and ground, less that of the sky that they hide.
+#if SOLIDS
+READS(6, vec4, faces)
+#endif
 
 vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
 
 vec3 reach_of(int c) {
     return 1.0 / (3.0 * FLOAT(density, c) * push.kept + push.inverse_chord);
 }
+
+#if SOLIDS
+// Returns the light of surfaces and ground at a face of a cell: bilinear between the patches.
+vec3 of_solids(ivec3 at, uint axis, uint side) {
+    uint u = (axis + 1u) % 3u, v = (axis + 2u) % 3u;
+    vec3 part = (vec3(at) + 0.5) / vec3(push.grid.n_cells);
+    vec2 k = clamp(vec2(part[u], part[v]) * float(PATCHES) - 0.5, 0.0, float(PATCHES - 1u));
+    uvec2 base = min(uvec2(k), PATCHES - 1u), next = min(base + 1u, PATCHES - 1u);
+    uint first = (2u * axis + side) * OF_FACE;
+    vec2 t = k - vec2(base);
+    vec3 low = mix(
+        faces[first + base.y * PATCHES + base.x].rgb, faces[first + base.y * PATCHES + next.x].rgb,
+        t.x
+    );
+    vec3 high = mix(
+        faces[first + next.y * PATCHES + base.x].rgb, faces[first + next.y * PATCHES + next.x].rgb,
+        t.x
+    );
+    return mix(low, high, t.y);
+}
+#else
+#define of_solids(at, axis, side) vec3(0.0)
+#endif
 
 // Returns the light of the sky that comes in through a face: `share` of a horizontal plane's.
 vec3 of_sky(float share) {
@@ -57,7 +92,8 @@ void main() {
         vec3 next[3];
         for (int axis = 0; axis < 3; ++axis) {
             float inverse = 1.0 / edges[axis];
-            vec3 through = inverse / (2.0 + 0.5 * edges[axis] / own);
+            vec3 half_cell = 0.5 * edges[axis] / own;
+            vec3 through = inverse / (2.0 + half_cell);
             vec3 carried = field_at(4 * c + 1 + axis);
             next[axis] = vec3(0.0);
             if (at[axis] + 1 < int(level.n_cells[axis])) {
@@ -67,7 +103,8 @@ void main() {
                 right -= 0.5 * inverse * (carried + field_at(4 * after + 1 + axis));
             } else {
                 sink += through;
-                right += 4.0 * through * of_sky(axis == 1 ? 1.0 : 0.5);
+                vec3 j = of_sky(axis == 1 ? 1.0 : 0.5) + of_solids(at, uint(axis), 1u);
+                right += through * (4.0 * max(j, vec3(0.0)) - half_cell * carried);
             }
             if (at[axis] > 0) {
                 int prior = c - stride[axis];
@@ -76,7 +113,8 @@ void main() {
                 right += 0.5 * inverse * (carried + field_at(4 * prior + 1 + axis));
             } else {
                 sink += through;
-                right += 4.0 * through * of_sky(axis == 1 ? 0.0 : 0.5);
+                vec3 j = of_sky(axis == 1 ? 0.0 : 0.5) + of_solids(at, uint(axis), 0u);
+                right += through * (4.0 * max(j, vec3(0.0)) + half_cell * carried);
             }
         }
         for (int set = 0; set < N_SETS; ++set) {

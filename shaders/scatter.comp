@@ -4,12 +4,14 @@
 #include "each.glsl"
 #include "light.glsl"
 #include "medium.glsl"
+#include "field.glsl"
 
 // Computes the radiance that clouds scatter toward the eye as a medium, and the first reflection of
 // surfaces and ground (model.md §18, passes.md "scatter").
 // In: facets, lights, optical depths [facet][light], regions, the lobe table, media by cloud; with
 // DIFFUSE the diffuse light by cell. Out: fluence and radiance of every facet, linear RGB, and with
-// SLOPES the relative slopes of the clouds' radiance, 1/length.
+// SLOPES the relative slopes of the clouds' radiance, 1/length; with SOLIDS that of the box's
+// patches.
 // Law: albedo' sum E F sum_i a^i p(c^i g) e^{-b^i s tau}, and (phi + 3 g F.w) albedo'/4pi.
 
 // 1: light is scattered further by diffusion.
@@ -21,13 +23,18 @@
 #define SLOPES 0
 #endif
 
+// 1: and the scene has surfaces or ground.
+#ifndef SOLIDS
+#define SOLIDS 0
+#endif
+
 layout(push_constant) uniform Push {
     Grid grid;
     vec3 eye;
     uint n_facets;
     uint n_lights;
     uint n_solids;
-    // 1-g on the way to surfaces and ground.
+    // Share of the depth that weakens light on its way to surfaces and ground: 1-g, with DIFFUSE s.
     float backward;
     uint n_terms;
     float term_light;
@@ -46,11 +53,17 @@ WRITES(8, Slope, slopes)
 #endif
 
 #include "first.glsl"
+#if SOLIDS
+// phi and the flux along each axis, by patch.
+TEXELS(8 + SLOPES, patches)
+#include "patches.glsl"
+#endif
 
 float arriving(float tau) {
     return tau < BARRED_DEPTH ? through(vec3(push.backward * tau)).x : 0.0;
 }
 #define ARRIVING(k) arriving(transmittance[k])
+#define WITHOUT_SKY SOLIDS
 #include "reflect.glsl"
 
 // Returns the share of a light that is scattered per solid angle at 1 - cos = away.
@@ -87,20 +100,14 @@ vec4 field_at(int k) { return uintBitsToFloat(TEXEL(field, k)); }
 // Returns phi + 3 g F.w, at least 0, and U at p: trilinear between the cells' centres and beyond
 // the outermost as on them.
 vec4 diffuse_along(vec3 p, vec3 w, float g) {
-    ivec3 n = ivec3(push.grid.n_cells);
-    vec3 at = (p - push.grid.low) * push.grid.inv_cell * vec3(1.0, push.grid.inv_aspect, 1.0) - 0.5;
-    at = clamp(at, vec3(0.0), vec3(n - 1));
-    ivec3 base = ivec3(at);
-    vec3 part = at - vec3(base);
+    Weights of = weights_at(push.grid, p);
     vec4 sum = vec4(0.0);
     for (int corner = 0; corner < 8; ++corner) {
-        ivec3 to = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
-        vec3 share = mix(1.0 - part, part, equal(to, ivec3(1)));
-        ivec3 i = min(base + to, n - 1);
-        int c = 4 * (i.x + n.x * (i.y + n.y * i.z));
+        Corner to = corner_of(push.grid, of, corner);
+        int c = 4 * to.i_cell;
         vec3 along =
             w.x * field_at(c + 1).rgb + w.y * field_at(c + 2).rgb + w.z * field_at(c + 3).rgb;
-        sum += share.x * share.y * share.z * (field_at(c) + vec4(3.0 * g * along, 0.0));
+        sum += to.share * (field_at(c) + vec4(3.0 * g * along, 0.0));
     }
     return vec4(max(sum.rgb, vec3(0.0)), sum.w);
 }
@@ -127,11 +134,69 @@ vec3 slope_at(vec3 p, vec3 w, float g, vec3 albedo, vec3 once, vec3 diffuse) {
 }
 #endif
 
+#if SOLIDS
+vec3 patch_value(uint k) { return uintBitsToFloat(TEXEL(patches, int(k))).rgb; }
+
+// Returns the irradiance of a facet of a surface or ground by the sky and the light of the clouds.
+// Inside of the box it is that of the cells, beyond a patch's edge that of the patches.
+vec3 of_sky_and_clouds(uint j, Facet facet) {
+    vec3 above = vec3(0.0), all = vec3(0.0);
+    bool is_roofed = false;
+    for (uint l = 0; l < push.n_lights; ++l) {
+        if (lights[l].kind == LIGHT_SKY) {
+            bool is_barred = transmittance[j * push.n_lights + l] >= BARRED_DEPTH;
+            all += lights[l].energy * lights[l].constant;
+            above += lights[l].energy;
+            is_roofed = is_roofed || (is_barred && any(notEqual(lights[l].energy, vec3(0.0))));
+        }
+    }
+    if (is_roofed) {
+        return all;
+    }
+    vec3 extent = extent_of(push.grid), p = facet.position;
+    vec3 nearest = clamp(p, push.grid.low, push.grid.low + extent);
+    float edge = max(extent.x, max(extent.y, extent.z)) / float(PATCHES);
+    float far = min(distance(p, nearest) / edge, 1.0);
+    vec3 outside = above * (0.5 + 0.5 * facet.normal.y) + all;
+    for (uint face = 0; face < 6u; ++face) {
+        // Where the facet is behind a face, none of its patches counts.
+        Patch of_face = patch_at(push.grid, face * OF_FACE);
+        bool is_seen = far > 0.0 && dot(p - of_face.center, of_face.outward) > 0.0;
+        uint first = face * OF_FACE, end = is_seen ? first + OF_FACE : first;
+        for (uint i = first; i < end; ++i) {
+            Patch from = patch_at(push.grid, i);
+            vec3 offset = from.center - p;
+            float share = share_between(offset, from.outward, from.area, facet.normal);
+            vec3 to = offset * inversesqrt(dot(offset, offset));
+            vec3 along = to.x * patch_value(4u * i + 1u) + to.y * patch_value(4u * i + 2u)
+                         + to.z * patch_value(4u * i + 3u);
+            vec3 sent = 0.25 * max(patch_value(4u * i) - 3.0 * along, vec3(0.0));
+            outside += share * (sent - all - (offset.y > 0.0 ? above : vec3(0.0)));
+        }
+    }
+    Weights of = weights_at(push.grid, nearest);
+    vec3 inside = vec3(0.0);
+    for (int corner = 0; corner < 8; ++corner) {
+        Corner to = corner_of(push.grid, of, corner);
+        int c = 4 * to.i_cell;
+        vec3 across = facet.normal.x * field_at(c + 1).rgb + facet.normal.y * field_at(c + 2).rgb
+                      + facet.normal.z * field_at(c + 3).rgb;
+        inside += to.share * (0.25 * field_at(c).rgb - 0.5 * across);
+    }
+    return mix(max(inside, vec3(0.0)), max(outside, vec3(0.0)), far);
+}
+#endif
+
 void main() {
     FOR_EACH(j, push.n_facets) {
         Facet facet = facets[j];
         if (facet.i_region < push.n_solids) {
             Reflected r = reflected_by(j, facet, push.eye, push.n_lights);
+#if SOLIDS
+            vec3 more = of_sky_and_clouds(j, facet);
+            r.irradiance += more;
+            r.radiance += region_at(facet.i_region).kd * facet.color * more * INV_PI;
+#endif
             lit[j].direct = r.irradiance;
             lit[j].first = r.radiance;
             return;

@@ -18,7 +18,7 @@ use nimbus::model::scene::Scene;
 #[test]
 fn every_facet_has_the_light_of_the_twin() {
     let gpu = Gpu::new();
-    for name in ["coloured", "droplets", "flat", "boxes"] {
+    for name in ["coloured", "droplets", "flat", "boxes", "floors"] {
         media::check(&gpu, name, "diffusion");
     }
 }
@@ -41,12 +41,45 @@ fn wrong_shaders_are_found() {
         ),
         ("coloured", "diffusion", "diffusion_system.comp", "next[2][set]", "next[1][set]"),
         ("flat", "diffusion", "diffusion_system.comp", "axis == 1 ? 0.0", "axis == 0 ? 0.0"),
+        ("floors", "diffusion", "diffusion_solids.comp", "share_of(light", "0.99 * share_of(light"),
+        ("coloured", "diffusion", "diffusion_solids.comp", "push.backward * tau", "tau"),
+        ("floors", "diffusion", "diffusion_faces.comp", "sent - all", "sent"),
+        ("floors", "diffusion", "diffusion_faces.comp", "offset.y > 0.0", "offset.y < 0.0"),
+        ("floors", "diffusion", "diffusion_faces.comp", "place.xyz - at", "place.xyz - to.center"),
+        ("floors", "diffusion", "diffusion_faces.comp", "n = 32u", "n = 16u"),
+        ("floors", "diffusion", "diffusion_system.comp", "(axis + 2u) % 3u", "(axis + 1u) % 3u"),
+        (
+            "floors",
+            "diffusion",
+            "diffusion_system.comp",
+            "max(j, vec3(0.0)) - half",
+            "j - 0.0 * half",
+        ),
+        (
+            "floors",
+            "diffusion",
+            "diffusion_sources.comp",
+            "fallen += light",
+            "fallen += 0.0 * light",
+        ),
+        ("floors", "diffusion", "diffusion_patches.comp", "c.share *", "0.125 *"),
+        ("floors", "diffusion", "include/patches.glsl", "part[u] =", "part[v] ="),
+        ("floors", "diffusion", "scatter.comp", "0.25 * field_at(c)", "0.5 * field_at(c)"),
+        ("floors", "diffusion", "scatter.comp", "min(distance(p, nearest) / edge, 1.0)", "1.0"),
+        ("floors", "diffusion", "scatter.comp", "- 3.0 * along", "- along"),
+        (
+            "floors",
+            "diffusion",
+            "scatter.comp",
+            "define WITHOUT_SKY SOLIDS",
+            "define WITHOUT_SKY 0",
+        ),
         (
             "boxes",
             "diffusion",
             "diffusion_system.comp",
-            "sink += through;\n                right += 4.0",
-            "right += 4.0",
+            "sink += through;\n                vec3 j = of_sky(axis == 1 ? 0.0",
+            "vec3 j = of_sky(axis == 1 ? 0.0",
         ),
         ("boxes", "diffusion", "diffusion_system.comp", "push.absorbed", "push.absorbed * 0.0"),
         (

@@ -45,7 +45,7 @@ fn surfaces_have_the_light_of_the_first_reflection() {
         let shade = first.iter().map(|e| e.x).fold(f64::INFINITY, f64::min);
         let most = first.iter().map(|e| e.x).fold(0.0, f64::max);
         assert!(shade < 0.5 * most, "a shadow of the roof or the cloud");
-        for mode in ["single", "similarity", "octaves", "diffusion"] {
+        for mode in ["single", "similarity", "octaves"] {
             // (1 - g) tau and its exponent, rounded alike but for some units in the last place.
             let off = media::apart(&light(mode), &first);
             assert!(off < 1e-6, "{mode}, {forward}: {off:e}");

@@ -1,5 +1,10 @@
 // The first reflection of a facet (model.md §7, passes.md "first"). Needs first.glsl and
 // light.glsl, and ARRIVING(k): what arrives of light and facet k through clouds and past surfaces.
+// With WITHOUT_SKY that of skies is left out.
+
+#ifndef WITHOUT_SKY
+#define WITHOUT_SKY 0
+#endif
 
 struct Reflected {
     vec3 irradiance;
@@ -17,6 +22,9 @@ Reflected reflected_by(uint j, Facet facet, vec3 eye, uint n_lights) {
     vec3 glossy = vec3(0.0);
     for (uint l = 0; l < n_lights; ++l) {
         Light light = lights[l];
+        if (WITHOUT_SKY != 0 && light.kind == LIGHT_SKY) {
+            continue;
+        }
         Arrival a = arrival_at(light, facet.position);
         vec3 e = light.energy * share_of(light, a, facet.normal, ARRIVING(j * n_lights + l));
         irradiance += e;

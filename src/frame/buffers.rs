@@ -6,6 +6,7 @@ use super::staging::StagedBuffer;
 use crate::error::Result;
 use crate::gpu::{Buffer, Recorder, buffers};
 use crate::layout::cull::KeptRecord;
+use crate::layout::diffusion::N_PATCHES;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord, SlopeRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::medium::MediumRecord;
@@ -56,6 +57,10 @@ buffers! {
         /// Fluence and flux of diffuse light by cell, and fluence of suns and lamps.
         field: Buffer => [[f32; 4]; 4], n_if(has_diffusion(scene), n_cells(scene)),
             "diffusion.field", Texels;
+        /// The same by patch of the grid's box, for surfaces and ground.
+        patches: Buffer => [[f32; 4]; 4],
+            n_if(has_diffusion(scene) && scene.has_solids(), u64::from(N_PATCHES)),
+            "diffusion.patches", Texels;
         regions: StagedBuffer => RegionRecord, scene.n_regions() as u64, "first.regions", Texels;
         /// Lobes by material, then the vectors of the basis, N_NODES numbers each.
         table: StagedBuffer => f32, n_table_rows(scene) * N_NODES as u64, "first.table", Floats;
@@ -160,7 +165,9 @@ pub(super) fn diffusion_room(scene: &Scene) -> Option<Room> {
     };
     let plain = |c: &Cloud| is_grey(&scene.materials[c.i_material]) && !has_colors(c);
     let n_sets = if scene.clouds.iter().all(plain) { 1 } else { 3 };
-    has_diffusion(scene).then(|| Room::new(n_cells(scene), n_sets, has_slopes(scene)))
+    let n_solid_facets = scene.n_solid_facets();
+    has_diffusion(scene)
+        .then(|| Room::new(n_cells(scene), n_sets, has_slopes(scene), n_solid_facets))
 }
 
 /// Returns the most cells of a density grid at any time. Clouds that drift apart or grow change its

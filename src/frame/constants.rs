@@ -26,6 +26,8 @@ pub(super) struct FrameConstants {
     pub terms: Octaves,
     /// The light changes inside of blobs.
     pub has_slopes: bool,
+    /// Longest edge of a facet of surfaces and terrains, where light diffuses.
+    pub longest_facet_edge: f64,
     /// Cycles of the diffusion solver.
     pub n_cycles: u32,
     pub texture_seed: u32,
@@ -70,6 +72,10 @@ impl FrameConstants {
             forward: scene.lighting.forward,
             terms: medium::terms(&scene.lighting),
             has_slopes: scene.lighting.has_slopes(),
+            longest_facet_edge: match has_diffusion(scene) {
+                true => scene.longest_facet_edge(),
+                false => 0.0,
+            },
             n_cycles: scene.lighting.diffusion.cycles,
             texture_seed: scene.draw.texture_seed,
             edge: scene.draw.edge(),

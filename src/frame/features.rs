@@ -100,6 +100,13 @@ impl SceneFeatures {
     }
 }
 
+impl SceneFeatures {
+    /// Returns whether there are surfaces or terrains.
+    pub fn has_solids(&self) -> bool {
+        self.n_surfaces + self.n_terrains > 0
+    }
+}
+
 /// Returns whether `lighting.mode` is not "none".
 pub fn is_lit(scene: &Scene) -> bool {
     scene.lighting.mode != LightingMode::None

@@ -22,7 +22,7 @@ use crate::passes::first::First;
 use crate::passes::generate::Generate;
 use crate::passes::grid::Grid;
 use crate::passes::place::Place;
-use crate::passes::scatter::Scatter;
+use crate::passes::scatter::{Scatter, ScatterVariant};
 use crate::passes::sort::Sort;
 use crate::passes::texture::Texture;
 use crate::passes::transmit::{Arriving, Transmit};
@@ -100,7 +100,13 @@ impl FramePasses {
                 .map(|room| Diffusion::new(device, compiler, room))
                 .transpose()?,
             scatter: is_medium(scene)
-                .then(|| Scatter::new(device, compiler, [has_diffusion(scene), has_slopes(scene)]))
+                .then(|| {
+                    let is_diffuse = has_diffusion(scene);
+                    let has_solids = is_diffuse && scene.has_solids();
+                    let has_slopes = has_slopes(scene);
+                    let variant = ScatterVariant { is_diffuse, has_slopes, has_solids };
+                    Scatter::new(device, compiler, variant)
+                })
                 .transpose()?,
             gather,
             tensors,

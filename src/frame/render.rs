@@ -16,7 +16,7 @@ use crate::model::boxes::MAX_ATTEMPTS;
 use crate::passes::blobs::{BlobBuffers, BlobCount};
 use crate::passes::contract::ContractBuffers;
 use crate::passes::cull::{CullBuffers, Order};
-use crate::passes::diffusion::{DiffusionBuffers, DiffusionWork};
+use crate::passes::diffusion::{DiffusionBuffers, DiffusionWork, SolidsWork};
 use crate::passes::facets;
 use crate::passes::first::{self, FirstBuffers};
 use crate::passes::morton;
@@ -211,19 +211,28 @@ impl FramePasses {
             media,
             field,
             slopes,
+            patches,
             ..
         } = &self.buffers;
         pass(rec, plan, Pass::Diffusion, |rec| {
             let (Some(diffusion), Some(params)) = (diffusion, &packet.diffusion) else {
                 return Ok(());
             };
-            let buffers = DiffusionBuffers { lights, regions, density, field };
+            let depths = transmittance;
+            let buffers =
+                DiffusionBuffers { lights, regions, density, facets, depths, field, patches };
             let work = DiffusionWork {
                 n_lights: c.march.n_lights,
                 n_surfaces: c.march.n_surfaces,
                 step_cells: c.march.step_cells,
                 max_steps: MAX_STEPS,
                 n_cycles: c.n_cycles,
+                solids: SolidsWork {
+                    n_facets: c.n_solid_facets,
+                    n_lights: c.march.n_lights,
+                    lift: c.longest_facet_edge,
+                    forward: c.forward,
+                },
             };
             diffusion.record(rec, &buffers, &packet.grid, params, &work)
         })?;
@@ -240,13 +249,17 @@ impl FramePasses {
                 media,
                 field,
                 slopes,
+                patches,
             };
             let of = ScatterParams {
                 eye: packet.camera.eye,
                 n_facets: c.march.n_facets,
                 n_lights: c.march.n_lights,
                 n_solids: c.n_solids,
-                forward: c.forward,
+                backward: match &packet.diffusion {
+                    Some(of) => of.weakened(),
+                    None => 1.0 - c.forward,
+                },
                 n_terms: c.terms.n,
                 term: [c.terms.light, c.terms.depth, c.terms.phase],
             };

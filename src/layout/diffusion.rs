@@ -4,7 +4,7 @@ use glam::{DVec3, UVec3};
 
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
-use crate::model::grid::{GridSpec, coarser};
+use crate::model::grid::{GridSpec, PATCHES, coarser};
 use crate::model::medium::MeanMedium;
 
 record! {
@@ -32,6 +32,9 @@ pub struct LevelStep {
     /// 1 along the axes that are halved.
     pub halved: [u32; 3],
 }
+
+/// Number of patches of the box's faces.
+pub const N_PATCHES: u32 = 6 * PATCHES * PATCHES;
 
 /// All levels together have at most this many times the cells of the finest one: a level has at
 /// most two thirds of the cells of the one before.
@@ -83,6 +86,14 @@ impl DiffusionParams {
             straight: mean.straight as f32,
             inverse_chord: grid.inverse_chord() as f32,
         }
+    }
+}
+
+impl DiffusionParams {
+    /// Returns s: the mean over the channels of 1 − ϖf.
+    pub fn weakened(&self) -> f64 {
+        let straight = self.albedo.map(|albedo| f64::from(albedo) * f64::from(self.straight));
+        1.0 - straight.iter().sum::<f64>() / 3.0
     }
 }
 

@@ -92,6 +92,10 @@ impl GridSpec {
     }
 }
 
+/// Number of patches along each edge of the box's faces, through which light passes between the
+/// cells and surfaces or ground.
+pub const PATCHES: u32 = 8;
+
 /// Number of cells at which a grid is coarse enough to be solved by sweeps alone.
 pub const COARSEST_CELLS: u32 = 64;
 

@@ -206,6 +206,13 @@ impl Scene {
         self.n_surface_facets() + self.terrains.iter().map(Terrain::n_facets).sum::<u64>()
     }
 
+    /// Returns the longest edge of a facet of rectangles and ground as a square; 0 without any.
+    pub fn longest_facet_edge(&self) -> f64 {
+        let of_surfaces = self.surfaces.iter().map(|s| s.area() / s.n_facets() as f64);
+        let of_ground = self.terrains.iter().flat_map(Terrain::facets).map(|f| f.area);
+        of_surfaces.chain(of_ground).fold(0.0, f64::max).sqrt()
+    }
+
     /// Returns the number of rectangles and terrains: the regions before the clouds.
     pub fn n_solids(&self) -> usize {
         self.surfaces.len() + self.terrains.len()

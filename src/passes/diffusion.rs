@@ -1,13 +1,18 @@
 //! diffusion: computes the diffuse light in every cell of the density grid.
 //!
-//! In: the density grid, lights, regions (rectangles). Out: fluence φ and flux F by cell. Law:
-//! −∇·(D∇φ) + σ(1 − ϖ)φ = Q0 − ∇·q with Marshak's condition at the box, by a fixed number of
-//! multigrid cycles. Source: model.md §18, passes.md. Error: of a cycle about an eighth of what
-//! the cycle before left; of rounding 2e-6 of φ.
+//! In: the density grid, lights, regions (rectangles), facets of surfaces and ground. Out: fluence
+//! φ and flux F by cell. Law: −∇·(D∇φ) + σ(1 − ϖ)φ = Q0 − ∇·q with Marshak's condition at the box,
+//! where surfaces and ground send light in, by a fixed number of multigrid cycles. Source: model.md
+//! §18, passes.md. Error: of a cycle about an eighth of what the cycle before left; of rounding
+//! 2e-6 of φ.
+
+mod solids;
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
-use crate::layout::diffusion::{DiffusionParams, LEVELS_ROOM, LevelRecord, LevelStep, levels};
+use crate::layout::diffusion::{
+    DiffusionParams, LEVELS_ROOM, LevelRecord, LevelStep, N_PATCHES, levels,
+};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
@@ -110,6 +115,9 @@ record! {
 /// Sweeps of the coarsest grid.
 const COARSEST_SWEEPS: u32 = 16;
 
+use solids::Solids;
+pub use solids::{FacesPush, PatchesPush, SolidsPush, SolidsWork};
+
 bindings! {
     /// The buffers of the pass that others share.
     pub struct DiffusionBuffers {
@@ -119,9 +127,16 @@ bindings! {
         regions,
         /// `f32` by cell: extinction per length.
         density,
+        /// `FacetRecord` by facet; without surfaces and ground not read.
+        facets,
+        /// `f32` optical depth by facet and light; alike.
+        depths,
         /// Output, four `[f32; 4]` by cell: φ and F along each axis, and beside φ the mean fluence
         /// of suns and lamps.
         field,
+        /// Output, four `[f32; 4]` by patch of the box: φ and F along each axis; without surfaces
+        /// and ground not written.
+        patches,
     }
 }
 
@@ -138,6 +153,8 @@ pub struct DiffusionWork {
     pub max_steps: u32,
     /// Number of cycles.
     pub n_cycles: u32,
+    /// Light of surfaces and ground.
+    pub solids: SolidsWork,
 }
 
 /// Room for the grids of the solver.
@@ -149,12 +166,19 @@ pub struct Room {
     pub n_sets: u32,
     /// The fluence of suns and lamps is wanted in every cell.
     pub has_slopes: bool,
+    /// Facets of surfaces and ground.
+    pub n_solid_facets: u64,
 }
 
 impl Room {
     /// Returns the room for a grid of at most `n_cells`.
-    pub fn new(n_cells: u64, n_sets: u32, has_slopes: bool) -> Room {
-        Room { n_cells: LEVELS_ROOM * n_cells, n_sets, has_slopes }
+    pub fn new(n_cells: u64, n_sets: u32, has_slopes: bool, n_solid_facets: u64) -> Room {
+        Room { n_cells: LEVELS_ROOM * n_cells, n_sets, has_slopes, n_solid_facets }
+    }
+
+    /// Returns the number of patches through which light passes to and from surfaces and ground.
+    pub fn n_patches(&self) -> u64 {
+        if self.n_solid_facets > 0 { u64::from(N_PATCHES) } else { 0 }
     }
 }
 
@@ -170,6 +194,10 @@ buffers! {
         next_phi: Buffer => [f32; 4], room.n_cells, "diffusion.next_phi", Texels;
         /// Right-hand sides by cell.
         source: Buffer => [f32; 4], room.n_cells, "diffusion.source", Texels;
+        /// By facet of surfaces and ground: place and area, normal, radiosity.
+        solids: Buffer => [[f32; 4]; 3], room.n_solid_facets, "diffusion.solids", Texels;
+        /// Their light by patch of the box.
+        faces: Buffer => [f32; 4], room.n_patches(), "diffusion.faces";
     }
 }
 
@@ -183,6 +211,8 @@ pub struct Diffusion {
     coarsest: Kernel,
     restrict: Kernel,
     flux: Kernel,
+    /// Light from and to surfaces and ground, where a scene has them.
+    solids: Option<Solids>,
     scratch: Scratch,
     room: Room,
 }
@@ -193,11 +223,17 @@ impl Diffusion {
     /// # Errors
     /// Fails if a shader does not compile or the device cannot hold the buffers.
     pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Diffusion> {
-        let macros = [("N_SETS", room.n_sets), ("SLOPES", u32::from(room.has_slopes))];
+        let has_solids = room.n_solid_facets > 0;
+        let macros = [
+            ("N_SETS", room.n_sets),
+            ("SLOPES", u32::from(room.has_slopes)),
+            ("SOLIDS", u32::from(has_solids)),
+        ];
         let kernel = |name: &str, fields: &_| {
             Kernel::with_macros(device, compiler, name, fields, &[], &macros)
         };
         Ok(Diffusion {
+            solids: has_solids.then(|| Solids::new(device, compiler)).transpose()?,
             sources: kernel("diffusion.sources", SourcesPush::FIELDS)?,
             system: kernel("diffusion.system", SystemPush::FIELDS)?,
             coarsen: kernel("diffusion.coarsen", PairPush::FIELDS)?,
@@ -218,7 +254,7 @@ impl Diffusion {
         })
     }
 
-    /// Writes φ and F of every cell of `grid`.
+    /// Writes φ and F of every cell of `grid`, and with surfaces or ground of its patches.
     ///
     /// # Errors
     /// Fails if the grid has more cells than there is room for.
@@ -237,9 +273,14 @@ impl Diffusion {
                 self.room.n_cells
             )));
         }
-        let DiffusionBuffers { lights, regions, density, field } = *buffers;
-        let Scratch { operators, phi, next_phi, source } = &self.scratch;
+        let DiffusionBuffers { lights, regions, density, facets, depths, field, patches } =
+            *buffers;
+        let Scratch { operators, phi, next_phi, source, solids, faces } = &self.scratch;
         let n_cells = steps[0].level.n_total();
+        if let Some(kernels) = &self.solids {
+            let given = [facets, lights, depths, regions];
+            kernels.record_faces(rec, given, [solids, faces], grid, &work.solids)?;
+        }
         let push = SourcesPush {
             grid: *grid,
             albedo: of.albedo,
@@ -260,8 +301,9 @@ impl Diffusion {
             n_lights: work.n_lights,
             n_all,
         };
-        let system = [lights, density, field, operators, phi, source];
-        rec.dispatch(&self.system, &system, &push, n_cells)?;
+        let system = [lights, density, field, operators, phi, source, faces];
+        let n_buffers = 6 + usize::from(self.solids.is_some());
+        rec.dispatch(&self.system, &system[..n_buffers], &push, n_cells)?;
         for pair in steps.windows(2) {
             let push = pair_push(pair, n_all);
             rec.dispatch(&self.coarsen, &[operators], &push, pair[1].level.n_total())?;
@@ -270,7 +312,11 @@ impl Diffusion {
             self.record_cycle(rec, &steps, n_all, i == 0)?;
         }
         let push = FluxPush { grid: *grid, kept: of.kept, inverse_chord: of.inverse_chord };
-        rec.dispatch(&self.flux, &[density, next_phi, field], &push, n_cells)
+        rec.dispatch(&self.flux, &[density, next_phi, field], &push, n_cells)?;
+        match &self.solids {
+            Some(kernels) => kernels.record_patches(rec, [field, patches], grid),
+            None => Ok(()),
+        }
     }
 
     /// Two sweeps on every level on the way down, and two on the way up. The first sweep from φ = 0
@@ -282,7 +328,7 @@ impl Diffusion {
         n_all: u32,
         is_first: bool,
     ) -> Result<()> {
-        let Scratch { operators, phi, next_phi, source } = &self.scratch;
+        let Scratch { operators, phi, next_phi, source, .. } = &self.scratch;
         for (i, pair) in steps.windows(2).enumerate() {
             let push = pair_push(pair, n_all);
             if i == 0 && !is_first {

@@ -23,7 +23,7 @@ record! {
         n_lights: u32,
         /// Number of surfaces and grounds: the regions before the clouds.
         n_solids: u32,
-        /// 1 − g of the ways to surfaces and ground.
+        /// Share of the depth that weakens light on its way to surfaces and ground.
         backward: f32,
         /// Number of terms.
         n_terms: u32,
@@ -58,6 +58,9 @@ bindings! {
         field,
         /// Output, `SlopeRecord` by facet of a cloud; without slopes not written.
         slopes,
+        /// Four `[f32; 4]` by patch of the grid's box: φ and F; read with diffusion and surfaces or
+        /// ground.
+        patches,
     }
 }
 
@@ -72,35 +75,44 @@ pub struct ScatterParams {
     pub n_lights: u32,
     /// Number of surfaces and grounds.
     pub n_solids: u32,
-    /// g of the ways to surfaces and ground.
-    pub forward: f64,
+    /// Share of the depth that weakens light on its way to surfaces and ground.
+    pub backward: f64,
     /// Number of terms of the light that is scattered once.
     pub n_terms: u32,
     /// Light, optical depth and mean cosines of a term over those of the one before.
     pub term: [f64; 3],
 }
 
+/// Further light of a scene besides that of suns and lamps that is scattered once.
+#[derive(Debug, Clone, Copy)]
+pub struct ScatterVariant {
+    /// Light is scattered further by diffusion.
+    pub is_diffuse: bool,
+    /// The slopes of diffuse light are wanted.
+    pub has_slopes: bool,
+    /// Diffuse light reaches surfaces or ground.
+    pub has_solids: bool,
+}
+
 /// The pipeline of the pass.
 pub struct Scatter {
     kernel: Kernel,
-    n_buffers: usize,
+    variant: ScatterVariant,
 }
 
 impl Scatter {
-    /// Creates the pipeline; `is_diffuse` if light is scattered further by diffusion, and then
-    /// `has_slopes` if its slopes are wanted.
+    /// Creates the pipeline.
     ///
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
-    pub fn new(
-        device: &Device,
-        compiler: &Compiler,
-        [is_diffuse, has_slopes]: [bool; 2],
-    ) -> Result<Scatter> {
-        let macros = [("DIFFUSE", u32::from(is_diffuse)), ("SLOPES", u32::from(has_slopes))];
+    pub fn new(device: &Device, compiler: &Compiler, variant: ScatterVariant) -> Result<Scatter> {
+        let macros = [
+            ("DIFFUSE", u32::from(variant.is_diffuse)),
+            ("SLOPES", u32::from(variant.has_slopes)),
+            ("SOLIDS", u32::from(variant.has_solids)),
+        ];
         let kernel = Kernel::with_macros(device, compiler, "scatter", Push::FIELDS, &[], &macros)?;
-        let n_buffers = 7 + usize::from(is_diffuse) + usize::from(has_slopes);
-        Ok(Scatter { kernel, n_buffers })
+        Ok(Scatter { kernel, variant })
     }
 
     /// Writes the light of every facet.
@@ -121,13 +133,19 @@ impl Scatter {
             n_facets: of.n_facets,
             n_lights: of.n_lights,
             n_solids: of.n_solids,
-            backward: (1.0 - of.forward) as f32,
+            backward: of.backward as f32,
             n_terms: of.n_terms,
             term_light,
             term_depth,
             term_phase,
         };
-        let buffers: [&Buffer; 9] = buffers.by_binding();
-        rec.dispatch(&self.kernel, &buffers[..self.n_buffers], &push, of.n_facets)
+        // The last ones are bound where they are wanted.
+        let ScatterVariant { is_diffuse, has_slopes, has_solids } = self.variant;
+        let is_bound = [is_diffuse, has_slopes, has_solids];
+        let buffers: [&Buffer; 10] = buffers.by_binding();
+        let (always, wanted) = buffers.split_at(7);
+        let wanted = wanted.iter().zip(is_bound).filter(|(_, is)| *is).map(|(buffer, _)| *buffer);
+        let bound: Vec<&Buffer> = always.iter().copied().chain(wanted).collect();
+        rec.dispatch(&self.kernel, &bound, &push, of.n_facets)
     }
 }

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::case::{Case, Comparison};
 use super::context::StressContext;
 use super::scenes::{
-    HEIGHT, SUN_ABOVE, WIDTH, blob, blob_cluster, cloud_of, rectangle, surface_scene,
+    HEIGHT, SUN_ABOVE, WIDTH, blob, blob_cluster, cloud_of, floor, rectangle, surface_scene,
 };
 use crate::error::Result;
 use crate::model::cloud::{CloudSource, Particle};
@@ -19,8 +19,8 @@ use crate::reference::rounding::U_F32;
 pub const CASES: &[Case] = &[
     Case {
         name: "scattering/furnace",
-        what: "a white cloud in even light, of optical depth 1e-6 to 1e4: as bright as the light, \
-            by diffusion",
+        what: "a white cloud in even light, of optical depth 1e-6 to 1e4, without and with white \
+            floors: as bright as the light, by diffusion",
         bound: "128 u, relative: (cells across)^2 / 8",
         check: furnace,
     },
@@ -100,12 +100,18 @@ fn cluster(tau: f64) -> Vec<Particle> {
 }
 
 fn furnace(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
-    for tau in [1e-6, 1.0, 1e4] {
-        let scene = scene(LightingMode::Diffusion, EVEN, "albedo = [1, 1, 1]\n", cluster(tau))?;
+    const WHITE: &str = "kd = [1, 1, 1]\nalbedo = [1, 1, 1]\n";
+    // In the box, just below it, and far below.
+    let floors = [-0.3, -2.0, -6.0].map(|y| floor([0.0, y, 0.0], 8)).to_vec();
+    for (tau, surfaces) in
+        [1e-6, 1.0, 1e4].into_iter().flat_map(|t| [(t, vec![]), (t, floors.clone())])
+    {
+        let mut scene = scene(LightingMode::Diffusion, EVEN, WHITE, cluster(tau))?;
+        scene.surfaces = surfaces;
         let frame = ctx.render(&scene, 0)?;
         for (i, lit) in frame.lit.iter().enumerate() {
-            let what = format_args!("radiance of blob {i}, depth {tau:e}");
-            let bound = (128.0 * U_F32 + UNEVEN) * FRAC_1_PI;
+            let what = format_args!("radiance of facet {i}, depth {tau:e}");
+            let bound = (128.0 * U_F32 + 4.0 * UNEVEN) * FRAC_1_PI;
             c.add(f64::from(lit.first[0]), FRAC_1_PI, bound, what);
         }
     }

@@ -225,10 +225,24 @@ pub const FAULTS: &[Fault] = &[
         "brdf/exponent-0",
     ),
     (
-        "no light leaves the box of diffusion",
+        "no light enters diffusion from above",
         "diffusion_system.comp",
-        "right += 4.0 * through * of_sky(axis == 1 ? 1.0 : 0.5);",
+        "right += through * (4.0 * max(j, vec3(0.0)) - half_cell * carried);",
         "",
+        "scattering/furnace",
+    ),
+    (
+        "ground does not hide the sky from clouds",
+        "diffusion_faces.comp",
+        "(sent - all - ",
+        "(sent - ",
+        "scattering/furnace",
+    ),
+    (
+        "clouds do not hide the sky from ground",
+        "scatter.comp",
+        "share * (sent - all - ",
+        "share * (sent - ",
         "scattering/furnace",
     ),
     (

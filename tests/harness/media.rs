@@ -25,8 +25,13 @@ const LIGHTS: &str = "[[light]]\nkind = 'directional'\ndirection = [-0.5, -0.8, 
     [[light]]\nkind = 'spot'\nposition = [-2, 1, 2]\ndirection = [2, -1, -2]\n\
     intensity = [1, 2, 3]\ninner_deg = 10\nouter_deg = 25\n";
 
+/// A lamp under the clouds, and a sky.
+const FROM_BELOW: &str = "[[light]]\nkind = 'sky'\nirradiance = [0.8, 0.87, 1]\nconstant = 0.3\n\
+    [[light]]\nkind = 'point'\nposition = [0.3, -2.6, 0.2]\nintensity = [0.4, 0.2, 0.1]\n";
+
 /// Scenes by name: coloured balls among lamps and surfaces, droplets in facets of several, flat
-/// blobs over one another, boxes.
+/// blobs over one another, boxes; "floors" whose lamps no cloud hides, in the box of the grid, near
+/// it, and far from it.
 pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
     let dir = tempfile::tempdir().expect("a folder");
     let write = |file: &str, text: &str| std::fs::write(dir.path().join(file), text).expect("room");
@@ -45,6 +50,14 @@ pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
              subdivide = [3, 3]\n[[surface]]\ncenter = [1.2, 1.0, 0.5]\nu = [0.6, 0, 0]\n\
              v = [0, 0, 0.6]\nmaterial = 'm'\n",
         ),
+        "floors" => (
+            "kd = [0.9, 0.8, 0.7]\n",
+            "[[cloud]]\nfrom = 'particles'\nfile = 'points.csv'\nmaterial = 'm'\n[[surface]]\n\
+             center = [0, -3.5, 0]\nu = [0, 0, 5]\nv = [5, 0, 0]\nmaterial = 'm'\n\
+             subdivide = [9, 9]\n[[surface]]\ncenter = [-3.5, -1.0, 0]\nu = [0.5, 1, 0]\n\
+             v = [0, 0, 0.5]\nmaterial = 'm'\nsubdivide = [2, 2]\n[[surface]]\n\
+             center = [0.0, -0.9, 1.1]\nu = [0, 0, 0.4]\nv = [0.4, 0, 0]\nmaterial = 'm'\n",
+        ),
         "droplets" => (
             "albedo = [0.999, 0.99, 0.95]\nphase = 'mie'\ndroplet_um = 8\n",
             "[[cloud]]\nfrom = 'boxes'\nfile = 'boxes.dat'\nmaterial = 'm'\noptical_depth = 2\n",
@@ -59,9 +72,10 @@ pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
         ),
     };
     let grouped = if name == "droplets" { "facets_per_cloud = 30\n" } else { "" };
+    let lights = if name == "floors" { FROM_BELOW } else { LIGHTS };
     let text = format!(
         "[film]\nwidth = 64\nheight = 48\n[camera]\nposition = [0.5, 1, 6]\ntarget = [0, 0, 0]\n\
-         [lighting]\nmode = '{mode}'\ngrid = 20\n{grouped}{LIGHTS}[[material]]\nname = 'm'\n\
+         [lighting]\nmode = '{mode}'\ngrid = 20\n{grouped}{lights}[[material]]\nname = 'm'\n\
          {material}{cloud}"
     );
     write("scene.toml", &text);
@@ -162,7 +176,13 @@ pub fn bound(scene: &Scene) -> f64 {
 pub fn check(gpu: &Gpu, name: &str, mode: &str) {
     let scene = scene(name, mode, &[]);
     let (found, truth) = (on_device(gpu, &gpu.compiler, &scene), by_twin(&scene));
+    // The twin lights surfaces without the grid, which is the same where no cloud is between.
+    let of_solids = match name {
+        "floors" => apart(&found.of_solids, &truth.of_solids),
+        _ => 0.0,
+    };
     let off = [
+        of_solids,
         apart(&found.direct, &truth.direct),
         apart(&found.radiance, &truth.radiance),
         slopes_apart(&scene, &found, &truth),
@@ -183,6 +203,10 @@ pub fn check_found(gpu: &Gpu, wrong: &[Wrong]) {
         let (found, truth) = (on_device(gpu, &wrong, &scene), by_twin(&scene));
         let off = apart(&found.radiance, &truth.radiance).max(apart(&found.direct, &truth.direct));
         let off = off.max(slopes_apart(&scene, &found, &truth));
+        let off = match *name {
+            "floors" => off.max(apart(&found.of_solids, &truth.of_solids)),
+            _ => off,
+        };
         println!("{name}, {mode}, {file}, {from} -> {to}: {off:e}");
         assert!(off > bound(&scene), "{name}, {mode}, {file}, {from} -> {to}: {off:e}");
     }

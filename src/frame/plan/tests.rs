@@ -300,4 +300,13 @@ fn a_medium_runs_what_its_light_depends_on() {
     let mut next = p.clone();
     next.lights[0].energy[1] = 2.0;
     assert_eq!(running(&once, Some(&p), &next), ["scatter", "sprites"]);
+    // The material of ground changes what it sends into clouds.
+    let over_ground = SceneFeatures { n_terrains: 1, ..features };
+    let repainted = |features: &SceneFeatures| {
+        let mut next = p.clone();
+        next.regions[0].kd = [0.1; 3];
+        let all = running(features, Some(&p), &next);
+        ["diffusion", "scatter"].map(|pass| all.contains(&pass))
+    };
+    assert_eq!([&over_ground, &features].map(repainted), [[true, true], [false, true]]);
 }

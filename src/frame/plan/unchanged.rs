@@ -128,7 +128,7 @@ impl Unchanged {
             rays: facets && same(&has_same_rays),
             eye,
             response,
-            diffusion: grid && geometry && media && lights,
+            diffusion: grid && geometry && media && lights && (materials || !features.has_solids()),
             light,
             drawn,
             kept,

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
+use super::faces::FaceLight;
 use super::multigrid::Multigrid;
 use super::sources::{DiffusionMedium, Sources};
 use super::system::{System, before, next};
@@ -23,16 +24,18 @@ pub struct DiffuseLight {
 }
 
 impl DiffuseLight {
-    /// Computes the light in the cells of `obstacles` by `n_cycles` cycles.
+    /// Computes the light in the cells of `obstacles` by `n_cycles` cycles. `of_solids` is that of
+    /// surfaces and ground, where a scene has them.
     pub fn new(
         of: &DiffusionMedium,
         obstacles: &Obstacles<'_>,
         lights: &[Light],
+        of_solids: Option<&FaceLight>,
         n_cycles: u32,
     ) -> DiffuseLight {
         let (grid, cells) = (obstacles.spec, obstacles.cells);
-        let sources = Sources::new(of, obstacles, lights);
-        let system = System::new(of, grid, cells, &sources, lights);
+        let sources = Sources::new(of, obstacles, lights, of_solids.is_some());
+        let system = System::new(of, grid, cells, &sources, lights, of_solids);
         let phi = Multigrid::new(system, grid.edges()).solve(n_cycles);
         DiffuseLight::of_fluence(of, grid, cells, &sources, &phi)
     }
@@ -56,6 +59,13 @@ impl DiffuseLight {
         let of_cell = |c: usize| [phi[c], flux(c, 0), flux(c, 1), flux(c, 2)];
         let (cells, direct) = ((0..cells.len()).map(of_cell).collect(), sources.direct.clone());
         DiffuseLight { spec: *grid, cells, direct }
+    }
+
+    /// Returns light with the given φ and F of each cell, and no suns or lamps.
+    #[cfg(test)]
+    pub(super) fn of_cells(spec: &GridSpec, cells: Vec<[DVec3; 4]>) -> DiffuseLight {
+        let direct = vec![0.0; cells.len()];
+        DiffuseLight { spec: *spec, cells, direct }
     }
 
     /// Returns φ and F at `p`, and U: trilinear between the cells' centres, and beyond the

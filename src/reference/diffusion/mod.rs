@@ -9,9 +9,13 @@
 //!
 //! - [`Multigrid`]: their solution by cycles, as the device does.
 //!
+//! - [`FaceLight`], [`BoxLight`]: what surfaces and ground send to the cells, and cells to them.
+//!
 //! - [`DiffuseLight`]: all of them for a frame, and what a blob scatters of it.
 
+mod box_light;
 mod direct_solve;
+mod faces;
 mod field;
 mod multigrid;
 mod sources;
@@ -19,7 +23,9 @@ mod system;
 #[cfg(test)]
 mod tests;
 
+pub use box_light::BoxLight;
 pub use direct_solve::solve;
+pub use faces::FaceLight;
 pub use field::DiffuseLight;
 pub use multigrid::Multigrid;
 pub use sources::{DiffusionMedium, Sources};

@@ -37,26 +37,36 @@ impl DiffusionMedium {
 pub struct Sources {
     /// Q0: light that is scattered, W m⁻³.
     pub scattered: Vec<DVec3>,
-    /// q = 3D Q1: D times three times the momentum that it keeps, a row an axis, W m⁻².
+    /// q = D(3Q1 + cF₀): D times three times the momentum that it keeps, with the sky's where a
+    /// scene has surfaces or ground; a row an axis, W m⁻².
     pub carried: Vec<[DVec3; 3]>,
     /// U: fluence of suns and lamps, mean over the channels, W m⁻².
     pub direct: Vec<f64>,
 }
 
 impl Sources {
-    /// Returns the sources in the cells of `cells` density.
-    pub fn new(of: &DiffusionMedium, obstacles: &Obstacles<'_>, lights: &[Light]) -> Sources {
+    /// Returns the sources in the cells of `obstacles`, with the flux of the sky if it is wanted.
+    pub fn new(
+        of: &DiffusionMedium,
+        obstacles: &Obstacles<'_>,
+        lights: &[Light],
+        has_sky_flux: bool,
+    ) -> Sources {
         let MeanMedium { albedo, g, straight: f } = of.mean;
-        let depth = DVec3::ONE - albedo * f;
+        let (depth, kept) = (DVec3::ONE - albedo * f, DVec3::ONE - albedo * g);
         let spec = obstacles.spec;
         let found = parallel_map(obstacles.cells.len(), |c| {
             let p = spec.center(c);
             let receiver = Receiver { position: p, i_region: u32::MAX };
-            let (mut fluence, mut flux) = (DVec3::ZERO, DMat3::ZERO);
-            for light in lights.iter().filter(|light| !light.is_sky()) {
+            let (mut fluence, mut flux, mut fallen) = (DVec3::ZERO, DMat3::ZERO, DVec3::ZERO);
+            for light in lights.iter().filter(|light| has_sky_flux || !light.is_sky()) {
                 let way = light.arrival(p);
                 let tau = obstacles.depths(&[receiver], std::slice::from_ref(light))[0];
                 if tau >= BARRED {
+                    continue;
+                }
+                if light.is_sky() {
+                    fallen += light.energy() * (-tau * kept).exp();
                     continue;
                 }
                 let e = light.energy() * way.falloff * (-tau * depth).exp();
@@ -67,9 +77,10 @@ impl Sources {
                 }
             }
             let extinction = obstacles.cells[c];
-            let carried = [0, 1, 2].map(|axis| {
+            let mut carried = [0, 1, 2].map(|axis| {
                 3.0 * of.reach(extinction) * albedo * (g - f) * extinction * flux.col(axis)
             });
+            carried[1] -= of.reach(extinction) * of.inverse_chord * fallen;
             (albedo * (1.0 - f) * extinction * fluence, (carried, fluence.element_sum() / 3.0))
         });
         let (scattered, rest): (Vec<DVec3>, Vec<_>) = found.into_iter().unzip();

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, USizeVec3};
 
+use super::faces::FaceLight;
 use super::sources::{DiffusionMedium, Sources};
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
@@ -56,6 +57,7 @@ impl System {
         cells: &[f64],
         sources: &Sources,
         lights: &[Light],
+        of_solids: Option<&FaceLight>,
     ) -> System {
         let n = grid.n_cells.as_usizevec3();
         let reach: Vec<DVec3> = cells.iter().map(|sigma| of.reach(*sigma)).collect();
@@ -65,6 +67,14 @@ impl System {
             next: vec![[DVec3::ZERO; 3]; cells.len()],
             sink: cells.iter().map(|sigma| sigma * (DVec3::ONE - of.mean.albedo)).collect(),
             source: sources.scattered.clone(),
+        };
+        let extent = grid.high() - grid.low;
+        // Light that arrives at the face of the box at cell c.
+        let arriving = |c: usize, axis: usize, side: usize| {
+            let solids =
+                |light: &FaceLight| light.at(axis, side, (grid.center(c) - grid.low) / extent);
+            let of_solids = of_solids.map_or(DVec3::ZERO, solids);
+            (of_sky(lights, axis, side) + of_solids).max(DVec3::ZERO)
         };
         for c in 0..cells.len() {
             for axis in 0..3 {
@@ -76,23 +86,24 @@ impl System {
                         system.next[c][axis] = 2.0 * a * b / (a + b) / (h * h);
                         system.source[c] -= 0.5 * (carried(c) + carried(after)) / h;
                     }
-                    None => system.add_face(c, reach[c], h, of_sky(lights, axis, 1)),
+                    None => system.add_face(c, (reach[c], h), arriving(c, axis, 1), carried(c)),
                 }
                 match before(n, c, axis) {
                     Some(prior) => system.source[c] += 0.5 * (carried(prior) + carried(c)) / h,
-                    None => system.add_face(c, reach[c], h, of_sky(lights, axis, 0)),
+                    None => system.add_face(c, (reach[c], h), arriving(c, axis, 0), -carried(c)),
                 }
             }
         }
         system
     }
 
-    /// Adds a face of the box: Marshak's condition φ/4 − F/2 = J with what flows in, F, over half a
-    /// cell.
-    fn add_face(&mut self, c: usize, reach: DVec3, h: f64, arriving: DVec3) {
-        let through = (2.0 + 0.5 * h / reach).recip() / h;
+    /// Adds a face of the box: Marshak's condition φ/4 + F/2 = J with what flows in, F, over half a
+    /// cell. `carried` is q outward.
+    fn add_face(&mut self, c: usize, (reach, h): (DVec3, f64), arriving: DVec3, carried: DVec3) {
+        let half = 0.5 * h / reach;
+        let through = (2.0 + half).recip() / h;
         self.sink[c] += through;
-        self.source[c] += 4.0 * through * arriving;
+        self.source[c] += through * (4.0 * arriving - half * carried);
     }
 
     /// Returns Σ w (φ − φ_n) + sink φ in cell `c`.

@@ -57,8 +57,8 @@ fn system_of(
     let of = DiffusionMedium::new(MEAN, grid);
     let obstacles =
         Obstacles { spec: grid, cells: &cells, rectangles: &[], step: 0.5, forward: 0.0 };
-    let sources = Sources::new(&of, &obstacles, lights);
-    let system = System::new(&of, grid, &cells, &sources, lights);
+    let sources = Sources::new(&of, &obstacles, lights, false);
+    let system = System::new(&of, grid, &cells, &sources, lights, None);
     (of, cells, sources, system)
 }
 
@@ -144,6 +144,26 @@ fn finer_grids_converge_at_second_order() {
     println!("{found:?}, steps {steps:?}");
     // A quarter of the step before, once a cell is shorter than a blob's σ.
     assert!(steps[2] < 0.35 * steps[1] && steps[1] < 0.6 * steps[0], "{steps:?}");
+}
+
+#[test]
+fn an_empty_box_lets_the_sky_through() {
+    // φ = 2E + 4kE and F = −E along y in all cells, as without the box.
+    let sky = Light::Sky { irradiance: DVec3::new(1.0, 2.0, 0.5), constant: 0.2 };
+    let grid = spec([6, 5, 4], 0.7);
+    let of = DiffusionMedium::new(MEAN, &grid);
+    let cells = vec![0.0; 120];
+    let obstacles =
+        Obstacles { spec: &grid, cells: &cells, rectangles: &[], step: 0.5, forward: 0.0 };
+    let sources = Sources::new(&of, &obstacles, &[sky], true);
+    let system = System::new(&of, &grid, &cells, &sources, &[sky], None);
+    let phi = solve(&system);
+    let light = DiffuseLight::of_fluence(&of, &grid, &cells, &sources, &phi);
+    for [phi, x, y, z] in &light.cells {
+        let e = sky.energy();
+        assert!((*phi - 2.8 * e).abs().max_element() < 1e-12, "{phi}");
+        assert!((*y + e).abs().max_element() < 1e-12 && (*x + *z).abs().max_element() < 1e-12);
+    }
 }
 
 #[test]

@@ -1,8 +1,11 @@
 //! Every stage of one frame in f64, from the scene alone.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
 use super::local_scene::LocalScene;
+use super::medium_light::MediumLight;
 use crate::error::Result;
 use crate::model::cloud::{Cloud, CloudSource, Group};
 use crate::model::frame_state::FrameState;
@@ -10,10 +13,8 @@ use crate::model::light::{Light, UP};
 use crate::model::medium::{MeanMedium, Medium, ScatterLaw};
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::shade::FacetSlope;
-use crate::model::surface::Surface;
 use crate::reference::area::adaptive::{Accuracy, Estimate};
 use crate::reference::area::{AreaScene, DiscFacet, Receiver};
-use crate::reference::diffusion::{DiffuseLight, DiffusionMedium};
 use crate::reference::facets::{Facet, FacetPlace, FacetSources};
 use crate::reference::generate::Generated;
 use crate::reference::occlude::Rectangle;
@@ -186,30 +187,49 @@ impl FrameReference {
             .iter()
             .map(|f| transmit::Receiver { position: f.position, i_region: f.region })
             .collect();
-        let transmittance = obstacles.transmittance(&receivers, &local.lights);
+        let diffuse = (scene.lighting.mode == LightingMode::Diffusion).then(|| {
+            let mean = MeanMedium::new(scene, &self.groups, self.state.time_s);
+            MediumLight::new(scene, &mean, &obstacles, &local)
+        });
+        // Diffuse light has the sky, and what is scattered on the way from suns and lamps.
+        let (direct, lights) = match &diffuse {
+            Some(light) => {
+                let lights = local.lights.iter().filter(|light| !light.is_sky()).copied();
+                (Obstacles { forward: light.forward, ..obstacles }, lights.collect())
+            }
+            None => (obstacles, local.lights.clone()),
+        };
+        let transmittance = direct.transmittance(&receivers, &lights);
         self.irradiance =
-            reference::first::irradiance(&positions, &normals, &transmittance, &local.lights);
+            reference::first::irradiance(&positions, &normals, &transmittance, &lights);
+        let more = diffuse.as_ref().map_or(&[][..], |light| &light.on_solids);
+        let (on_surfaces, on_ground) = more.split_at(more.len().saturating_sub(local.ground.len()));
+        for (e, more) in self.irradiance.iter_mut().zip(on_ground) {
+            *e += *more;
+        }
         self.radiance =
             reference::first::radiance(&self.irradiance, &regions, &local.kd(), &self.facet_colors);
         if scene.lighting.mode.is_medium() {
-            self.scatter(scene, &obstacles, &local.lights);
+            self.scatter(scene, &obstacles, &local.lights, diffuse.as_ref());
         }
-        self.light_surfaces(scene, &local, take)
+        self.light_surfaces(scene, &local, (&lights, direct.forward), on_surfaces, take)
     }
 
     /// Replaces the light of the clouds' facets by what they scatter as a medium.
-    fn scatter(&mut self, scene: &Scene, obstacles: &Obstacles<'_>, lights: &[Light]) {
-        let time_s = self.state.time_s;
-        let diffuse = (scene.lighting.mode == LightingMode::Diffusion).then(|| {
-            let mean = MeanMedium::new(scene, &self.groups, time_s);
-            let medium = DiffusionMedium::new(mean, &self.state.grid);
-            DiffuseLight::new(&medium, obstacles, lights, scene.lighting.diffusion.cycles)
-        });
+    fn scatter(
+        &mut self,
+        scene: &Scene,
+        obstacles: &Obstacles<'_>,
+        lights: &[Light],
+        diffuse: Option<&MediumLight>,
+    ) {
         let forward = scene.lighting.forward;
-        let medium = |c: &Cloud| Medium::new(&scene.materials[c.i_material], time_s, forward);
+        let medium =
+            |c: &Cloud| Medium::new(&scene.materials[c.i_material], self.state.time_s, forward);
         let media: Vec<Medium> = scene.clouds.iter().map(medium).collect();
         let eye = self.state.pose.position - self.state.light_origin;
         let n_solids = scene.n_solids();
+        let diffuse = diffuse.map(|light| &light.cells);
         let found = parallel_map(self.facets.len(), |i| {
             let facet = &self.facets[i];
             let i_cloud = (facet.region as usize).checked_sub(n_solids)?;
@@ -221,8 +241,8 @@ impl FrameReference {
             let has_sky = diffuse.is_none();
             let once = reference::scatter::radiance(&law, p, eye, &taus, lights, has_sky);
             let outgoing = (eye - p).normalize_or(UP);
-            let more = diffuse.as_ref().map(|light| light.scattered(&law, p, outgoing));
-            let slope = diffuse.as_ref().map(|light| light.slope(&law, p, outgoing, once));
+            let more = diffuse.map(|light| light.scattered(&law, p, outgoing));
+            let slope = diffuse.map(|light| light.slope(&law, p, outgoing, once));
             Some((fluence, once + more.unwrap_or_default(), slope.unwrap_or_default()))
         });
         for (i, light) in found.iter().enumerate() {
@@ -278,11 +298,15 @@ impl FrameReference {
         take(&sources, &reference::place::cloud_centers(&scene.clouds, time_s, light_origin))
     }
 
-    /// Puts the surfaces' facets before all others, lit by the area reference.
+    /// Puts the surfaces' facets before all others, lit by the area reference, with `more`
+    /// irradiance by diffuse light. `lights` reach them through a share of the depth, 1 less the
+    /// number beside them.
     fn light_surfaces<T>(
         &mut self,
         scene: &Scene,
         local: &LocalScene,
+        (lights, forward): (&[Light], f64),
+        more: &[DVec3],
         take: impl FnOnce(&FrameReference, &SecondOf<'_>) -> T,
     ) -> T {
         let disc = |(f, c): (&Facet, &DVec3)| local.disc(f, *c);
@@ -296,13 +320,12 @@ impl FrameReference {
         let area_scene = AreaScene::new(
             &local.surfaces,
             local.surface_brdfs(),
-            &local.lights,
+            lights,
             &self.blobs,
-            scene.lighting.forward,
+            forward,
             &discs,
         );
-        let flat: Vec<Facet> =
-            local.surfaces.iter().zip(0u32..).flat_map(|(s, i)| surface_facets(s, i)).collect();
+        let flat: Vec<Facet> = local.surface_facets().collect();
         let eye = self.state.pose.position - self.state.light_origin;
         let on_surfaces = flat.iter().map(|f| area_scene.on_surface(f.region as usize, f.position));
         let receivers: Vec<(Receiver, DVec3)> = on_surfaces
@@ -311,8 +334,12 @@ impl FrameReference {
             .collect();
         let of_surfaces = &receivers[..flat.len()];
         let n = of_surfaces.len();
-        let first = parallel_map(n, |i| area_scene.first(&of_surfaces[i].0, of_surfaces[i].1));
-        let irradiance = parallel_map(n, |i| area_scene.irradiance(&of_surfaces[i].0));
+        let of_more = |i: usize| more.get(i).copied().unwrap_or(DVec3::ZERO);
+        let first = parallel_map(n, |i| {
+            let (at, toward) = &of_surfaces[i];
+            area_scene.first(at, *toward) + at.brdf.kd * of_more(i) / PI
+        });
+        let irradiance = parallel_map(n, |i| area_scene.irradiance(&of_surfaces[i].0) + of_more(i));
         self.radiance.splice(0..0, first);
         if !self.slopes.is_empty() {
             let even = |f: &Facet| FacetSlope { relative: DVec3::ZERO, position: f.position };
@@ -340,20 +367,6 @@ impl FrameReference {
 
 /// Relative accuracy of the second reflection: a hundredth of the 1 % that devices are held to.
 const SECOND_ACCURACY: f64 = 1e-4;
-
-/// Facets of a surface whose region is `region`.
-fn surface_facets(surface: &Surface, region: u32) -> impl Iterator<Item = Facet> + '_ {
-    let n = surface.subdivide[0] * surface.subdivide[1];
-    let area = surface.area() / f64::from(n);
-    let normal = surface.normal();
-    (0..n).map(move |i| Facet {
-        position: surface.facet_center(i),
-        normal,
-        area,
-        region,
-        conditioning: 1.0,
-    })
-}
 
 /// Returns every particle's own colour, linear RGB.
 pub fn colors(scene: &Scene) -> Vec<DVec3> {

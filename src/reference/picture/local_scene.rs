@@ -52,6 +52,16 @@ impl LocalScene {
         &self.brdfs[..self.n_solids]
     }
 
+    /// Facets of the surfaces.
+    pub fn surface_facets(&self) -> impl Iterator<Item = Facet> + '_ {
+        self.surfaces.iter().zip(0u32..).flat_map(|(s, i)| surface_facets(s, i))
+    }
+
+    /// Facets of the surfaces, and then of the ground.
+    pub fn solid_facets(&self) -> Vec<Facet> {
+        self.surface_facets().chain(self.ground.iter().copied()).collect()
+    }
+
     /// K_d of every region.
     pub fn kd(&self) -> Vec<DVec3> {
         self.brdfs.iter().map(|brdf| brdf.kd).collect()
@@ -71,4 +81,18 @@ impl LocalScene {
 /// Returns the scene's surfaces relative to `origin`.
 pub(super) fn surfaces(scene: &Scene, origin: DVec3) -> Vec<Surface> {
     scene.surfaces.iter().map(|s| Surface { center: s.center - origin, ..*s }).collect()
+}
+
+/// Facets of a surface whose region is `region`.
+fn surface_facets(surface: &Surface, region: u32) -> impl Iterator<Item = Facet> + '_ {
+    let n = surface.subdivide[0] * surface.subdivide[1];
+    let area = surface.area() / f64::from(n);
+    let normal = surface.normal();
+    (0..n).map(move |i| Facet {
+        position: surface.facet_center(i),
+        normal,
+        area,
+        region,
+        conditioning: 1.0,
+    })
 }

@@ -15,6 +15,7 @@ mod kind;
 mod layers;
 mod limits;
 mod local_scene;
+mod medium_light;
 mod model_light;
 mod model_picture;
 mod particle_light;

@@ -101,7 +101,7 @@ fn finder(what: &str) -> &'static [&'static str] {
         | "a slice closed as if it were thin" => {
             &["scenes/cubes-554.toml", "--set", "draw.overlap='slices'"]
         }
-        "no light leaves the box of diffusion"
+        "no light enters diffusion from above"
         | "a blob's front is lit as its back"
         | "diffuse light is not averaged over all directions" => {
             &["scenes/cubes-554.toml", "--set", "lighting.mode='diffusion'"]
@@ -112,6 +112,15 @@ fn finder(what: &str) -> &'static [&'static str] {
             "lighting.mode='diffusion'",
             "--set",
             "draw.overlap='slices'",
+        ],
+        "ground does not hide the sky from clouds" | "clouds do not hide the sky from ground" => &[
+            "scenes/katrina.toml",
+            "--set",
+            "cloud.0.particles=2000",
+            "--set",
+            "lighting.grid=24",
+            "--set",
+            "lighting.mode='diffusion'",
         ],
         "the sky's light from everywhere is too bright" => {
             &["scenes/cubes-554.toml", "--set", "lighting.mode='single'"]

@@ -101,8 +101,9 @@ fn cluster(tau: f64) -> Vec<Particle> {
 
 fn furnace(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     const WHITE: &str = "kd = [1, 1, 1]\nalbedo = [1, 1, 1]\n";
-    // In the box, just below it, and far below.
-    let floors = [-0.3, -2.0, -6.0].map(|y| floor([0.0, y, 0.0], 8)).to_vec();
+    // In the box, just below it, and far below; none is under another.
+    let places = [[0.0, -0.3, 0.0], [3.0, -2.0, 0.0], [-3.0, -6.0, 0.0]];
+    let floors = places.map(|at| floor(at, 8)).to_vec();
     for (tau, surfaces) in
         [1e-6, 1.0, 1e4].into_iter().flat_map(|t| [(t, vec![]), (t, floors.clone())])
     {

@@ -241,8 +241,8 @@ pub const FAULTS: &[Fault] = &[
     (
         "clouds do not hide the sky from ground",
         "scatter.comp",
-        "share * (sent - all - ",
-        "share * (sent - ",
+        "(sent - all - (offset.y > 0.0 ? above : vec3(0.0)))",
+        "sent",
         "scattering/furnace",
     ),
     (

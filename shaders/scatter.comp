@@ -55,7 +55,11 @@ WRITES(8, Slope, slopes)
 #include "first.glsl"
 #if SOLIDS
 // phi and the flux along each axis, by patch.
-TEXELS(8 + SLOPES, patches)
+#if SLOPES
+TEXELS(9, patches)
+#else
+TEXELS(8, patches)
+#endif
 #include "patches.glsl"
 #endif
 

@@ -49,6 +49,19 @@ WRITES(3, vec4, field)
 #include "march.glsl"
 #include "medium.glsl"
 
+// Returns the length of the way through the middle of a cell.
+float chord_of(vec3 toward) {
+    vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
+    vec3 across = edges / max(abs(toward), vec3(1e-6));
+    return min(across.x, min(across.y, across.z));
+}
+
+// Returns the mean of light over its way through a cell of this depth, over that in the middle.
+vec3 mean_over(vec3 depth) {
+    vec3 h = 0.5 * min(depth, vec3(40.0));
+    return mix(sinh(h) / max(h, vec3(1e-3)), vec3(1.0), lessThan(h, vec3(1e-3)));
+}
+
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
     FOR_EACH(c, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
@@ -56,7 +69,8 @@ void main() {
         vec3 p = push.grid.low + push.grid.cell * vec3(1.0, push.grid.aspect, 1.0) * at;
         float sigma = cell_at(int(c));
         vec3 weakened = 1.0 - push.albedo * push.straight;
-        vec3 fluence = vec3(0.0), fallen = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
+        vec3 fluence = vec3(0.0), fallen = vec3(0.0), direct = vec3(0.0);
+        vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
             bool is_sky = light.kind == LIGHT_SKY;
@@ -69,6 +83,8 @@ void main() {
                     fallen += light.energy * through(tau * (1.0 - push.albedo * push.g));
                 } else {
                     vec3 e = light.energy * a.falloff * through(tau * weakened);
+                    direct += e;
+                    e *= mean_over(sigma * weakened * chord_of(a.toward));
                     fluence += e;
                     x -= e * a.toward.x;
                     y -= e * a.toward.y;
@@ -79,9 +95,9 @@ void main() {
         vec3 reach = 1.0 / (3.0 * sigma * (1.0 - push.albedo * push.g) + push.inverse_chord);
         vec3 carried = 3.0 * reach * push.albedo * (push.g - push.straight) * sigma;
         vec3 scattered = push.albedo * (1.0 - push.straight) * sigma * fluence;
-        field[4 * c] = vec4(scattered, dot(fluence, vec3(1.0 / 3.0)));
-        field[4 * c + 1] = vec4(carried * x, 0.0);
-        field[4 * c + 2] = vec4(carried * y - reach * push.inverse_chord * fallen, 0.0);
-        field[4 * c + 3] = vec4(carried * z, 0.0);
+        field[4 * c] = vec4(scattered, dot(direct, vec3(1.0 / 3.0)));
+        field[4 * c + 1] = vec4(carried * x, fallen.r);
+        field[4 * c + 2] = vec4(carried * y - reach * push.inverse_chord * fallen, fallen.g);
+        field[4 * c + 3] = vec4(carried * z, fallen.b);
     }
 }

@@ -23,7 +23,8 @@ void main() {
         float aspect = particles[i].aspect;
         vec3 n = normal_at(p, scale, aspect, group.cloud_center);
         float area = area_of(sigma, aspect, particles[i].kappa);
+        vec3 place = shell_at(p, scale, aspect, n);
         facets[push.i_first_facet + i] =
-            Facet(shell_at(p, scale, aspect, n), area, n, group.i_region, particles[i].color, 0u);
+            Facet(place, area, n, group.i_region, particles[i].color, sigma);
     }
 }

@@ -106,7 +106,8 @@ void main() {
         float scale = max(sigma, sigma_mean);
         vec3 n = normal_at(p, scale, aspect, group.cloud_center);
         uint facet = push.i_first_facet + g;
-        facets[facet] = Facet(shell_at(p, scale, aspect, n), s.area, n, group.i_region, color, 0u);
+        vec3 place = shell_at(p, scale, aspect, n);
+        facets[facet] = Facet(place, s.area, n, group.i_region, color, sigma);
         for (uint k = run.i_first; k < run.i_first + run.n_particles; ++k) {
             i_facet[order[k]] = facet;
         }

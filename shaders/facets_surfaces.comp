@@ -24,7 +24,8 @@ void main() {
             - 1.0;
         vec3 u = region.u / float(region.n_u), v = region.v / float(region.n_v);
         vec3 position = region.center + at.x * region.u + at.y * region.v;
+        float area = 4.0 * length(u) * length(v);
         facets[j] =
-            Facet(position, 4.0 * length(u) * length(v), region.normal, i_region[j], vec3(1.0), 0u);
+            Facet(position, area, region.normal, i_region[j], vec3(1.0), 0.0);
     }
 }

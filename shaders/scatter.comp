@@ -23,6 +23,11 @@
 #define SLOPES 0
 #endif
 
+// 1: and what the cells scatter toward the eye is known.
+#ifndef SEEN
+#define SEEN 0
+#endif
+
 // 1: and the scene has surfaces or ground.
 #ifndef SOLIDS
 #define SOLIDS 0
@@ -40,6 +45,9 @@ layout(push_constant) uniform Push {
     float term_light;
     float term_depth;
     float term_phase;
+    float unused;
+    // 1 over albedo (1-f) of the mean medium.
+    vec3 inverse_scattered;
 } push;
 UPDATES(5, Lit, lit)
 READS(6, Medium, media)
@@ -50,6 +58,16 @@ TEXELS(7, field)
 #endif
 #if SLOPES
 WRITES(8, Slope, slopes)
+#endif
+#if SEEN
+// Radiance toward the eye and extinction by cell.
+#if SLOPES && SOLIDS
+TEXELS(10, seen)
+#elif SLOPES || SOLIDS
+TEXELS(9, seen)
+#else
+TEXELS(8, seen)
+#endif
 #endif
 
 #include "first.glsl"
@@ -117,8 +135,9 @@ vec4 diffuse_along(vec3 p, vec3 w, float g) {
 }
 #endif
 
-#if SLOPES
 float mean_of(vec3 v) { return dot(v, vec3(1.0 / 3.0)); }
+
+#if SLOPES
 
 // Returns the change of the light along each axis, relative to it: differences over a cell, of U
 // for the light that is scattered once.
@@ -135,6 +154,64 @@ vec3 slope_at(vec3 p, vec3 w, float g, vec3 albedo, vec3 once, vec3 diffuse) {
         rise[axis] += both > 0.0 ? 2.0 * first * (after.w - prior.w) / both : 0.0;
     }
     return all > 0.0 ? rise / (all * edges) : vec3(0.0);
+}
+#endif
+
+#if SEEN
+// Returns radiance and extinction at p: trilinear between the cells' centres.
+vec4 seen_at(vec3 p) {
+    Weights of = weights_at(push.grid, p);
+    vec4 sum = vec4(0.0);
+    for (int corner = 0; corner < 8; ++corner) {
+        Corner to = corner_of(push.grid, of, corner);
+        sum += to.share * uintBitsToFloat(TEXEL(seen, to.i_cell));
+    }
+    return sum;
+}
+
+// Places on a way to the eye on which a blob is seen, and their distance, sigma.
+const int N_PLACES = 4;
+const float APART = 1.2;
+// Half the distance of the ways, sigma.
+const float ASIDE = 1.0;
+
+// Returns the radiance of a blob as the eye sees it through the cells, its mean over the channels,
+// and `relative`, its change across the view.
+vec3 seen_of(Facet facet, vec3 toward, out float mean, out vec3 relative) {
+    float weight = 0.0, first = 0.0, apart = APART * facet.sigma;
+    vec3 sum = vec3(0.0);
+    vec3 other = abs(toward.y) < 0.9 ? vec3(0.0, 1.0, 0.0) : vec3(1.0, 0.0, 0.0);
+    vec3 u = normalize(cross(toward, other)), v = cross(u, toward);
+    for (int k = 0; k < 4; ++k) {
+        vec3 aside = ASIDE * ((k & 1) == 0 ? u : -u) + ASIDE * ((k & 2) == 0 ? v : -v);
+        float passed = 1.0;
+        for (int i = 0; i < N_PLACES; ++i) {
+            float z = APART * (0.5 * float(N_PLACES - 1) - float(i));
+            vec4 here = seen_at(facet.position + facet.sigma * (z * toward + aside));
+            float depth = here.w * apart, on = through(vec3(depth)).x;
+            // The mean of e^-t over the step; below, it is 1 to a rounding.
+            float w = exp(-0.5 * z * z) * passed * (depth > 1e-6 ? (1.0 - on) / depth : 1.0);
+            passed *= on;
+            weight += w;
+            first += w * z;
+            sum += w * here.rgb;
+        }
+    }
+    vec3 radiance = sum / weight, edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
+    vec3 p = facet.position + facet.sigma * (first / weight) * toward;
+    mean = mean_of(radiance);
+    relative = vec3(0.0);
+#if SLOPES
+    for (int axis = 0; axis < 3; ++axis) {
+        vec3 half_step = vec3(0.0);
+        half_step[axis] = 0.5 * edges[axis];
+        vec3 rise = seen_at(p + half_step).rgb - seen_at(p - half_step).rgb;
+        relative[axis] = mean_of(rise) / edges[axis];
+    }
+    relative = mean > 0.0 ? relative / mean : vec3(0.0);
+    relative -= dot(relative, toward) * toward;
+#endif
+    return radiance;
 }
 #endif
 
@@ -231,7 +308,18 @@ void main() {
                 radiance += e * toward_eye(m, law, 0.5 * dot(bend, bend), tau);
             }
         }
-#if DIFFUSE
+#if SEEN
+        vec3 relative;
+        float mean;
+        radiance = seen_of(facet, outgoing, mean, relative);
+        radiance *= law.albedo * law.depth * push.inverse_scattered;
+        // Slices multiply it by the mean of the cells' light where they are.
+        lit[j].indirect = mean > 0.0 ? radiance / mean : vec3(0.0);
+#if SLOPES
+        slopes[j].relative = relative;
+        slopes[j].position = facet.position;
+#endif
+#elif DIFFUSE
         vec3 diffuse =
             law.albedo * diffuse_along(facet.position, outgoing, m.mean).rgb * INV_FOUR_PI;
 #if SLOPES

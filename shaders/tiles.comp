@@ -64,6 +64,14 @@ TEXELS(10, conics)
 #if SHADED
 TEXELS(11, shades)
 #endif
+// 1: slices have the light of the cells where they are, and splats only its colour.
+#ifndef CELLS
+#define CELLS 0
+#endif
+#if CELLS
+// Radiance toward the eye by cell.
+TEXELS(12, seen_cells)
+#endif
 // 1: every splat has its own exponent at which it ends, the same for all its pixels. It is computed
 // where the splat is loaded: once, and not once for every row.
 #define OWN_EDGE (THRESHOLD && !ELLIPSOIDS)
@@ -98,6 +106,14 @@ layout(push_constant) uniform Push {
     float y_forward;
     // The near plane's distance over the thickness of a slice.
     float near_in_slices;
+    // Where the cells lie, by slices from the eye.
+    vec3 eye_in_cells;
+    uint n_x;
+    vec3 right_in_cells;
+    uint n_y;
+    vec3 up_in_cells;
+    uint n_z;
+    vec3 forward_in_cells;
 } push;
 TEXELS(0, splats)
 READS(1, uvec2, pairs)
@@ -272,6 +288,9 @@ void draw_tile(uvec4 range, uint i_tile) {
     inv_threshold = push.inv_threshold;
 #endif
     float y = push.tangents.y - (float(at.y) + 0.5) * push.pixel.y;
+#if CELLS
+    along_row = push.forward_in_cells + y * push.up_in_cells;
+#endif
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         float x = (float(at.x + j) + 0.5) * push.pixel.x - push.tangents.x;
         uint p = row + min(at.x + j, push.width - 1u);

@@ -21,6 +21,10 @@
 #ifndef INVOCATIONS
 #define INVOCATIONS 8
 #endif
+// 1: slices have the light of the cells where they are, and splats only its colour.
+#ifndef CELLS
+#define CELLS 0
+#endif
 
 layout(local_size_x = INVOCATIONS) in;
 
@@ -115,8 +119,12 @@ uint project(uint i, uint r) {
     vec3 radiance = shade.xyz;
     if (LIT != 0) {
         int facet = int(GROUPED != 0 ? i_facet[i] : push.i_first_facet + i);
+#if CELLS
+        radiance = uintBitsToFloat(TEXEL(lit, 4 * facet + 1).xyz);
+#else
         radiance = uintBitsToFloat(TEXEL(lit, 4 * facet + 2).xyz)
                    + uintBitsToFloat(TEXEL(lit, 4 * facet + 3).xyz);
+#endif
         if (SHADED != 0) {
             Shade shade = shade_of(push.camera, slopes[facet], shape, place.xyz, v, sigma);
             radiance *= shade.base;

@@ -59,6 +59,11 @@ fn right_pictures_of_all_kinds_pass() {
         ("study-both", &["lighting.mode='none'"]),
         ("study-both", &["lighting.mode='diffusion'", "draw.overlap='slices'"]),
         ("cubes-554", &["lighting.mode='diffusion'", "lighting.facets_per_cloud=100"]),
+        (
+            "study-both",
+            &["lighting.mode='diffusion'", "lighting.bounces=2", "draw.overlap='slices'"],
+        ),
+        ("cumulus", &["lighting.mode='diffusion'", "lighting.bounces=1", "lighting.grid=24"]),
         // From the light that is kept.
         ("cubes-554", &["lighting.mode='diffusion'", "draw.path='sprites'"]),
         ("cubes-554", &["lighting.mode='diffusion'", "draw.cutoff=3.5"]),
@@ -112,6 +117,15 @@ fn finder(what: &str) -> &'static [&'static str] {
             "lighting.mode='diffusion'",
             "--set",
             "draw.overlap='slices'",
+        ],
+        "a bounce has no light of the sky" | "light that goes straight on is not seen" => &[
+            "scenes/cubes-554.toml",
+            "--set",
+            "lighting.mode='diffusion'",
+            "--set",
+            "lighting.grid=24",
+            "--set",
+            "lighting.bounces=2",
         ],
         "ground does not hide the sky from clouds" | "clouds do not hide the sky from ground" => &[
             "scenes/katrina.toml",

@@ -142,6 +142,7 @@ impl Scene {
             saturated: 0.0,
             slice: 0.0,
             extents: None,
+            cells: None,
         };
         let view = CullView { blobs, size: [width, height], smallest };
         let order = Order { depths: self.depths(), sort_tile: TILE, splat_block: 256 };

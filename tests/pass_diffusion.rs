@@ -20,6 +20,7 @@ fn every_facet_has_the_light_of_the_twin() {
     let gpu = Gpu::new();
     for name in ["coloured", "droplets", "flat", "boxes", "floors"] {
         media::check(&gpu, name, "diffusion");
+        media::check(&gpu, name, "bounces");
     }
 }
 
@@ -63,6 +64,35 @@ fn wrong_shaders_are_found() {
             "fallen += 0.0 * light",
         ),
         ("floors", "diffusion", "diffusion_patches.comp", "c.share *", "0.125 *"),
+        ("coloured", "diffusion", "diffusion_sources.comp", "sinh(h)", "h"),
+        ("coloured", "bounces", "diffusion_sources.comp", "fallen.b", "0.0"),
+        ("coloured", "bounces", "diffusion_flux.comp", "push.even * phi_at(c)", "phi_at(c)"),
+        ("coloured", "bounces", "diffusion_flux.comp", "3.0 * push.forward * flux", "flux"),
+        ("floors", "bounces", "diffusion_flux.comp", "axis == 1 ? push", "axis == 2 ? push"),
+        ("coloured", "bounces", "diffusion_bounce.comp", "0.908248290463863", "0.9"),
+        ("coloured", "bounces", "diffusion_bounce.comp", "y += l * w.y", "y -= l * w.y"),
+        ("flat", "bounces", "diffusion_bounce.comp", "reach * push.forward;", "push.forward;"),
+        ("coloured", "bounces", "diffusion_correct.comp", ".rgb + phi_at(c)", ".rgb"),
+        ("coloured", "bounces", "diffusion_correct.comp", "field[k].rgb + carried", "field[k].rgb"),
+        ("coloured", "bounces", "diffusion_correct.comp", "3.0 * push.forward", "push.forward"),
+        ("coloured", "bounces", "diffusion_seen.comp", "0.5 * dot(bend", "dot(bend"),
+        ("coloured", "bounces", "diffusion_seen.comp", "of_suns * mix(1.0", "of_suns * mix(0.9"),
+        ("coloured", "bounces", "diffusion_seen.comp", "(1.0 - push.weakened) *", "0.9 *"),
+        ("flat", "bounces", "include/ways.glsl", "face = 0.5 * across", "face = across"),
+        ("coloured", "bounces", "include/ways.glsl", "w.y < 0.0 ? 1.0", "w.y > 0.0 ? 1.0"),
+        ("floors", "bounces", "include/ways.glsl", "turn[axis] > 0 ? 1u", "turn[axis] < 0 ? 1u"),
+        ("flat", "bounces", "scatter.comp", "passed *= on", "passed *= 1.0"),
+        ("coloured", "bounces", "scatter.comp", "APART = 1.2", "APART = 1.3"),
+        ("boxes", "bounces", "scatter.comp", "(k & 2) == 0", "(k & 1) == 0"),
+        ("coloured", "bounces", "scatter.comp", "law.depth * push", "push"),
+        (
+            "boxes",
+            "bounces",
+            "scatter.comp",
+            "relative -= dot(relative, toward)",
+            "relative -= 0.0",
+        ),
+        ("droplets", "bounces", "facets_groups.comp", "color, sigma)", "color, scale)"),
         ("floors", "diffusion", "include/patches.glsl", "part[u] =", "part[v] ="),
         ("floors", "diffusion", "scatter.comp", "0.25 * field_at(c)", "0.5 * field_at(c)"),
         ("floors", "diffusion", "scatter.comp", "min(distance(p, nearest) / edge, 1.0)", "1.0"),

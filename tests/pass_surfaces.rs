@@ -357,6 +357,7 @@ fn a_target_that_does_not_fit_is_refused() {
                     textured: &buffer,
                     pool: &buffer,
                     slopes: &buffer,
+                    seen: &buffer,
                 };
                 let view = BlobView {
                     camera: &camera,
@@ -366,6 +367,7 @@ fn a_target_that_does_not_fit_is_refused() {
                     saturated: 0.0,
                     slice: 0.0,
                     extents: None,
+                    cells: None,
                 };
                 let count = BlobCount { n: RecordCount::Known(0), i_first_facet: 0 };
                 pass.record(rec, &buffers, (target, start), &view, count)

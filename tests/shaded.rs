@@ -21,6 +21,7 @@ use mixed::{cases, mixed};
 use nimbus::frame::saturation_bound;
 use nimbus::gpu::Compiler;
 use nimbus::layout::facet::{LitRecord, SlopeRecord};
+use nimbus::layout::frame::GridRecord;
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
 use nimbus::passes::tiles::Sharing;
@@ -61,10 +62,40 @@ fn pictures() -> Vec<(String, Picture)> {
     let over = cases().into_iter().find(|(what, ..)| what == "over surfaces");
     let (_, over, _) = over.expect("a picture over surfaces");
     all.push(("slices over surfaces".to_owned(), sliced(&over)));
+    all.push(("cells".to_owned(), in_cells(&mixed(100, 3, 3.0, -1.0).sliced(0.7))));
+    all.push(("cells of ellipsoids".to_owned(), in_cells(&flat.clone().sliced(0.7))));
+    all.push(("cells over surfaces".to_owned(), in_cells(&over.clone().sliced(0.7))));
     let scenery = over.scenery.clone();
     let flat_over = Picture { scenery, ..flat };
     all.push(("slices of ellipsoids over surfaces".to_owned(), sliced(&flat_over)));
     all
+}
+
+/// Gives slices the light of cells whose light changes up to the next by as much as it is.
+fn in_cells(picture: &Picture) -> Picture {
+    let mut random = Random(9);
+    let picture = shaded(picture);
+    let half = |l: &LitRecord| l.first.map(|v| 0.5 * v);
+    let lit = picture.lit.iter().flatten();
+    let lit = lit.map(|l| LitRecord { indirect: l.first, first: half(l), second: half(l), ..*l });
+    let [x, y, z] = [0, 1, 2].map(|k| {
+        let all = || picture.placed.iter().map(move |p| p.position[k]);
+        (all().fold(f32::MAX, f32::min), all().fold(f32::MIN, f32::max))
+    });
+    let widest = (x.1 - x.0).max(y.1 - y.0).max(z.1 - z.0);
+    let cell = widest / 9.0;
+    let grid = GridRecord {
+        low: [x.0, y.0, z.0],
+        cell,
+        n_cells: [9, 14, 8],
+        inv_cell: 1.0 / cell,
+        aspect: 0.7,
+        inv_aspect: 1.0 / 0.7,
+        ..GridRecord::default()
+    };
+    let cell = |_| std::array::from_fn(|_| random.within(0.2, 1.4));
+    let cells = Some((grid, (0..9 * 14 * 8).map(cell).collect()));
+    Picture { lit: Some(lit.collect()), slopes: None, cells, ..picture.clone() }
 }
 
 fn tiled(gpu: &Gpu, format: FilmFormat) -> Tiled {
@@ -125,6 +156,13 @@ fn wrong_shaders_are_found() {
         (thin, false, "sprites.frag", "vec3(delta, seen)", "vec3(delta, 0.0)"),
         ("slices", true, sliced, "- nearer * middle", ""),
         ("slices", true, sliced, "exp(-0.5 * min", "exp(-5.0 * min"),
+        ("cells", true, sliced, "mix(base, next, to)", "mix(next, base, to)"),
+        ("cells", true, sliced, "NEAREST_MIDDLE = 1.5", "NEAREST_MIDDLE = 1.6"),
+        ("cells", true, sliced, "middle += 1.0;", ""),
+        ("cells", true, sliced, "middle / length_of_ray(j)", "middle"),
+        ("cells of ellipsoids", true, sliced, "light_at(j, middle);", "light_at(j ^ 1u, middle);"),
+        ("cells", true, "tiles.comp", "y * push.up_in_cells", "-y * push.up_in_cells"),
+        ("cells", true, "tiles_splat.comp", "4 * facet + 1)", "4 * facet + 2)"),
         ("slices over surfaces", true, sliced, "density_here = density(to_wall)", ""),
         ("slices of ellipsoids", true, sliced, "density_here = density(u)", "density_here = 0.0"),
     ] {

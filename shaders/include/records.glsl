@@ -117,7 +117,7 @@ struct Facet {
     vec3 normal;
     uint i_region;
     vec3 color;
-    uint unused;
+    float sigma;
 };
 struct Run {
     uint i_first;

@@ -8,6 +8,9 @@
 // Fours of a pixel's state: colour and opacity, the open slices, their place.
 const uint STATE_FOURS = 2 + OPEN;
 
+// Middle of the nearest open slice, from the boundary between the last two.
+const float NEAREST_MIDDLE = 1.5 - float(OPEN);
+
 // q (xyz) and t (w) of the slices that splats not yet composed may reach, near to far.
 vec4 open[OPEN][RUN];
 // The boundary between the last two open slices, counted from the eye.
@@ -88,8 +91,34 @@ void find_shares(inout Loaded splat, uint t, bool is_splat) {
 #endif
 }
 
-// Composes the nearest open slice of all pixels, if `is_on`.
-void close_slice(bool is_on) {
+#if CELLS
+// A slice's thickness along the rays through x = 0 of the row, in cells.
+vec3 along_row;
+
+// Returns the light that cells scatter toward the eye in the middle of a slice, at pixel j, mean
+// over the channels: trilinear between their centres, and beyond the outermost as on them.
+float light_at(uint j, float middle) {
+    ivec3 n = ivec3(push.n_x, push.n_y, push.n_z);
+    vec3 ray = along_row + x_of[j] * push.right_in_cells;
+    vec3 at = push.eye_in_cells + middle / length_of_ray(j) * ray;
+    at = clamp(at, vec3(0.0), vec3(n - 1));
+    ivec3 base = ivec3(at), next = min(base + 1, n - 1);
+    vec3 part = at - vec3(base);
+    float sum = 0.0;
+    [[unroll]] for (int corner = 0; corner < 8; ++corner) {
+        bvec3 to = bvec3(corner & 1, corner & 2, corner & 4);
+        ivec3 i = mix(base, next, to);
+        vec3 share = mix(1.0 - part, part, to);
+        vec4 here = uintBitsToFloat(TEXEL(seen_cells, i.x + n.x * (i.y + n.y * i.z)));
+        sum += share.x * share.y * share.z * dot(here.rgb, vec3(1.0 / 3.0));
+    }
+    return sum;
+}
+#endif
+
+// Composes the nearest open slice of all pixels, if `is_on`. Its middle is so many slices from the
+// eye.
+void close_slice(bool is_on, float middle) {
     float t[RUN], here[RUN];
     // Step by step for all pixels, as in find_depths().
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
@@ -101,7 +130,16 @@ void close_slice(bool is_on) {
         // Each pixel decides by itself, so that it does not depend on which others are drawn.
         here[j] *= passed < saturated ? 0.0 : passed;
         alpha[j] += here[j];
+#if CELLS
+        float light = 0.0;
+        // The same for all pixels: where nothing is composed, nothing is fetched.
+        if (is_on) {
+            light = light_at(j, middle);
+        }
+        color[j] += here[j] / max(t[j], 1e-30) * open[0][j].xyz * light;
+#else
         color[j] += here[j] / max(t[j], 1e-30) * open[0][j].xyz;
+#endif
     }
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         [[unroll]] for (uint m = 1; m < OPEN; ++m) {
@@ -114,17 +152,20 @@ void close_slice(bool is_on) {
 // Composes the slices before those that a splat at `boundary` reaches.
 void close_before(int boundary) {
     int n = clamp(boundary - i_boundary, 0, int(OPEN));
+    float middle = float(i_boundary) + NEAREST_MIDDLE;
     i_boundary = boundary;
     // Where n is 0 there is one turn that does nothing: llvmpipe would run it, too, if the loop
     // tested first.
     do {
-        close_slice(n > 0);
+        close_slice(n > 0, middle);
+        middle += 1.0;
         --n;
     } while (n > 0);
 }
 
 void close_all() {
-    [[unroll]] for (uint m = 0; m < OPEN; ++m) { close_slice(true); }
+    float middle = float(i_boundary) + NEAREST_MIDDLE;
+    [[unroll]] for (uint m = 0; m < OPEN; ++m) { close_slice(true, middle + float(m)); }
 }
 
 #if SHADED

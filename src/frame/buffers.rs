@@ -1,6 +1,8 @@
 //! The buffers that passes share.
 
-use super::features::{has_diffusion, has_second, has_slopes, is_grouped, is_lit, is_medium};
+use super::features::{
+    has_bounces, has_diffusion, has_second, has_slopes, is_grouped, is_lit, is_medium,
+};
 use super::packet::Packet;
 use super::staging::StagedBuffer;
 use crate::error::Result;
@@ -57,6 +59,8 @@ buffers! {
         /// Fluence and flux of diffuse light by cell, and fluence of suns and lamps.
         field: Buffer => [[f32; 4]; 4], n_if(has_diffusion(scene), n_cells(scene)),
             "diffusion.field", Texels;
+        /// Radiance that cells scatter toward the eye, and extinction, with bounces.
+        seen: Buffer => [f32; 4], n_if(has_bounces(scene), n_cells(scene)), "scatter.seen", Texels;
         /// The same by patch of the grid's box, for surfaces and ground.
         patches: Buffer => [[f32; 4]; 4],
             n_if(has_diffusion(scene) && scene.has_solids(), u64::from(N_PATCHES)),
@@ -106,7 +110,7 @@ impl SceneBuffers {
     /// Returns the buffers that blobs are drawn from.
     pub fn of_blobs(&self) -> BlobBuffers<'_> {
         let SceneBuffers { entries, placed, particles, lit, i_facet, i_group, drawn, .. } = self;
-        let SceneBuffers { textured, pool, slopes, .. } = self;
+        let SceneBuffers { textured, pool, slopes, seen, .. } = self;
         BlobBuffers {
             entries,
             placed,
@@ -118,6 +122,7 @@ impl SceneBuffers {
             textured,
             pool,
             slopes,
+            seen,
         }
     }
 }
@@ -166,8 +171,10 @@ pub(super) fn diffusion_room(scene: &Scene) -> Option<Room> {
     let plain = |c: &Cloud| is_grey(&scene.materials[c.i_material]) && !has_colors(c);
     let n_sets = if scene.clouds.iter().all(plain) { 1 } else { 3 };
     let n_solid_facets = scene.n_solid_facets();
-    has_diffusion(scene)
-        .then(|| Room::new(n_cells(scene), n_sets, has_slopes(scene), n_solid_facets))
+    has_diffusion(scene).then(|| Room {
+        has_bounces: has_bounces(scene),
+        ..Room::new(n_cells(scene), n_sets, has_slopes(scene), n_solid_facets)
+    })
 }
 
 /// Returns the most cells of a density grid at any time. Clouds that drift apart or grow change its

@@ -1,6 +1,6 @@
 //! The numbers of a scene that passes take as arguments. They are constant over a run.
 
-use super::features::{has_diffusion, is_medium, saturation_bound, target_format};
+use super::features::{blob_variant, has_diffusion, is_medium, saturation_bound, target_format};
 use super::packet::Packet;
 use crate::gpu::TargetFormat;
 use crate::layout::frame::CameraRecord;
@@ -30,10 +30,14 @@ pub(super) struct FrameConstants {
     pub longest_facet_edge: f64,
     /// Cycles of the diffusion solver.
     pub n_cycles: u32,
+    /// Bounces that follow it.
+    pub n_bounces: u32,
     pub texture_seed: u32,
     pub edge: Edge,
     /// Blobs are composed by slices.
     pub slices: bool,
+    /// Slices have the light of the cells where they are.
+    pub in_cells: bool,
     /// σ below which a blob is left out, in pixels of the film.
     pub smallest: f64,
     pub saturated: f64,
@@ -77,8 +81,10 @@ impl FrameConstants {
                 false => 0.0,
             },
             n_cycles: scene.lighting.diffusion.cycles,
+            n_bounces: scene.lighting.diffusion.bounces,
             texture_seed: scene.draw.texture_seed,
             edge: scene.draw.edge(),
+            in_cells: blob_variant(scene).in_cells,
             slices: scene.draw.overlap == Overlap::Slices,
             smallest: scene.draw.smallest.bound(),
             saturated: saturation_bound(scene.film.format),
@@ -99,6 +105,7 @@ impl FrameConstants {
         } = *self;
         let slice = if self.slices { packet.slice } else { 0.0 };
         let extents = Some(&packet.extents[..]);
-        BlobView { camera, cutoff, threshold, least, saturated, slice, extents }
+        let cells = self.in_cells.then_some(&packet.grid);
+        BlobView { camera, cutoff, threshold, least, saturated, slice, extents, cells }
     }
 }

@@ -127,6 +127,11 @@ pub fn has_diffusion(scene: &Scene) -> bool {
     scene.lighting.mode == LightingMode::Diffusion
 }
 
+/// Returns whether bounces between cells follow diffusion.
+pub fn has_bounces(scene: &Scene) -> bool {
+    scene.lighting.has_bounces()
+}
+
 /// Returns whether the light changes inside of each blob.
 pub fn has_slopes(scene: &Scene) -> bool {
     scene.lighting.has_slopes()
@@ -197,6 +202,7 @@ pub(super) fn region_sizes(scene: &Scene) -> Vec<u32> {
 
 /// Returns the properties of the scene's blobs.
 pub(super) fn blob_variant(scene: &Scene) -> BlobVariant {
+    let in_cells = scene.has_light_of_cells();
     BlobVariant {
         lit: is_lit(scene),
         grouped: is_grouped(scene),
@@ -205,7 +211,8 @@ pub(super) fn blob_variant(scene: &Scene) -> BlobVariant {
         threshold: scene.draw.edge().has_threshold(),
         ellipsoids: scene.has_ellipsoids(),
         thin: is_thin(scene) && !scene.is_textured(),
-        shaded: has_slopes(scene),
+        shaded: has_slopes(scene) && !in_cells,
+        in_cells,
     }
 }
 

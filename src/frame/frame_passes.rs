@@ -4,7 +4,7 @@ use super::buffers::{SceneBuffers, diffusion_room, n_cells};
 use super::constants::FrameConstants;
 use super::culling::Culling;
 use super::features::{
-    SceneFeatures, has_diffusion, has_second, has_slopes, is_grouped, is_medium,
+    SceneFeatures, has_bounces, has_diffusion, has_second, has_slopes, is_grouped, is_medium,
 };
 use super::gather::IndirectGather;
 use super::live::{LiveParticles, PlacedUploads};
@@ -104,7 +104,8 @@ impl FramePasses {
                     let is_diffuse = has_diffusion(scene);
                     let has_solids = is_diffuse && scene.has_solids();
                     let has_slopes = has_slopes(scene);
-                    let variant = ScatterVariant { is_diffuse, has_slopes, has_solids };
+                    let has_seen = has_bounces(scene);
+                    let variant = ScatterVariant { is_diffuse, has_slopes, has_solids, has_seen };
                     Scatter::new(device, compiler, variant)
                 })
                 .transpose()?,

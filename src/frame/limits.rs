@@ -86,7 +86,7 @@ fn specs(scene: &Scene) -> Vec<BufferSpec> {
         SceneBuffers::specs(&exact),
         live::specs(&exact),
         grid::Scratch::specs(n_cells(&exact)),
-        diffusion_room(&exact).map_or(vec![], diffusion::Scratch::specs),
+        diffusion_room(&exact).map_or(vec![], diffusion::specs),
         when(is_grouped(&exact), FacetRuns::specs),
         when(has_second(&exact), IndirectGather::specs),
         Culling::specs(&exact),

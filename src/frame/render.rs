@@ -212,6 +212,7 @@ impl FramePasses {
             field,
             slopes,
             patches,
+            seen,
             ..
         } = &self.buffers;
         pass(rec, plan, Pass::Diffusion, |rec| {
@@ -227,6 +228,7 @@ impl FramePasses {
                 step_cells: c.march.step_cells,
                 max_steps: MAX_STEPS,
                 n_cycles: c.n_cycles,
+                n_bounces: c.n_bounces,
                 solids: SolidsWork {
                     n_facets: c.n_solid_facets,
                     n_lights: c.march.n_lights,
@@ -239,6 +241,10 @@ impl FramePasses {
         pass(rec, plan, Pass::Scatter, |rec| {
             let Some(scatter) = scatter else { return Ok(()) };
             let depths = transmittance;
+            if let (Some(diffusion), Some(params)) = (diffusion, &packet.diffusion) {
+                let of = (params, c.march.n_lights, packet.camera.eye);
+                diffusion.record_seen(rec, [lights, field, seen], &packet.grid, of)?;
+            }
             let buffers = ScatterBuffers {
                 facets,
                 lights,
@@ -250,6 +256,7 @@ impl FramePasses {
                 field,
                 slopes,
                 patches,
+                seen,
             };
             let of = ScatterParams {
                 eye: packet.camera.eye,
@@ -257,11 +264,12 @@ impl FramePasses {
                 n_lights: c.march.n_lights,
                 n_solids: c.n_solids,
                 backward: match &packet.diffusion {
-                    Some(of) => of.weakened(),
+                    Some(of) => of.mean_weakened(),
                     None => 1.0 - c.forward,
                 },
                 n_terms: c.terms.n,
                 term: [c.terms.light, c.terms.depth, c.terms.phase],
+                scattered: packet.diffusion.map_or([1.0; 3], |of| of.scattered()),
             };
             scatter.record(rec, &buffers, &packet.grid, &of)
         })

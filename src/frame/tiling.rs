@@ -106,7 +106,8 @@ impl Tiling {
         for i_round in 0..tiles.n_rounds(view) {
             let (entries, n) = tiles.record_pairs(rec, i_round, count.n, view)?;
             let sorted = sort.record(rec, entries, *n_bits, Count::Counted(n))?;
-            tiles.record_compose(rec, i_round, [sorted, picture, buffers.pool], view)?;
+            let from = [sorted, picture, buffers.pool, buffers.seen];
+            tiles.record_compose(rec, i_round, from, view)?;
         }
         Ok(())
     }

@@ -72,12 +72,21 @@ pub struct DiffusionParams {
     pub straight: f32,
     /// c, 1/length.
     pub inverse_chord: f32,
+    /// s = 1 − ϖf.
+    pub weakened: [f32; 3],
+    /// ϖ' = ϖ(1 − f)/s.
+    pub even: [f32; 3],
+    /// ϖ'g' = ϖ(g − f)/s.
+    pub forward: [f32; 3],
 }
 
 impl DiffusionParams {
     /// Returns the numbers of a medium on a grid.
     pub fn new(mean: &MeanMedium, grid: &GridSpec) -> DiffusionParams {
         let f32s = |v: DVec3| v.as_vec3().to_array();
+        let MeanMedium { albedo, g, straight } = *mean;
+        let weakened = DVec3::ONE - albedo * straight;
+        let scattered = albedo / weakened.max(DVec3::splat(f64::MIN_POSITIVE));
         DiffusionParams {
             albedo: f32s(mean.albedo),
             absorbed: f32s(DVec3::ONE - mean.albedo),
@@ -85,13 +94,21 @@ impl DiffusionParams {
             g: mean.g as f32,
             straight: mean.straight as f32,
             inverse_chord: grid.inverse_chord() as f32,
+            weakened: f32s(weakened),
+            even: f32s(scattered * (1.0 - straight)),
+            forward: f32s(scattered * (g - straight)),
         }
     }
 }
 
 impl DiffusionParams {
+    /// Returns ϖ(1 − f).
+    pub fn scattered(&self) -> [f32; 3] {
+        self.albedo.map(|albedo| albedo * (1.0 - self.straight))
+    }
+
     /// Returns s: the mean over the channels of 1 − ϖf.
-    pub fn weakened(&self) -> f64 {
+    pub fn mean_weakened(&self) -> f64 {
         let straight = self.albedo.map(|albedo| f64::from(albedo) * f64::from(self.straight));
         1.0 - straight.iter().sum::<f64>() / 3.0
     }

@@ -21,8 +21,8 @@ record! {
         i_region: u32,
         /// Factor on its material's K_d.
         color: [f32; 3],
-        /// Padding.
-        unused: u32,
+        /// σ of the blobs that it stands for, scene units; 0 on surfaces and ground.
+        sigma: f32,
     }
 }
 
@@ -35,7 +35,7 @@ impl FacetRecord {
             normal: facet.normal.as_vec3().to_array(),
             i_region,
             color: [1.0; 3],
-            unused: 0,
+            sigma: 0.0,
         }
     }
 }

@@ -68,6 +68,8 @@ pub struct Octaves {
 pub struct DiffusionSettings {
     /// Cycles of the multigrid solver.
     pub cycles: u32,
+    /// Bounces between the cells that follow.
+    pub bounces: u32,
     /// The light changes linearly inside of each blob.
     pub slopes: bool,
 }
@@ -112,6 +114,11 @@ impl Lighting {
     pub fn has_slopes(&self) -> bool {
         self.mode == LightingMode::Diffusion && self.diffusion.slopes
     }
+
+    /// Returns whether bounces between cells follow diffusion.
+    pub fn has_bounces(&self) -> bool {
+        self.mode == LightingMode::Diffusion && self.diffusion.bounces > 0
+    }
 }
 
 /// Greatest number of octaves.
@@ -119,6 +126,9 @@ pub const MAX_OCTAVES: u32 = 16;
 
 /// Greatest number of cycles of the multigrid solver: what is left is rounding.
 pub const MAX_CYCLES: u32 = 32;
+
+/// Greatest number of bounces between cells.
+pub const MAX_BOUNCES: u32 = 64;
 
 /// Greatest number of divisions of an emitter: it is 2¹⁶ times smaller then.
 pub const MAX_PAIR_LEVELS: u32 = 16;

@@ -206,7 +206,7 @@ mod tests {
         },
         sun_radius: 0.005,
         octaves: ONCE,
-        diffusion: crate::model::scene::DiffusionSettings { cycles: 1, slopes: false },
+        diffusion: crate::model::scene::DiffusionSettings { cycles: 1, bounces: 0, slopes: false },
     };
 
     fn lighting(mode: LightingMode) -> Lighting {

@@ -13,8 +13,8 @@ use super::film::Film;
 use super::grid::GridSpec;
 use super::light::Light;
 pub use super::lighting::{
-    DiffusionSettings, Gather, Lighting, LightingMode, MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS,
-    Octaves, Pairs,
+    DiffusionSettings, Gather, Lighting, LightingMode, MAX_BOUNCES, MAX_CYCLES, MAX_OCTAVES,
+    MAX_PAIR_LEVELS, Octaves, Pairs,
 };
 use super::material::Material;
 use super::named::named;
@@ -183,6 +183,12 @@ impl Scene {
         let mean = groups.iter().map(|g| f64::from(g.n_particles) * g.aspects[1]).sum::<f64>() / n;
         let flat = extent.y / extent.x.max(extent.z);
         if flat > 0.0 { mean.min(flat) } else { mean }.clamp(MIN_ASPECT, 1.0 / MIN_ASPECT)
+    }
+
+    /// Returns whether slices of clouds have the light of the cells where they are, and not that
+    /// of their blobs (model.md §18).
+    pub fn has_light_of_cells(&self) -> bool {
+        self.lighting.has_bounces() && self.draw.overlap == Overlap::Slices
     }
 
     /// Returns whether some cloud's particles have textures.

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use crate::gpu::RecordCount;
-use crate::layout::frame::CameraRecord;
+use crate::layout::frame::{CameraRecord, GridRecord};
 use crate::layout::record;
 
 bindings! {
@@ -30,6 +30,8 @@ bindings! {
         pool,
         /// `SlopeRecord` by facet; read where blobs are shaded.
         slopes,
+        /// `[f32; 4]` by cell: radiance toward the eye; read where blobs have the light of cells.
+        seen,
     }
 }
 
@@ -58,13 +60,24 @@ pub struct BlobVariant {
     pub thin: bool,
     /// The light changes linearly across each blob.
     pub shaded: bool,
+    /// Slices have the light of the cells where they are, and blobs only its colour.
+    pub in_cells: bool,
 }
 
 impl BlobVariant {
     /// Returns the specialization constants that the blob shaders share, by id.
     pub(super) fn constants(self) -> [(u32, u32); 8] {
-        let BlobVariant { lit, grouped, weighted, textured, threshold, ellipsoids, thin, shaded } =
-            self;
+        let BlobVariant {
+            lit,
+            grouped,
+            weighted,
+            textured,
+            threshold,
+            ellipsoids,
+            thin,
+            shaded,
+            ..
+        } = self;
         let ids = [0, 2, 3, 4, 5, 6, 9, 12];
         let are_on = [lit, grouped, weighted, textured, threshold, ellipsoids, thin, shaded];
         std::array::from_fn(|k| (ids[k], u32::from(are_on[k])))
@@ -112,6 +125,8 @@ pub struct BlobView<'a> {
     pub slice: f64,
     /// Where the blobs' centres are, relative to the lighting origin; `None` where this is unknown.
     pub extents: Option<&'a [Extent]>,
+    /// The cells that blobs have the light of; `None` where they have their facets'.
+    pub cells: Option<&'a GridRecord>,
 }
 
 impl BlobView<'_> {

@@ -6,115 +6,21 @@
 //! §18, passes.md. Error: of a cycle about an eighth of what the cycle before left; of rounding
 //! 2e-6 of φ.
 
+mod bounces;
+mod push;
 mod solids;
 
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
-use crate::layout::diffusion::{
-    DiffusionParams, LEVELS_ROOM, LevelRecord, LevelStep, N_PATCHES, levels,
-};
+use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
+use crate::layout::diffusion::{DiffusionParams, LEVELS_ROOM, LevelStep, N_PATCHES, levels};
 use crate::layout::frame::GridRecord;
-use crate::layout::record;
-
-record! {
-    /// Push constants of `diffusion_sources.comp`.
-    pub struct SourcesPush {
-        /// The density grid.
-        grid: GridRecord,
-        /// ϖ.
-        albedo: [f32; 3],
-        /// c, 1/length.
-        inverse_chord: f32,
-        /// g.
-        g: f32,
-        /// f.
-        straight: f32,
-        /// Number of lights.
-        n_lights: u32,
-        /// Number of surfaces that may hide a light.
-        n_surfaces: u32,
-        /// Length of a step of the march.
-        step_length: f32,
-        /// The most steps of a march.
-        max_steps: u32,
-    }
-}
-
-record! {
-    /// Push constants of `diffusion_system.comp`.
-    pub struct SystemPush {
-        /// The density grid.
-        grid: GridRecord,
-        /// 1 − ϖ.
-        absorbed: [f32; 3],
-        /// c, 1/length.
-        inverse_chord: f32,
-        /// 1 − ϖg.
-        kept: [f32; 3],
-        /// Number of lights.
-        n_lights: u32,
-        /// Cells of all levels.
-        n_all: u32,
-    }
-}
-
-record! {
-    /// Push constants of `diffusion_coarsen.comp` and `diffusion_restrict.comp`.
-    pub struct PairPush {
-        /// The finer level.
-        fine: LevelRecord,
-        /// The coarser level.
-        coarse: LevelRecord,
-        /// 1 along the axes that are halved.
-        halved: [u32; 3],
-        /// Cells of all levels.
-        n_all: u32,
-    }
-}
-
-record! {
-    /// Push constants of `diffusion_sweep.comp`.
-    pub struct SweepPush {
-        /// The level.
-        level: LevelRecord,
-        /// The coarser level, where its φ is added.
-        coarse: LevelRecord,
-        /// 1 along the axes that are halved.
-        halved: [u32; 3],
-        /// Cells of all levels.
-        n_all: u32,
-        /// 1: the long step of a pair of sweeps, else the short one.
-        is_long: u32,
-    }
-}
-
-record! {
-    /// Push constants of `diffusion_coarsest.comp`.
-    pub struct CoarsestPush {
-        /// The level.
-        level: LevelRecord,
-        /// Cells of all levels.
-        n_all: u32,
-        /// Number of sweeps.
-        n_sweeps: u32,
-    }
-}
-
-record! {
-    /// Push constants of `diffusion_flux.comp`.
-    pub struct FluxPush {
-        /// The density grid.
-        grid: GridRecord,
-        /// 1 − ϖg.
-        kept: [f32; 3],
-        /// c, 1/length.
-        inverse_chord: f32,
-    }
-}
 
 /// Sweeps of the coarsest grid.
 const COARSEST_SWEEPS: u32 = 16;
 
+use bounces::Bounces;
+pub use bounces::{BouncePush, CorrectPush, SeenPush};
+pub use push::{CoarsestPush, FluxPush, PairPush, SourcesPush, SweepPush, SystemPush};
 use solids::Solids;
 pub use solids::{FacesPush, PatchesPush, SolidsPush, SolidsWork};
 
@@ -153,6 +59,8 @@ pub struct DiffusionWork {
     pub max_steps: u32,
     /// Number of cycles.
     pub n_cycles: u32,
+    /// Number of bounces.
+    pub n_bounces: u32,
     /// Light of surfaces and ground.
     pub solids: SolidsWork,
 }
@@ -168,12 +76,15 @@ pub struct Room {
     pub has_slopes: bool,
     /// Facets of surfaces and ground.
     pub n_solid_facets: u64,
+    /// Bounces follow diffusion.
+    pub has_bounces: bool,
 }
 
 impl Room {
     /// Returns the room for a grid of at most `n_cells`.
     pub fn new(n_cells: u64, n_sets: u32, has_slopes: bool, n_solid_facets: u64) -> Room {
-        Room { n_cells: LEVELS_ROOM * n_cells, n_sets, has_slopes, n_solid_facets }
+        let n_cells = LEVELS_ROOM * n_cells;
+        Room { n_cells, n_sets, has_slopes, n_solid_facets, has_bounces: false }
     }
 
     /// Returns the number of patches through which light passes to and from surfaces and ground.
@@ -201,6 +112,15 @@ buffers! {
     }
 }
 
+/// Lists the sizes of all scratch buffers.
+pub fn specs(room: Room) -> Vec<BufferSpec> {
+    let bounces = match room.has_bounces {
+        true => bounces::Scratch::specs(room.n_cells / LEVELS_ROOM),
+        false => vec![],
+    };
+    [Scratch::specs(room), bounces].concat()
+}
+
 /// The pipelines and scratch buffers of the pass.
 pub struct Diffusion {
     sources: Kernel,
@@ -213,6 +133,8 @@ pub struct Diffusion {
     flux: Kernel,
     /// Light from and to surfaces and ground, where a scene has them.
     solids: Option<Solids>,
+    /// What follows diffusion.
+    bounces: Option<Bounces>,
     scratch: Scratch,
     room: Room,
 }
@@ -228,6 +150,7 @@ impl Diffusion {
             ("N_SETS", room.n_sets),
             ("SLOPES", u32::from(room.has_slopes)),
             ("SOLIDS", u32::from(has_solids)),
+            ("BOUNCES", u32::from(room.has_bounces)),
         ];
         let kernel = |name: &str, fields: &_| {
             Kernel::with_macros(device, compiler, name, fields, &[], &macros)
@@ -249,6 +172,15 @@ impl Diffusion {
             coarsest: kernel("diffusion.coarsest", CoarsestPush::FIELDS)?,
             restrict: kernel("diffusion.restrict", PairPush::FIELDS)?,
             flux: kernel("diffusion.flux", FluxPush::FIELDS)?,
+            bounces: match room.has_bounces {
+                true => Some(Bounces::new(
+                    device,
+                    compiler,
+                    room.n_cells / LEVELS_ROOM,
+                    (room.n_sets, has_solids),
+                )?),
+                false => None,
+            },
             scratch: Scratch::new(device, room)?,
             room,
         })
@@ -293,7 +225,7 @@ impl Diffusion {
             max_steps: work.max_steps,
         };
         rec.dispatch(&self.sources, &[lights, regions, density, field], &push, n_cells)?;
-        let push = SystemPush {
+        let system_push = SystemPush {
             grid: *grid,
             absorbed: of.absorbed,
             inverse_chord: of.inverse_chord,
@@ -303,7 +235,7 @@ impl Diffusion {
         };
         let system = [lights, density, field, operators, phi, source, faces];
         let n_buffers = 6 + usize::from(self.solids.is_some());
-        rec.dispatch(&self.system, &system[..n_buffers], &push, n_cells)?;
+        rec.dispatch(&self.system, &system[..n_buffers], &system_push, n_cells)?;
         for pair in steps.windows(2) {
             let push = pair_push(pair, n_all);
             rec.dispatch(&self.coarsen, &[operators], &push, pair[1].level.n_total())?;
@@ -311,8 +243,34 @@ impl Diffusion {
         for i in 0..work.n_cycles {
             self.record_cycle(rec, &steps, n_all, i == 0)?;
         }
-        let push = FluxPush { grid: *grid, kept: of.kept, inverse_chord: of.inverse_chord };
-        rec.dispatch(&self.flux, &[density, next_phi, field], &push, n_cells)?;
+        let push = FluxPush {
+            grid: *grid,
+            kept: of.kept,
+            inverse_chord: of.inverse_chord,
+            weakened: of.weakened,
+            even: of.even,
+            forward: of.forward,
+            ..FluxPush::default()
+        };
+        let flux = [density, next_phi, field];
+        match &self.bounces {
+            None => rec.dispatch(&self.flux, &flux, &push, n_cells)?,
+            Some(bounces) => {
+                let flux = [flux.as_slice(), &bounces.begin()].concat();
+                rec.dispatch(&self.flux, &flux, &push, n_cells)?;
+                for _ in 0..work.n_bounces {
+                    bounces.record_gather(rec, [lights, field, faces], grid, of, work.n_lights)?;
+                    let push = SystemPush { n_lights: 0, ..system_push };
+                    let change = &bounces.scratch.change;
+                    let system = [lights, density, change, operators, phi, source];
+                    rec.dispatch(&bounces.system, &system, &push, n_cells)?;
+                    for i in 0..work.n_cycles {
+                        self.record_cycle(rec, &steps, n_all, i == 0)?;
+                    }
+                    bounces.record_correction(rec, [density, next_phi, field], grid, of)?;
+                }
+            }
+        }
         match &self.solids {
             Some(kernels) => kernels.record_patches(rec, [field, patches], grid),
             None => Ok(()),
@@ -347,6 +305,33 @@ impl Diffusion {
             self.record_sweep(rec, &self.sweep, [phi, next_phi], &push, false)?;
         }
         Ok(())
+    }
+
+    /// Writes the radiance that each cell scatters toward the eye.
+    ///
+    /// # Errors
+    /// Fails if a buffer does not fit the shader's binding.
+    pub fn record_seen(
+        &self,
+        rec: &mut Recorder<'_>,
+        [lights, field, seen]: [&Buffer; 3],
+        grid: &GridRecord,
+        (of, n_lights, eye): (&DiffusionParams, u32, [f32; 3]),
+    ) -> Result<()> {
+        let Some(bounces) = &self.bounces else { return Ok(()) };
+        let push = SeenPush {
+            grid: *grid,
+            weakened: of.weakened,
+            n_lights,
+            even: of.even,
+            g: of.g,
+            forward: of.forward.map(|v| 3.0 * v),
+            straight: of.straight,
+            eye,
+        };
+        let all = [lights, field, &bounces.scratch.arrived, seen, &self.scratch.faces];
+        let n_buffers = 4 + usize::from(self.solids.is_some());
+        rec.dispatch(&bounces.seen, &all[..n_buffers], &push, grid.n_cells.iter().product())
     }
 
     fn record_sweep(

@@ -33,6 +33,10 @@ record! {
         term_depth: f32,
         /// Mean cosines, alike.
         term_phase: f32,
+        /// Padding.
+        unused: u32,
+        /// 1 over ϖ(1 − f) of the mean medium.
+        inverse_scattered: [f32; 3],
     }
 }
 
@@ -61,6 +65,8 @@ bindings! {
         /// Four `[f32; 4]` by patch of the grid's box: φ and F; read with diffusion and surfaces or
         /// ground.
         patches,
+        /// `[f32; 4]` by cell: radiance toward the eye, and extinction; read with bounces.
+        seen,
     }
 }
 
@@ -81,6 +87,8 @@ pub struct ScatterParams {
     pub n_terms: u32,
     /// Light, optical depth and mean cosines of a term over those of the one before.
     pub term: [f64; 3],
+    /// ϖ(1 − f) of the mean medium.
+    pub scattered: [f32; 3],
 }
 
 /// Further light of a scene besides that of suns and lamps that is scattered once.
@@ -92,6 +100,8 @@ pub struct ScatterVariant {
     pub has_slopes: bool,
     /// Diffuse light reaches surfaces or ground.
     pub has_solids: bool,
+    /// What the cells scatter toward the eye is known.
+    pub has_seen: bool,
 }
 
 /// The pipeline of the pass.
@@ -110,6 +120,7 @@ impl Scatter {
             ("DIFFUSE", u32::from(variant.is_diffuse)),
             ("SLOPES", u32::from(variant.has_slopes)),
             ("SOLIDS", u32::from(variant.has_solids)),
+            ("SEEN", u32::from(variant.has_seen)),
         ];
         let kernel = Kernel::with_macros(device, compiler, "scatter", Push::FIELDS, &[], &macros)?;
         Ok(Scatter { kernel, variant })
@@ -138,11 +149,13 @@ impl Scatter {
             term_light,
             term_depth,
             term_phase,
+            unused: 0,
+            inverse_scattered: of.scattered.map(|a| 1.0 / a.max(f32::MIN_POSITIVE)),
         };
         // The last ones are bound where they are wanted.
-        let ScatterVariant { is_diffuse, has_slopes, has_solids } = self.variant;
-        let is_bound = [is_diffuse, has_slopes, has_solids];
-        let buffers: [&Buffer; 10] = buffers.by_binding();
+        let ScatterVariant { is_diffuse, has_slopes, has_solids, has_seen } = self.variant;
+        let is_bound = [is_diffuse, has_slopes, has_solids, has_seen];
+        let buffers: [&Buffer; 11] = buffers.by_binding();
         let (always, wanted) = buffers.split_at(7);
         let wanted = wanted.iter().zip(is_bound).filter(|(_, is)| *is).map(|(buffer, _)| *buffer);
         let bound: Vec<&Buffer> = always.iter().copied().chain(wanted).collect();

@@ -192,5 +192,7 @@ fn record_by(
         least_cut: view.least_cut() as f32,
         i_first,
     };
-    rec.draw(pipeline, target, start, &buffers.by_binding(), &push, instances)
+    // Slices alone have the light of cells.
+    let [bound @ .., _cells] = &buffers.by_binding();
+    rec.draw(pipeline, target, start, bound, &push, instances)
 }

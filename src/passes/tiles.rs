@@ -20,6 +20,7 @@ use crate::layout::cull::KeptRecord;
 use crate::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 
 pub use division::{Division, RUN, TILES_ACROSS, invocations};
+use push::in_powers_of_two;
 pub use push::{ClearPush, PairsPush, Push, RangesPush, RoundsPush, SplatPush};
 pub use rounds::{BLOCK, MAX_SLICES};
 use rounds::{Form, Rounds};
@@ -163,6 +164,7 @@ impl Tiles {
             ("TEXTURED", u32::from(blobs.textured)),
             ("ELLIPSOIDS", u32::from(blobs.ellipsoids)),
             ("SHADED", u32::from(blobs.shaded)),
+            ("CELLS", u32::from(blobs.in_cells)),
             ("THRESHOLD", u32::from(blobs.threshold)),
             ("SLICES", u32::from(slices)),
             ("QUEUE", u32::from(sharing == Sharing::Registers)),
@@ -171,6 +173,7 @@ impl Tiles {
             ("WORDS_64", u32::from(limits.has_int64)),
             ("BEHIND", if has_under { 1 + u32::from(has_depth24(device)) } else { 0 }),
         ];
+        let for_splats = [&macros[..3], &[("CELLS", u32::from(blobs.in_cells))]].concat();
         let kernel = |name, fields, constants: &[_], macros: &[_]| {
             Kernel::with_macros(device, compiler, name, fields, constants, macros)
         };
@@ -179,7 +182,7 @@ impl Tiles {
             kernel("tiles", Push::FIELDS, &[], &macros)
         };
         Ok(Tiles {
-            splat: kernel("tiles.splat", SplatPush::FIELDS, &constants, &macros[..3])?,
+            splat: kernel("tiles.splat", SplatPush::FIELDS, &constants, &for_splats)?,
             rounds: kernel("tiles.rounds", RoundsPush::FIELDS, &[], &macros[..3])?,
             clear: kernel("tiles.clear", ClearPush::FIELDS, &[], &[])?,
             pairs: kernel("tiles.pairs", PairsPush::FIELDS, &constants, &[])?,
@@ -188,6 +191,7 @@ impl Tiles {
             compose: (rounds.n > 1).then(|| compose(1)).transpose()?,
             division,
             n_compose_bindings: match blobs {
+                BlobVariant { in_cells: true, .. } => 13,
                 BlobVariant { shaded: true, .. } => 12,
                 BlobVariant { ellipsoids: true, .. } => 11,
                 BlobVariant { textured: true, .. } => 10,
@@ -337,7 +341,7 @@ impl Tiles {
     }
 
     /// Composes `sorted`, the pairs of round `i_round` by bin, into `picture`; `pool` holds the
-    /// textures.
+    /// textures, and `seen` the light of cells.
     ///
     /// # Errors
     /// Fails if a buffer does not fit the shader's binding.
@@ -345,35 +349,20 @@ impl Tiles {
         &self,
         rec: &mut Recorder<'_>,
         i_round: u32,
-        [sorted, picture, pool]: [&Buffer; 3],
+        [sorted, picture, pool, seen]: [&Buffer; 4],
         view: &BlobView<'_>,
     ) -> Result<()> {
-        let Division { width, height, n_bins_x, n_bins, .. } = self.division;
+        let n_bins = self.division.n_bins;
         let Scratch { splats, sheets, conics, shades, round, ranges, state, under, depths, .. } =
             &self.scratch;
         let (max_groups, most_tiles) = (self.max_groups, self.max_tiles);
         let push = RangesPush { n_bins, i_round, max_groups, most_tiles };
         let i_first = ROUND_WORDS * i_round;
         rec.dispatch_indirect(&self.ranges, &[sorted, round, ranges], &push, (round, i_first + 8))?;
-        let push = Push {
-            tangents: [view.camera.tan_x, view.camera.tan_y],
-            pixel: self.pixel(view),
-            width,
-            height,
-            n_bins_x,
-            i_round,
-            cut: in_powers_of_two(0.5 * view.cutoff * view.cutoff),
-            saturated: view.saturated as f32,
-            inv_threshold: view.inv_threshold(),
-            least_cut: in_powers_of_two(view.least_cut()),
-            y_right: view.camera.right[1],
-            y_up: view.camera.up[1],
-            y_forward: view.camera.forward[1],
-            near_in_slices: view.near_in_slices(),
-        };
+        let push = Push::new(view, &self.division, i_round);
         let buffers = [
             splats, sorted, round, ranges, state, picture, under, depths, sheets, pool, conics,
-            shades,
+            shades, seen,
         ];
         let buffers = &buffers[..self.n_compose_bindings];
         if i_round == 0 {
@@ -388,10 +377,4 @@ impl Tiles {
     fn pixel(&self, view: &BlobView<'_>) -> [f32; 2] {
         view.camera.pixel_slopes(self.division.width, self.division.height)
     }
-}
-
-/// Returns b²/(2 σ²) of a cut in powers of two: at most 46, at 8 σ; the shader's power of two holds
-/// up to 125.
-fn in_powers_of_two(cut: f64) -> f32 {
-    (cut * std::f64::consts::LOG2_E) as f32
 }

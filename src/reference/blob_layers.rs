@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::Blob;
 use super::composite::{OpaquePixel, Rounding};
+use super::diffusion::SeenCells;
 use super::parallel::parallel_map;
 use super::shade::{SeenLight, SeenShade};
 use super::shine::Shine;
@@ -34,6 +35,29 @@ pub struct Sprites<'a> {
     pub factor: Option<Factor<'a>>,
     /// Light inside of each blob; `None` where it is the same throughout.
     pub shades: Option<&'a [Shade]>,
+    /// Light that slices have where they are; `None` where they have that of their blobs.
+    pub cells: Option<&'a CellLight<'a>>,
+}
+
+/// Light of cells, which slices have where they are, in the blobs' colours.
+#[derive(Debug, Clone)]
+pub struct CellLight<'a> {
+    /// Radiance toward the eye by cell.
+    pub cells: &'a SeenCells,
+    /// By blob, the mean over the channels of what cells show of it: its own radiance belongs to
+    /// that.
+    pub means: Vec<f64>,
+}
+
+impl CellLight<'_> {
+    /// Returns the factor on the radiance of blob `j` at `p`, and its greatest in the cells around.
+    pub(super) fn factor(&self, j: usize, p: DVec3) -> (f64, f64) {
+        let mean = self.means[j];
+        if mean <= 0.0 {
+            return (0.0, 0.0);
+        }
+        (self.cells.mean_at(p) / mean, self.cells.greatest_about(p) / mean)
+    }
 }
 
 impl Sprites<'_> {
@@ -44,6 +68,13 @@ impl Sprites<'_> {
     /// Returns the greatest radiance of any part of a blob.
     pub(super) fn brightest(&self) -> f64 {
         let brightest = self.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
+        if let Some(light) = self.cells {
+            let of = |(l, mean): (&DVec3, &f64)| {
+                if *mean > 0.0 { l.abs().max_element() / mean } else { 0.0 }
+            };
+            let most = self.radiance.iter().zip(&light.means).map(of).fold(0.0, f64::max);
+            return brightest.max(most * light.cells.greatest());
+        }
         if self.shades.is_some() { BRIGHTER * brightest } else { brightest }
     }
 }

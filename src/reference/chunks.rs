@@ -76,8 +76,14 @@ mod tests {
         behind: OpaquePixel,
     ) -> ([f64; 4], [f64; 4]) {
         let order: Vec<u32> = (0..blobs.len() as u32).collect();
-        let sprites =
-            Sprites { blobs, radiance: colors, order: &order, factor: None, shades: None };
+        let sprites = Sprites {
+            blobs,
+            radiance: colors,
+            order: &order,
+            factor: None,
+            shades: None,
+            cells: None,
+        };
         let of = Composition { view: &VIEW, sprites, rounding, saturated: 0.0 };
         let (values, bounds) = render_over(&of, &[behind]);
         (values[0], bounds[0])
@@ -101,6 +107,7 @@ mod tests {
                 order: &[0, 1],
                 factor: None,
                 shades: None,
+                cells: None,
             };
             far_to_near(&VIEW, &[behind], &sprites, &Rounding::NONE)
         };

@@ -91,7 +91,7 @@ pub fn grouped(
             ([b.sigma.max(b.sigma_mean), b.aspect], cloud_centers[region as usize]);
         let density = |x| sample(spec, cells, x);
         let facet = facet_at(sources.place, b.position, shape, b.area, region, center, density);
-        (facet, b.color)
+        (Facet { sigma: b.sigma, ..facet }, b.color)
     };
     runs.iter().map(of).collect()
 }

@@ -38,6 +38,8 @@ pub struct Facet {
     pub area: f64,
     /// Index of the region; of the cloud in this module.
     pub region: u32,
+    /// σ of the blobs that it stands for; 0 on surfaces and ground.
+    pub sigma: f64,
     /// q = |G|/S, from 0, where the density has no direction, to 1.
     pub conditioning: f64,
 }
@@ -155,7 +157,8 @@ fn facet_of(
     let (blob, region) = (&sources.blobs[i], sources.regions[i]);
     let shape = [blob.sigma.max(sources.sigma_means[i]), blob.aspect];
     let center = cloud_centers[region as usize];
-    facet_at(sources.place, blob.position, shape, area(blob), region, center, density)
+    let facet = facet_at(sources.place, blob.position, shape, area(blob), region, center, density);
+    Facet { sigma: blob.sigma, ..facet }
 }
 
 /// Returns the facet of a blob of shape (σ, aspect) at `p`, on its shell or at its centre.
@@ -169,11 +172,18 @@ pub(super) fn facet_at(
     density: impl Fn(DVec3) -> f64,
 ) -> Facet {
     if place == FacetPlace::Center {
-        return Facet { position: p, normal: DVec3::Y, area, region, conditioning: 1.0 };
+        return Facet {
+            position: p,
+            normal: DVec3::Y,
+            area,
+            region,
+            sigma: 0.0,
+            conditioning: 1.0,
+        };
     }
     let gradient = gradient(density, p, shape[0], shape[1]);
     let (normal, conditioning) = blended_normal(gradient, shape[1], p, center);
-    Facet { position: shell(p, shape, normal), normal, area, region, conditioning }
+    Facet { position: shell(p, shape, normal), normal, area, region, sigma: 0.0, conditioning }
 }
 
 #[cfg(test)]

@@ -116,7 +116,14 @@ mod tests {
 
     fn sums(blobs: &[Blob], behind: OpaquePixel, rounding: &Rounding) -> SpriteSums {
         let order: Vec<u32> = (0..blobs.len() as u32).collect();
-        let sprites = Sprites { blobs, radiance: &[], order: &order, factor: None, shades: None };
+        let sprites = Sprites {
+            blobs,
+            radiance: &[],
+            order: &order,
+            factor: None,
+            shades: None,
+            cells: None,
+        };
         let raster = Raster { first: [0, 0], n_columns: 1, cell: 1, at: &[[0, 0]] };
         sums_at(&VIEW, &raster, &[behind], &sprites, rounding).remove(0)
     }

@@ -10,7 +10,7 @@ use super::composite::{Layered, OpaquePixel, Rounding};
 use super::slices;
 use super::view::View;
 
-pub use super::blob_layers::{Bounded, Factor, Raster, Shares, Sprites, alpha};
+pub use super::blob_layers::{Bounded, CellLight, Factor, Raster, Shares, Sprites, alpha};
 
 /// Returns the picture of `sprites` over nothing.
 pub fn render(view: &View, sprites: &Sprites<'_>) -> Vec<[f64; 4]> {
@@ -131,8 +131,14 @@ mod tests {
         let kappa = std::f64::consts::LN_2 / (SQRT_TAU * 0.25);
         let at = |z: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
         let blobs = [at(2.0), at(4.0)];
-        let sprites =
-            Sprites { blobs: &blobs, radiance: &[], order: &[1, 0], factor: None, shades: None };
+        let sprites = Sprites {
+            blobs: &blobs,
+            radiance: &[],
+            order: &[1, 0],
+            factor: None,
+            shades: None,
+            cells: None,
+        };
         let of = |depth: f64| {
             let raster = Raster { first: [0, 0], n_columns: 1, cell: 1, at: &[[0, 0]] };
             let behind = OpaquePixel { depth, ..OpaquePixel::EMPTY };
@@ -170,6 +176,7 @@ mod tests {
                     order: &[1, 0],
                     factor: None,
                     shades: None,
+                    cells: None,
                 };
                 render_over(&VIEW, &[behind], &sprites, &Rounding::NONE)
             };

@@ -21,6 +21,7 @@ pub fn facets(terrain: &Terrain, origin: DVec3, region: u32) -> Vec<Facet> {
         normal: f.normal,
         area: f.area,
         region,
+        sigma: 0.0,
         conditioning: 1.0,
     };
     terrain.facets().map(of).collect()

@@ -124,6 +124,7 @@ mod tests {
                 order: &[1, 0],
                 factor: None,
                 shades: None,
+                cells: None,
             };
             let of = Composition { view: &view, sprites, rounding: none, saturated: 0.0 };
             let (near_first, bound) = render_over(&of, &behind);

@@ -109,11 +109,14 @@ fn furnace(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     {
         let mut scene = scene(LightingMode::Diffusion, EVEN, WHITE, cluster(tau))?;
         scene.surfaces = surfaces;
-        let frame = ctx.render(&scene, 0)?;
-        for (i, lit) in frame.lit.iter().enumerate() {
-            let what = format_args!("radiance of facet {i}, depth {tau:e}");
-            let bound = (128.0 * U_F32 + 4.0 * UNEVEN) * FRAC_1_PI;
-            c.add(f64::from(lit.first[0]), FRAC_1_PI, bound, what);
+        for bounces in [0, 2] {
+            scene.lighting.diffusion.bounces = bounces;
+            let frame = ctx.render(&scene, 0)?;
+            for (i, lit) in frame.lit.iter().enumerate() {
+                let what = format_args!("radiance of facet {i}, depth {tau:e}, {bounces} bounces");
+                let bound = (128.0 * U_F32 + 4.0 * UNEVEN) * FRAC_1_PI;
+                c.add(f64::from(lit.first[0]), FRAC_1_PI, bound, what);
+            }
         }
     }
     Ok(())

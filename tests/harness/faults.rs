@@ -232,6 +232,20 @@ pub const FAULTS: &[Fault] = &[
         "scattering/furnace",
     ),
     (
+        "a bounce has no light of the sky",
+        "include/ways.glsl",
+        "vec3 outside = of_sky(w.y < 0.0 ? 1.0 : 0.0);",
+        "vec3 outside = vec3(0.0);",
+        "scattering/furnace",
+    ),
+    (
+        "light that goes straight on is not seen",
+        "diffusion_seen.comp",
+        "(1.0 - push.weakened) * behind",
+        "vec3(0.0)",
+        "scattering/furnace",
+    ),
+    (
         "ground does not hide the sky from clouds",
         "diffusion_faces.comp",
         "(sent - all - ",

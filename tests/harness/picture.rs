@@ -10,19 +10,22 @@ mod sprite;
 
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, UVec3};
 use nimbus::gpu::TargetFormat;
 use nimbus::layout::facet::{LitRecord, SlopeRecord};
+use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
 use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
+use nimbus::model::grid::GridSpec;
 use nimbus::model::shade::Shade;
 use nimbus::reference::Blob;
 use nimbus::reference::composite::{OpaquePixel, Rounding};
+use nimbus::reference::diffusion::SeenCells;
 use nimbus::reference::sort::{depths, distances, key32, order};
-use nimbus::reference::sprites::{Sprites, render_over};
+use nimbus::reference::sprites::{CellLight, Sprites, render_over};
 use nimbus::reference::texture::{Pool, SplatTexture, Textured};
 use nimbus::reference::view::View;
 
@@ -58,6 +61,8 @@ pub struct Picture {
     pub lit: Option<Vec<LitRecord>>,
     /// Slopes of the light by facet, if blobs are shaded.
     pub slopes: Option<Vec<SlopeRecord>>,
+    /// Radiance by cell, if slices have the light of cells.
+    pub cells: Option<(GridRecord, Vec<[f32; 4]>)>,
     /// Facet of each particle, if not in the order of particles.
     pub i_facet: Option<Vec<u32>>,
     /// Group of each particle and the drawn part of each group, if not all particles are drawn.
@@ -97,6 +102,7 @@ impl Picture {
             in_order: None,
             lit: None,
             slopes: None,
+            cells: None,
             i_facet: None,
             drawn: None,
             scenery: None,
@@ -191,6 +197,24 @@ impl Picture {
         Some(self.blobs().into_iter().zip(self.facets()).map(of).collect())
     }
 
+    /// Returns the cells that slices have the light of.
+    pub fn seen(&self) -> Option<SeenCells> {
+        let (grid, cells) = self.cells.as_ref()?;
+        let spec = GridSpec {
+            low: double(grid.low),
+            cell: f64::from(grid.cell),
+            aspect: f64::from(grid.aspect),
+            n_cells: UVec3::from(grid.n_cells),
+        };
+        let of = |v: &[f32; 4]| (double([v[0], v[1], v[2]]), f64::from(v[3]));
+        Some(SeenCells::of_cells(spec, cells.iter().map(of).collect()))
+    }
+
+    /// Returns their light. A facet's colour has the radiance that belongs to a mean of 1.
+    pub fn cell_light<'a>(&self, seen: Option<&'a SeenCells>) -> Option<CellLight<'a>> {
+        seen.map(|cells| CellLight { cells, means: vec![1.0; self.placed.len()] })
+    }
+
     pub fn radiance(&self) -> Vec<DVec3> {
         match &self.lit {
             // The f32 sum is rounded equally on both sides.
@@ -226,12 +250,14 @@ impl Picture {
             Some(_) => self.behind(format).iter().map(|c| self.widened(c)).collect(),
         };
         let sheets = self.sheets();
-        let shades = self.shades();
+        let (shades, seen) = (self.shades(), self.seen());
+        let cells = self.cell_light(seen.as_ref());
         let factor = |j: usize, delta: DVec2| self.factor(&sheets, j, delta);
         let (value, bound) = {
             let (blobs, radiance, order) = (&blobs, &radiance, &order);
             let (shades, factor) = (shades.as_deref(), Some(&factor as _));
-            let sprites = Sprites { blobs, radiance, order, factor, shades };
+            let cells = cells.as_ref();
+            let sprites = Sprites { blobs, radiance, order, factor, shades, cells };
             render_over(&self.view, &behind, &sprites, &rounding)
         };
         (value.concat(), bound.concat())

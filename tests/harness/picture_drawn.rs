@@ -52,7 +52,7 @@ struct Uploaded {
     n_entries: u32,
     n_surface_facets: u32,
     /// Buffers of the sprite path; the fourth holds the facets' light.
-    of_sprites: [Buffer; 10],
+    of_sprites: [Buffer; 11],
     regions: Buffer,
     n_regions: u32,
 }
@@ -105,14 +105,15 @@ impl Picture {
     }
 
     fn blob_view<'a>(
-        &self,
+        &'a self,
         camera: &'a CameraRecord,
         extents: Option<&'a [Extent]>,
         saturated: f64,
     ) -> BlobView<'a> {
         let Edge { radius: cutoff, tau: threshold, least } = self.view.edge;
         let slice = self.view.slice;
-        BlobView { camera, cutoff, threshold, least, saturated, slice, extents }
+        let cells = self.cells.as_ref().map(|(grid, _)| grid);
+        BlobView { camera, cutoff, threshold, least, saturated, slice, extents, cells }
     }
 
     /// Draws the picture by the given path.
@@ -254,6 +255,7 @@ impl Picture {
                 gpu.upload(&textures),
                 gpu.upload(&words),
                 gpu.upload(&slopes),
+                gpu.upload(self.cells.as_ref().map_or(&[][..], |(_, cells)| cells)),
             ],
             regions: gpu.upload(&scenery.regions),
             n_regions: scenery.regions.len() as u32,
@@ -268,8 +270,19 @@ impl Picture {
         target: Target<'_>,
         camera: &CameraRecord,
     ) -> Result<()> {
-        let [entries, placed, particles, lit, i_facet, i_group, drawn, textured, pool, slopes] =
-            uploaded.of_sprites.each_ref();
+        let [
+            entries,
+            placed,
+            particles,
+            lit,
+            i_facet,
+            i_group,
+            drawn,
+            textured,
+            pool,
+            slopes,
+            seen,
+        ] = uploaded.of_sprites.each_ref();
         let from = BlobBuffers {
             entries,
             placed,
@@ -281,6 +294,7 @@ impl Picture {
             textured,
             pool,
             slopes,
+            seen,
         };
         let i_first_facet = uploaded.n_surface_facets;
         let n = BlobCount { n: RecordCount::Known(uploaded.n_entries), i_first_facet };
@@ -338,6 +352,7 @@ impl Picture {
             ellipsoids: self.has_ellipsoids(),
             thin: self.textured.is_none() && tau_max <= THIN,
             shaded: self.slopes.is_some(),
+            in_cells: self.cells.is_some(),
         }
     }
 }

@@ -56,9 +56,11 @@ impl Picture {
         let sheets = self.sheets();
         let factor = |j: usize, delta: DVec2| self.factor(&sheets, j, delta);
         let (blobs, radiance, order) = (&blobs, &radiance, &order);
-        let shades = self.shades();
+        let (shades, seen) = (self.shades(), self.seen());
+        let cells = self.cell_light(seen.as_ref());
         let (shades, factor) = (shades.as_deref(), Some(&factor as _));
-        let sprites = Sprites { blobs, radiance, order, factor, shades };
+        let cells = cells.as_ref();
+        let sprites = Sprites { blobs, radiance, order, factor, shades, cells };
         let of = Composition { view: &self.view, sprites, rounding, saturated };
         let render = if by_tiles { tiles::render_over } else { chunks::render_over };
         let (value, bound) = render(&of, &behind);

@@ -22,7 +22,7 @@ fn lots(i: u32) -> [f64; 4] {
 
 /// Blobs without textures.
 fn plain<'a>(blobs: &'a [Blob], radiance: &'a [DVec3], order: &'a [u32]) -> Sprites<'a> {
-    Sprites { blobs, radiance, order, factor: None, shades: None }
+    Sprites { blobs, radiance, order, factor: None, shades: None, cells: None }
 }
 
 /// The picture over nothing and its bound.

@@ -6,8 +6,8 @@ use super::layers::{Rays, layers};
 use super::marches::march_samples;
 use crate::error::Result;
 use crate::frame::features::{
-    gathers_from_tree, has_diffusion, has_glossy, has_impostors, has_live, has_second, is_lit,
-    is_medium, region_sizes, target_format,
+    gathers_from_tree, has_bounces, has_diffusion, has_glossy, has_impostors, has_live, has_second,
+    is_lit, is_medium, region_sizes, target_format,
 };
 use crate::frame::packet::Packet;
 use crate::frame::renderer::Renderer;
@@ -57,6 +57,8 @@ pub struct Amounts {
     pub is_medium: bool,
     /// Cycles of the diffusion solver; 0 without.
     pub cycles: f64,
+    /// Visits of cells by ways along which bounces gather.
+    pub gathered: f64,
     /// Whether some material has a lobe.
     pub is_glossy: bool,
     /// Pairs of receiver and source that are looked at: at least this many.
@@ -173,6 +175,7 @@ impl Amounts {
                 true => f64::from(scene.lighting.diffusion.cycles),
                 false => 0.0,
             },
+            gathered: if lit { gathered(scene, [x, y, z]) } else { 0.0 },
             is_glossy: has_glossy(scene),
             pairs: if is_tree { facets } else { facets * (cloud_facets - 1.0).max(0.0) },
             tensor_numbers: is_edited(scene).then(|| tensor_numbers(scene, packet)),
@@ -248,4 +251,14 @@ fn tensor_numbers(scene: &Scene, packet: &Packet) -> f64 {
     };
     let of_light: f64 = region_sizes(scene).into_iter().enumerate().map(of_region).sum();
     of_light * bright_lights(&packet.lights).count() as f64
+}
+
+/// Returns the visits of cells by bounces, at least: each of 24 ways from a cell leaves the box, in
+/// the mean, after half of the cells along its shortest axis.
+fn gathered(scene: &Scene, [x, y, z]: [f64; 3]) -> f64 {
+    if !has_bounces(scene) {
+        return 0.0;
+    }
+    let bounces = f64::from(scene.lighting.diffusion.bounces);
+    24.0 * bounces * x * y * z * x.min(y).min(z) / 2.0
 }

@@ -8,6 +8,7 @@ use crate::frame::work::amounts::Blobs;
 const SMALL: Amounts = Amounts {
     is_medium: false,
     cycles: 0.0,
+    gathered: 0.0,
     particles: 10.0,
     box_particles: 10.0,
     live_particles: 0.0,

@@ -8,8 +8,8 @@ use crate::io::document::section::Section;
 use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, min_step};
 use crate::model::scene::{
-    DiffusionSettings, Gather, Lighting, LightingMode, MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS,
-    Octaves, Pairs,
+    DiffusionSettings, Gather, Lighting, LightingMode, MAX_BOUNCES, MAX_CYCLES, MAX_OCTAVES,
+    MAX_PAIR_LEVELS, Octaves, Pairs,
 };
 use crate::model::sums::{Precision, Summation, Sums};
 
@@ -68,6 +68,9 @@ keys! { DIFFUSION: fn diffusion(s) -> DiffusionSettings { DiffusionSettings;
     /// Cycles of the multigrid solver of mode "diffusion". Each leaves about an eighth of the error
     /// of the one before.
     cycles ["diffusion_cycles"]: integer(2, 1, MAX_CYCLES);
+    /// Times that light is gathered anew in mode "diffusion" on straight ways between the cells,
+    /// after diffusion.
+    bounces: integer(0, 0, MAX_BOUNCES);
     /// Whether the light of mode "diffusion" changes inside of each blob, as it does in the clouds
     /// around it.
     slopes: flag(true);

@@ -135,6 +135,7 @@ mod tests {
             normal: DVec3::Y,
             area: 0.25,
             region: 0,
+            sigma: 0.0,
             conditioning: 1.0,
         };
         (0..6400).map(facet).collect()

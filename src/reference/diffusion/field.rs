@@ -4,10 +4,14 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
+use super::bounce::Bounces;
 use super::faces::FaceLight;
+use super::moments::{Moments, corners, flux_of};
 use super::multigrid::Multigrid;
+use super::seen::SeenCells;
 use super::sources::{DiffusionMedium, Sources};
-use super::system::{System, before, next};
+use super::system::System;
+use super::ways::Ways;
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 use crate::model::medium::ScatterLaw;
@@ -18,7 +22,7 @@ use crate::reference::transmit::Obstacles;
 pub struct DiffuseLight {
     spec: GridSpec,
     /// φ, W m⁻², and F along each axis, W m⁻².
-    pub cells: Vec<[DVec3; 4]>,
+    pub cells: Vec<Moments>,
     /// U: fluence of suns and lamps, mean over the channels, W m⁻².
     pub direct: Vec<f64>,
 }
@@ -33,11 +37,37 @@ impl DiffuseLight {
         of_solids: Option<&FaceLight>,
         n_cycles: u32,
     ) -> DiffuseLight {
+        DiffuseLight::with_bounces(of, obstacles, lights, of_solids, (n_cycles, 0), DVec3::ZERO).0
+    }
+
+    /// Computes the light after a number of bounces, and with any the light of the cells toward
+    /// `eye`.
+    pub fn with_bounces(
+        of: &DiffusionMedium,
+        obstacles: &Obstacles<'_>,
+        lights: &[Light],
+        of_solids: Option<&FaceLight>,
+        (n_cycles, n_bounces): (u32, u32),
+        eye: DVec3,
+    ) -> (DiffuseLight, Option<SeenCells>) {
         let (grid, cells) = (obstacles.spec, obstacles.cells);
         let sources = Sources::new(of, obstacles, lights, of_solids.is_some());
         let system = System::new(of, grid, cells, &sources, lights, of_solids);
         let phi = Multigrid::new(system, grid.edges()).solve(n_cycles);
-        DiffuseLight::of_fluence(of, grid, cells, &sources, &phi)
+        let mut light = DiffuseLight::of_fluence(of, grid, cells, &sources, &phi);
+        if n_bounces == 0 {
+            return (light, None);
+        }
+        let weakened = DVec3::ONE - of.mean.albedo * of.mean.straight;
+        let all = cells.iter().map(|sigma| weakened * *sigma).collect();
+        let ways = Ways::new(grid, all, lights, of_solids);
+        let bounces = Bounces { of, grid, cells, n_cycles };
+        let arrived = bounces.arrived(&sources);
+        for _ in 0..n_bounces {
+            light.cells = bounces.next(&ways, &arrived, &light.cells);
+        }
+        let seen = SeenCells::new(of, (grid, cells), &light.cells, (&arrived, &ways), eye);
+        (light, Some(seen))
     }
 
     /// Returns φ with the flux F = q − D∇φ; at the faces of the box by one-sided differences.
@@ -48,16 +78,7 @@ impl DiffuseLight {
         sources: &Sources,
         phi: &[DVec3],
     ) -> DiffuseLight {
-        let (n, h) = (grid.n_cells.as_usizevec3(), grid.edges());
-        let flux = |c: usize, axis: usize| {
-            let (after, prior) = (next(n, c, axis), before(n, c, axis));
-            let steps = f64::from(u8::from(after.is_some()) + u8::from(prior.is_some()));
-            let rise = phi[after.unwrap_or(c)] - phi[prior.unwrap_or(c)];
-            let slope = if steps > 0.0 { rise / (steps * h[axis]) } else { DVec3::ZERO };
-            sources.carried[c][axis] - of.reach(cells[c]) * slope
-        };
-        let of_cell = |c: usize| [phi[c], flux(c, 0), flux(c, 1), flux(c, 2)];
-        let (cells, direct) = ((0..cells.len()).map(of_cell).collect(), sources.direct.clone());
+        let (cells, direct) = (flux_of(of, grid, cells, sources, phi), sources.direct.clone());
         DiffuseLight { spec: *grid, cells, direct }
     }
 
@@ -71,19 +92,8 @@ impl DiffuseLight {
     /// Returns φ and F at `p`, and U: trilinear between the cells' centres, and beyond the
     /// outermost ones as on them.
     pub fn at(&self, p: DVec3) -> ([DVec3; 4], f64) {
-        let n = self.spec.n_cells.as_usizevec3();
-        let at = (p - self.spec.low) / self.spec.edges() - DVec3::splat(0.5);
-        let at = at.max(DVec3::ZERO).min((n - 1).as_dvec3());
-        let (base, part) = (at.floor().as_usizevec3(), at - at.floor());
         let (mut sum, mut direct) = ([DVec3::ZERO; 4], 0.0);
-        for corner in 0..8usize {
-            let (mut c, mut weight, mut stride) = (0, 1.0, 1);
-            for axis in 0..3 {
-                let is_next = corner >> axis & 1;
-                weight *= if is_next == 1 { part[axis] } else { 1.0 - part[axis] };
-                c += stride * (base[axis] + is_next).min(n[axis] - 1);
-                stride *= n[axis];
-            }
+        for (c, weight) in corners(&self.spec, p) {
             for (sum, value) in sum.iter_mut().zip(self.cells[c]) {
                 *sum += weight * value;
             }

@@ -11,22 +11,29 @@
 //!
 //! - [`FaceLight`], [`BoxLight`]: what surfaces and ground send to the cells, and cells to them.
 //!
+//! - Bounces: light on straight ways between cells; [`SeenCells`]: what cells show of it.
+//!
 //! - [`DiffuseLight`]: all of them for a frame, and what a blob scatters of it.
 
+mod bounce;
 mod box_light;
 mod direct_solve;
 mod faces;
 mod field;
+mod moments;
 mod multigrid;
+mod seen;
 mod sources;
 mod system;
 #[cfg(test)]
 mod tests;
+mod ways;
 
 pub use box_light::BoxLight;
 pub use direct_solve::solve;
 pub use faces::FaceLight;
 pub use field::DiffuseLight;
 pub use multigrid::Multigrid;
+pub use seen::{SeenBlob, SeenCells};
 pub use sources::{DiffusionMedium, Sources};
 pub use system::System;

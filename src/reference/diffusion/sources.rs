@@ -40,6 +40,8 @@ pub struct Sources {
     /// q = D(3Q1 + cF₀): D times three times the momentum that it keeps, with the sky's where a
     /// scene has surfaces or ground; a row an axis, W m⁻².
     pub carried: Vec<[DVec3; 3]>,
+    /// 3Q1: three times the momentum of suns and lamps alone, a row an axis, W m⁻³.
+    pub of_suns: Vec<[DVec3; 3]>,
     /// U: fluence of suns and lamps, mean over the channels, W m⁻².
     pub direct: Vec<f64>,
 }
@@ -59,6 +61,7 @@ impl Sources {
             let p = spec.center(c);
             let receiver = Receiver { position: p, i_region: u32::MAX };
             let (mut fluence, mut flux, mut fallen) = (DVec3::ZERO, DMat3::ZERO, DVec3::ZERO);
+            let mut direct = 0.0;
             for light in lights.iter().filter(|light| has_sky_flux || !light.is_sky()) {
                 let way = light.arrival(p);
                 let tau = obstacles.depths(&[receiver], std::slice::from_ref(light))[0];
@@ -70,6 +73,8 @@ impl Sources {
                     continue;
                 }
                 let e = light.energy() * way.falloff * (-tau * depth).exp();
+                direct += e.element_sum() / 3.0;
+                let e = e * mean_over(obstacles.cells[c] * depth * chord(spec.edges(), way.toward));
                 fluence += e;
                 // A column an axis.
                 for axis in 0..3 {
@@ -77,14 +82,29 @@ impl Sources {
                 }
             }
             let extinction = obstacles.cells[c];
-            let mut carried = [0, 1, 2].map(|axis| {
-                3.0 * of.reach(extinction) * albedo * (g - f) * extinction * flux.col(axis)
-            });
+            let of_suns =
+                [0, 1, 2].map(|axis| 3.0 * albedo * (g - f) * extinction * flux.col(axis));
+            let mut carried = of_suns.map(|q| of.reach(extinction) * q);
             carried[1] -= of.reach(extinction) * of.inverse_chord * fallen;
-            (albedo * (1.0 - f) * extinction * fluence, (carried, fluence.element_sum() / 3.0))
+            (albedo * (1.0 - f) * extinction * fluence, (carried, of_suns, direct))
         });
         let (scattered, rest): (Vec<DVec3>, Vec<_>) = found.into_iter().unzip();
-        let (carried, direct) = rest.into_iter().unzip();
-        Sources { scattered, carried, direct }
+        let direct = rest.iter().map(|(.., direct)| *direct).collect();
+        let (carried, of_suns) = rest.into_iter().map(|(carried, suns, _)| (carried, suns)).unzip();
+        Sources { scattered, carried, of_suns, direct }
     }
+}
+
+/// Returns the length of the way through the middle of a cell.
+fn chord(edges: DVec3, toward: DVec3) -> f64 {
+    (edges / toward.abs().max(DVec3::splat(1e-6))).min_element()
+}
+
+/// Returns the mean of light over its way through a cell of the depth `depth`, over the light at
+/// the middle.
+fn mean_over(depth: DVec3) -> DVec3 {
+    (0.5 * depth)
+        .to_array()
+        .map(|h| if h > 0.0 { h.min(20.0).sinh() / h.min(20.0) } else { 1.0 })
+        .into()
 }

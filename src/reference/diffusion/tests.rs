@@ -175,6 +175,7 @@ fn a_flux_by_hand() {
     assert!((of.inverse_chord - 7.0 / 3.0).abs() < 1e-15);
     let phi = [1.0, 3.0, 5.0].map(DVec3::splat);
     let nothing = Sources {
+        of_suns: vec![],
         scattered: vec![DVec3::ZERO; 3],
         carried: vec![[DVec3::ZERO; 3]; 3],
         direct: vec![1.0, 2.0, 4.0],

@@ -5,11 +5,11 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::local_scene::LocalScene;
-use super::medium_light::MediumLight;
+use super::medium_light::{BlobLight, CloudCells, MediumLight};
 use crate::error::Result;
 use crate::model::cloud::{Cloud, CloudSource, Group};
 use crate::model::frame_state::FrameState;
-use crate::model::light::{Light, UP};
+use crate::model::light::Light;
 use crate::model::medium::{MeanMedium, Medium, ScatterLaw};
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::shade::FacetSlope;
@@ -52,6 +52,8 @@ pub struct FrameReference {
     pub radiance: Vec<DVec3>,
     /// Change of `radiance` at every facet; empty unless light changes inside of blobs.
     pub slopes: Vec<FacetSlope>,
+    /// Light of the cells toward the eye; `None` without bounces.
+    pub cells: Option<CloudCells>,
     /// I_i of every facet; empty unless the lighting mode is "two-reflection".
     pub indirect: Vec<DVec3>,
     /// L2 of every facet toward the eye; empty unless the lighting mode is "two-reflection".
@@ -150,6 +152,7 @@ impl FrameReference {
             irradiance: vec![],
             radiance: vec![],
             slopes: vec![],
+            cells: None,
             indirect: vec![],
             second: vec![],
             second_error: vec![],
@@ -189,7 +192,8 @@ impl FrameReference {
             .collect();
         let diffuse = (scene.lighting.mode == LightingMode::Diffusion).then(|| {
             let mean = MeanMedium::new(scene, &self.groups, self.state.time_s);
-            MediumLight::new(scene, &mean, &obstacles, &local)
+            let eye = self.state.pose.position - origin;
+            MediumLight::new(scene, &mean, &obstacles, &local, eye)
         });
         // Diffuse light has the sky, and what is scattered on the way from suns and lamps.
         let (direct, lights) = match &diffuse {
@@ -229,30 +233,26 @@ impl FrameReference {
         let media: Vec<Medium> = scene.clouds.iter().map(medium).collect();
         let eye = self.state.pose.position - self.state.light_origin;
         let n_solids = scene.n_solids();
-        let diffuse = diffuse.map(|light| &light.cells);
         let found = parallel_map(self.facets.len(), |i| {
             let facet = &self.facets[i];
             let i_cloud = (facet.region as usize).checked_sub(n_solids)?;
             let law = ScatterLaw::new(&scene.lighting, &media[i_cloud], self.facet_colors[i]);
-            let p = facet.position;
-            let receiver = transmit::Receiver { position: p, i_region: facet.region };
+            let receiver = transmit::Receiver { position: facet.position, i_region: facet.region };
             let taus = obstacles.depths(&[receiver], lights);
-            let fluence = reference::scatter::fluence(&law, p, &taus, lights);
-            let has_sky = diffuse.is_none();
-            let once = reference::scatter::radiance(&law, p, eye, &taus, lights, has_sky);
-            let outgoing = (eye - p).normalize_or(UP);
-            let more = diffuse.map(|light| light.scattered(&law, p, outgoing));
-            let slope = diffuse.map(|light| light.slope(&law, p, outgoing, once));
-            Some((fluence, once + more.unwrap_or_default(), slope.unwrap_or_default()))
+            Some(BlobLight::new(&law, facet, eye, (&taus, lights), diffuse))
         });
         for (i, light) in found.iter().enumerate() {
-            if let Some((fluence, radiance, _)) = *light {
-                (self.irradiance[i], self.radiance[i]) = (fluence, radiance);
+            if let Some(light) = light {
+                (self.irradiance[i], self.radiance[i]) = (light.fluence, light.radiance);
             }
         }
+        if let Some(cells) = diffuse.and_then(|light| light.seen.clone()) {
+            let mean = |light: &Option<BlobLight>| light.as_ref().map_or(0.0, |l| l.mean);
+            self.cells = Some(CloudCells { cells, means: found.iter().map(mean).collect() });
+        }
         if scene.lighting.has_slopes() {
-            let slope = |(facet, light): (&Facet, &Option<(DVec3, DVec3, DVec3)>)| FacetSlope {
-                relative: light.map_or(DVec3::ZERO, |(.., slope)| slope),
+            let slope = |(facet, light): (&Facet, &Option<BlobLight>)| FacetSlope {
+                relative: light.as_ref().map_or(DVec3::ZERO, |l| l.slope),
                 position: facet.position,
             };
             self.slopes = self.facets.iter().zip(&found).map(slope).collect();
@@ -344,6 +344,9 @@ impl FrameReference {
         if !self.slopes.is_empty() {
             let even = |f: &Facet| FacetSlope { relative: DVec3::ZERO, position: f.position };
             self.slopes.splice(0..0, flat.iter().map(even));
+        }
+        if let Some(of) = &mut self.cells {
+            of.means.splice(0..0, flat.iter().map(|_| 0.0));
         }
         self.irradiance.splice(0..0, irradiance);
         self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, flat.len()));

@@ -80,7 +80,14 @@ fn sums(
     }
     let raster = raster(pixels);
     with_textures(scene, frame, &view, |factor| {
-        let sprites = Sprites { blobs: &blobs, radiance: &[], order: &order, factor, shades: None };
+        let sprites = Sprites {
+            blobs: &blobs,
+            radiance: &[],
+            order: &order,
+            factor,
+            shades: None,
+            cells: None,
+        };
         sums_at(&view, &raster, &opaque, &sprites, &rounding)
     })
 }

@@ -93,6 +93,7 @@ fn surface_facets(surface: &Surface, region: u32) -> impl Iterator<Item = Facet>
         normal,
         area,
         region,
+        sigma: 0.0,
         conditioning: 1.0,
     })
 }

@@ -6,6 +6,7 @@ use super::frame::FrameReference;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::scene::Scene;
 use crate::model::shade::{FacetSlope, Shade};
+use crate::reference::sprites::CellLight;
 use crate::reference::{self, Blob};
 
 impl FrameReference {
@@ -23,8 +24,20 @@ impl FrameReference {
         self.particle_facets(scene).into_iter().map(|i| self.facet_radiance(i as usize)).collect()
     }
 
-    /// Returns the light inside of every particle; `None` where it is the same throughout.
+    /// Returns the light of cells that slices have where they are; `None` where they have that of
+    /// their particles.
+    pub fn particle_cells(&self, scene: &Scene) -> Option<CellLight<'_>> {
+        let of = self.cells.as_ref().filter(|_| scene.has_light_of_cells())?;
+        let means = self.particle_facets(scene).into_iter().map(|i| of.means[i as usize]);
+        Some(CellLight { cells: &of.cells, means: means.collect() })
+    }
+
+    /// Returns the light inside of every particle; `None` where it is the same throughout, or that
+    /// of cells.
     pub fn particle_shades(&self, scene: &Scene) -> Option<Vec<Shade>> {
+        if scene.has_light_of_cells() {
+            return None;
+        }
         let shade = |(blob, i): (&Blob, u32)| {
             let FacetSlope { relative, position } = self.slopes[i as usize];
             let apart = if scene.groups_facets() { blob.position - position } else { DVec3::ZERO };

@@ -107,9 +107,10 @@ fn drawn(
 ) -> Vec<[f64; 4]> {
     let (blobs, order) = drawn_blobs(scene, frame);
     let (raster, shades) = (raster(pixels), frame.particle_shades(scene));
+    let cells = frame.particle_cells(scene);
     with_textures(scene, frame, view, |factor| {
-        let shades = shades.as_deref();
-        let sprites = Sprites { blobs: &blobs, radiance, order: &order, factor, shades };
+        let (shades, cells) = (shades.as_deref(), cells.as_ref());
+        let sprites = Sprites { blobs: &blobs, radiance, order: &order, factor, shades, cells };
         let on_row = |n| on_progress(RenderStage::Drawing, n);
         sprites::render_at(view, &raster, opaque, &sprites, &on_row)
     })

@@ -81,9 +81,11 @@ pub fn pixel_shares(
     let (opaque, behind) = solid_shares(scene, frame, &view, pixels);
     let (blobs, order) = drawn_blobs(scene, frame);
     let (raster, shades) = (raster(pixels), frame.particle_shades(scene));
+    let cells = frame.particle_cells(scene);
     let found = with_textures(scene, frame, &view, |factor| {
-        let shades = shades.as_deref();
-        let sprites = Sprites { blobs: &blobs, radiance: &[], order: &order, factor, shades };
+        let (shades, cells) = (shades.as_deref(), cells.as_ref());
+        let sprites =
+            Sprites { blobs: &blobs, radiance: &[], order: &order, factor, shades, cells };
         sprites::shares_at(&view, &raster, &opaque, &sprites)
     });
     let all = found.iter().zip(&opaque).zip(behind);
@@ -177,9 +179,11 @@ pub fn drawn_by_settings(
     let order = set_order(scene, frame, &blobs);
     let radiance = emitters.of_particles(radiance);
     let (raster, shades) = (raster(pixels), frame.particle_shades(scene));
+    let cells = frame.particle_cells(scene);
     with_textures(scene, frame, &view, |factor| {
-        let shades = shades.as_deref();
-        let sprites = Sprites { blobs: &blobs, radiance: &radiance, order: &order, factor, shades };
+        let (shades, cells) = (shades.as_deref(), cells.as_ref());
+        let sprites =
+            Sprites { blobs: &blobs, radiance: &radiance, order: &order, factor, shades, cells };
         sprites::render_over_at(&view, &raster, &opaque, &sprites, &rounding)
     })
 }

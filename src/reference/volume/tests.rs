@@ -116,8 +116,14 @@ fn far_apart_blobs_are_thin_sprites() {
         [blob(4.0, 0.2, 0.8), blob(8.0, 0.25, 1.7), blob(20.0, 0.6, 3.0), blob(30.0, 0.5, 0.02)];
     let colors = [RED, BLUE, COLOR, DVec3::ONE];
     let thin = |order: &[u32]| {
-        let sprites =
-            Sprites { blobs: &blobs, radiance: &colors, order, factor: None, shades: None };
+        let sprites = Sprites {
+            blobs: &blobs,
+            radiance: &colors,
+            order,
+            factor: None,
+            shades: None,
+            cells: None,
+        };
         sprites::render(&view(3), &sprites)
     };
     let sorted = thin(&[3, 2, 1, 0]);

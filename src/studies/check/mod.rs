@@ -58,14 +58,19 @@ pub fn check(device: &DevicePicture, plan: &CheckPlan<'_>) -> Result<Check> {
     let pixels = checked_pixels(film.width, film.height);
     let exact = &ReferenceKind::drawn_by(&device.scene).without_approximations(&device.scene);
     if let Err(error) = ReferenceKind::Thin.check(&device.scene, device.time_s) {
-        let slopes = device.slopes.clone();
-        let frame = FrameReference { slopes, ..FrameReference::unlit(exact, device.time_s)? };
+        let mut frame = FrameReference::unlit(exact, device.time_s)?;
+        frame.slopes.clone_from(&device.slopes);
+        if exact.has_light_of_cells() {
+            frame.cells = FrameReference::new(exact, device.time_s)?.cells;
+        }
         let found = Drawing::new(device, exact, &frame, &pixels).compare(None);
         let reason = found.reason.or(Some(format!("the light is not checked: {error}")));
         let seconds = begin.elapsed().as_secs_f64();
         return Ok(Check { reason, seconds, ..found });
     }
     let cached = plan.folder.map(|folder| cache::path(folder, exact, device.time_s, &pixels));
+    // The light of cells is not kept: computing it takes seconds.
+    let cached = cached.filter(|_| !exact.has_light_of_cells());
     let kept = cached.as_deref().and_then(|path| cache::read(path, exact.n_facets()));
     let from_cache = kept.is_some();
     let mut found = match kept {

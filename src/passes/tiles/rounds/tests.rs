@@ -29,6 +29,7 @@ fn view<'a>(camera: &'a CameraRecord, extents: &'a [Extent]) -> BlobView<'a> {
         saturated: 0.0,
         slice: 0.0,
         extents: Some(extents),
+        cells: None,
     }
 }
 

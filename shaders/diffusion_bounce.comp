@@ -1,0 +1,93 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "each.glsl"
+#include "light.glsl"
+#include "diffusion.glsl"
+#include "medium.glsl"
+#include "patches.glsl"
+
+// Gathers the light that arrives in each cell from all others (model.md §18, passes.md
+// "diffusion").
+// In: lights, by cell what it sends out beside its extinction; with SOLIDS the light of surfaces
+// and ground on the box. In, out: phi and F by cell. Out: the sources Q0 and q that their change is
+// in diffusion. Law: phi and F are the means over 24 directions w of 4 pi L and 4 pi L w, L being
+// the radiance along w. Error: some ulp.
+
+// 1: the scene has surfaces or ground.
+#ifndef SOLIDS
+#define SOLIDS 0
+#endif
+
+layout(push_constant) uniform Push {
+    Grid grid;
+    // s
+    vec3 weakened;
+    uint n_lights;
+    // albedo (1-f), and 3 albedo (g-f)
+    vec3 even;
+    float inverse_chord;
+    vec3 forward;
+    float unused;
+    // 1 - albedo g
+    vec3 kept;
+} push;
+READS(0, Light, lights)
+// Texels, which llvmpipe fetches for all invocations at once.
+TEXELS(1, sent)
+UPDATES(2, vec4, field)
+WRITES(3, vec4, change)
+#if SOLIDS
+READS(4, vec4, faces)
+#endif
+
+#include "faces.glsl"
+#include "sky.glsl"
+
+// The means of 1, of a cosine over its half and of its square over the directions with these parts,
+// in each order and with each sign, are those over the sphere.
+const float LONG_PART = 0.908248290463863, SHORT_PART = 0.295875854768068;
+const uint N_DIRECTIONS = 24u;
+
+vec4 sent_at(int k) { return uintBitsToFloat(TEXEL(sent, k)); }
+
+vec3 direction(uint i) {
+    vec3 d = vec3(SHORT_PART);
+    d[i >> 3] = LONG_PART;
+    return d * (1.0 - 2.0 * vec3(i & 1u, i >> 1 & 1u, i >> 2 & 1u));
+}
+
+float extinction_of(int c) { return sent_at(4 * c).w; }
+
+vec3 sent_along(int c, vec3 w) {
+    return sent_at(4 * c).rgb + w.x * sent_at(4 * c + 1).rgb + w.y * sent_at(4 * c + 2).rgb
+           + w.z * sent_at(4 * c + 3).rgb;
+}
+
+#include "ways.glsl"
+
+void main() {
+    Level level = Level(push.grid.n_cells, 0u);
+    FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
+        int c = int(i);
+        ivec3 at = place_of(level, i);
+        vec3 phi = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
+        for (uint k = 0; k < N_DIRECTIONS; ++k) {
+            vec3 w = direction(k), l = radiance_along(level, at, w);
+            phi += l;
+            x += l * w.x;
+            y += l * w.y;
+            z += l * w.z;
+        }
+        vec3 new[4] = vec3[](phi, x, y, z);
+        float sigma = sent_at(4 * c).w;
+        vec3 reach = 1.0 / (3.0 * sigma * push.kept + push.inverse_chord);
+        for (int k = 0; k < 4; ++k) {
+            vec3 now = new[k] / float(N_DIRECTIONS);
+            vec3 rise = now - field[4 * c + k].rgb;
+            field[4 * c + k].rgb = now;
+            vec3 scattered = k == 0 ? push.even : reach * push.forward;
+            change[4 * c + k] = vec4(sigma * scattered * rise, 0.0);
+        }
+    }
+}

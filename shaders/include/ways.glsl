@@ -1,0 +1,36 @@
+// Straight ways through the cells, which are even inside (model.md §18). Needs faces.glsl, sky.glsl,
+// medium.glsl, push.grid and push.weakened, and of each cell its extinction and 4 pi times what
+// it sends out along w: extinction_of(c), sent_along(c, w).
+
+// Returns 4 pi times the radiance along w in the middle of a cell.
+vec3 radiance_along(Level level, ivec3 at, vec3 w) {
+    vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
+    // Length of the way through a cell along each axis, and to the next face.
+    vec3 across = edges / max(abs(w), vec3(1e-6)), face = 0.5 * across;
+    // The way leads to where light comes from.
+    ivec3 turn = mix(ivec3(1), ivec3(-1), greaterThan(w, vec3(0.0)));
+    ivec3 stride = turn * strides_of(level);
+    ivec3 left = mix(at, ivec3(level.n_cells) - 1 - at, greaterThan(turn, ivec3(0)));
+    int c = index_of(level, at);
+    vec3 sum = vec3(0.0), passed = vec3(1.0);
+    float done = 0.0;
+    uint axis = 0u;
+    for (bool is_inside = true; is_inside;) {
+        axis = face.x <= face.y && face.x <= face.z ? 0u : face.y <= face.z ? 1u : 2u;
+        float to = face[axis];
+        vec3 kept = through(push.weakened * (extinction_of(c) * (to - done)));
+        sum += passed * (1.0 - kept) * sent_along(c, w);
+        passed *= kept;
+        done = to;
+        face[axis] += across[axis];
+        is_inside = left[axis] > 0;
+        left[axis] -= 1;
+        if (is_inside) {
+            at[axis] += turn[axis];
+            c += stride[axis];
+        }
+    }
+    vec3 outside = of_sky(w.y < 0.0 ? 1.0 : 0.0);
+    outside += of_solids(at, axis, turn[axis] > 0 ? 1u : 0u);
+    return sum + 4.0 * passed * outside;
+}

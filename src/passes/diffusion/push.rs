@@ -1,0 +1,111 @@
+//! Push constants of the kernels that solve for φ.
+
+use crate::layout::diffusion::LevelRecord;
+use crate::layout::frame::GridRecord;
+use crate::layout::record;
+
+record! {
+    /// Push constants of `diffusion_sources.comp`.
+    pub struct SourcesPush {
+        /// The density grid.
+        grid: GridRecord,
+        /// ϖ.
+        albedo: [f32; 3],
+        /// c, 1/length.
+        inverse_chord: f32,
+        /// g.
+        g: f32,
+        /// f.
+        straight: f32,
+        /// Number of lights.
+        n_lights: u32,
+        /// Number of surfaces that may hide a light.
+        n_surfaces: u32,
+        /// Length of a step of the march.
+        step_length: f32,
+        /// The most steps of a march.
+        max_steps: u32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_system.comp`.
+    pub struct SystemPush {
+        /// The density grid.
+        grid: GridRecord,
+        /// 1 − ϖ.
+        absorbed: [f32; 3],
+        /// c, 1/length.
+        inverse_chord: f32,
+        /// 1 − ϖg.
+        kept: [f32; 3],
+        /// Number of lights.
+        n_lights: u32,
+        /// Cells of all levels.
+        n_all: u32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_coarsen.comp` and `diffusion_restrict.comp`.
+    pub struct PairPush {
+        /// The finer level.
+        fine: LevelRecord,
+        /// The coarser level.
+        coarse: LevelRecord,
+        /// 1 along the axes that are halved.
+        halved: [u32; 3],
+        /// Cells of all levels.
+        n_all: u32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_sweep.comp`.
+    pub struct SweepPush {
+        /// The level.
+        level: LevelRecord,
+        /// The coarser level, where its φ is added.
+        coarse: LevelRecord,
+        /// 1 along the axes that are halved.
+        halved: [u32; 3],
+        /// Cells of all levels.
+        n_all: u32,
+        /// 1: the long step of a pair of sweeps, else the short one.
+        is_long: u32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_coarsest.comp`.
+    pub struct CoarsestPush {
+        /// The level.
+        level: LevelRecord,
+        /// Cells of all levels.
+        n_all: u32,
+        /// Number of sweeps.
+        n_sweeps: u32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_flux.comp`.
+    pub struct FluxPush {
+        /// The density grid.
+        grid: GridRecord,
+        /// 1 − ϖg.
+        kept: [f32; 3],
+        /// c, 1/length.
+        inverse_chord: f32,
+        /// s.
+        weakened: [f32; 3],
+        /// Padding.
+        unused: f32,
+        /// ϖ'.
+        even: [f32; 3],
+        /// Padding.
+        unused_too: f32,
+        /// ϖ'g'.
+        forward: [f32; 3],
+    }
+}

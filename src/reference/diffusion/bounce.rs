@@ -1,0 +1,112 @@
+//! Bounces: light on straight ways between cells, and what diffusion makes of its change.
+
+use glam::DVec3;
+
+use super::moments::{Moments, flux_of};
+use super::multigrid::Multigrid;
+use super::sources::{DiffusionMedium, Sources};
+use super::system::System;
+use super::ways::Ways;
+use crate::model::grid::GridSpec;
+use crate::model::medium::MeanMedium;
+use crate::reference::parallel::parallel_map;
+
+/// Returns 24 directions: with these means of 1, of a cosine over its half, and of its square, as
+/// over the sphere.
+pub(super) fn directions() -> [DVec3; 24] {
+    // 2a + b = 3/2 and 2a² + b² = 1.
+    let root = 6f64.sqrt();
+    let (short, long) = (0.5 - root / 12.0, 0.5 + root / 6.0);
+    std::array::from_fn(|i| {
+        let mut d = DVec3::splat(short);
+        d[i / 8] = long;
+        let sign = |bit: usize| if i >> bit & 1 == 1 { -1.0 } else { 1.0 };
+        d * DVec3::new(sign(0), sign(1), sign(2))
+    })
+}
+
+/// What bounces need besides the ways.
+pub(super) struct Bounces<'a> {
+    pub of: &'a DiffusionMedium,
+    pub grid: &'a GridSpec,
+    /// Extinction by cell.
+    pub cells: &'a [f64],
+    pub n_cycles: u32,
+}
+
+impl Bounces<'_> {
+    /// Returns what suns and lamps make each cell send out, over s σ and times 4π: ϖ'U, and
+    /// 3ϖ'g'W along each axis. `sky` is the flux of the sky that is part of q.
+    pub fn arrived(&self, sources: &Sources) -> Vec<Moments> {
+        let MeanMedium { albedo, straight, .. } = self.of.mean;
+        let weakened = DVec3::ONE - albedo * straight;
+        let of = |c: usize| {
+            let extinction = weakened * self.cells[c];
+            if self.cells[c] == 0.0 {
+                return [DVec3::ZERO; 4];
+            }
+            let [x, y, z] = sources.of_suns[c];
+            [sources.scattered[c], x, y, z].map(|v| v / extinction)
+        };
+        (0..self.cells.len()).map(of).collect()
+    }
+
+    /// Returns the light after one more bounce of `light`, and what diffusion makes of the change.
+    pub fn next(&self, ways: &Ways<'_>, arrived: &[Moments], light: &[Moments]) -> Vec<Moments> {
+        let MeanMedium { albedo, g, straight: f } = self.of.mean;
+        let weakened = DVec3::ONE - albedo * f;
+        let (even, forward) = (albedo * (1.0 - f) / weakened, albedo * (g - f) / weakened);
+        let sent = |c: usize, toward: DVec3| {
+            let along = |m: &Moments| -(m[1] * toward.x + m[2] * toward.y + m[3] * toward.z);
+            let (own, sun) = (&light[c], &arrived[c]);
+            even * own[0] + 3.0 * forward * along(own) + sun[0] + along(sun)
+        };
+        let all = directions();
+        let found: Vec<Moments> = parallel_map(light.len(), |c| {
+            let mut sum = [DVec3::ZERO; 4];
+            for d in all {
+                let l = ways.radiance(c, d, |k| sent(k, d)) / all.len() as f64;
+                let add = [l, -l * d.x, -l * d.y, -l * d.z];
+                sum.iter_mut().zip(add).for_each(|(sum, l)| *sum += l);
+            }
+            sum
+        });
+        let change = |c: usize, k: usize| found[c][k] - light[c][k];
+        let of_axis = |c: usize| {
+            let times = 3.0 * self.of.reach(self.cells[c]) * albedo * (g - f) * self.cells[c];
+            [1, 2, 3].map(|k| times * change(c, k))
+        };
+        let cells = 0..self.cells.len();
+        let sources = Sources {
+            scattered: cells
+                .clone()
+                .map(|c| albedo * (1.0 - f) * self.cells[c] * change(c, 0))
+                .collect(),
+            carried: cells.map(of_axis).collect(),
+            of_suns: vec![],
+            direct: vec![],
+        };
+        let system = System::new(self.of, self.grid, self.cells, &sources, &[], None);
+        let phi = Multigrid::new(system, self.grid.edges()).solve(self.n_cycles);
+        let more = flux_of(self.of, self.grid, self.cells, &sources, &phi);
+        let all = found.iter().zip(more);
+        all.map(|(a, b)| std::array::from_fn(|k| a[k] + b[k])).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_have_the_means_of_the_sphere() {
+        let all = directions();
+        let mean = |of: &dyn Fn(DVec3) -> f64| all.iter().map(|d| of(*d)).sum::<f64>() / 24.0;
+        for axis in DVec3::AXES {
+            assert!(mean(&|d| d.dot(axis)).abs() < 1e-15);
+            assert!((mean(&|d| d.dot(axis).max(0.0)) - 0.25).abs() < 1e-15);
+            assert!((mean(&|d| d.dot(axis).powi(2)) - 1.0 / 3.0).abs() < 1e-15);
+        }
+        assert!(all.iter().all(|d| (d.length() - 1.0).abs() < 1e-15));
+    }
+}

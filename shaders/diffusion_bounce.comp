@@ -82,12 +82,16 @@ void main() {
         vec3 new[4] = vec3[](phi, x, y, z);
         float sigma = sent_at(4 * c).w;
         vec3 reach = 1.0 / (3.0 * sigma * push.kept + push.inverse_chord);
+        // Where cells are opaque, diffusion is right and the change is rounding.
+        vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
+        vec3 depth = sigma * push.weakened * min(edges.x, min(edges.y, edges.z));
+        vec3 counts = sigma / max(vec3(1.0), depth * depth);
         for (int k = 0; k < 4; ++k) {
             vec3 now = new[k] / float(N_DIRECTIONS);
             vec3 rise = now - field[4 * c + k].rgb;
             field[4 * c + k].rgb = now;
             vec3 scattered = k == 0 ? push.even : reach * push.forward;
-            change[4 * c + k] = vec4(sigma * scattered * rise, 0.0);
+            change[4 * c + k] = vec4(counts * scattered * rise, 0.0);
         }
     }
 }

@@ -6,8 +6,7 @@
 
 // Writes fluence and flux of the diffuse light (model.md §18, passes.md "diffusion").
 // In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi; what
-// stands beside Q0 stays. With BOUNCES also what bounces begin with: what suns and lamps and all
-// light make a cell send out.
+// stands beside Q0 stays. With BOUNCES also what each cell sends out, beside its extinction.
 
 // 1: bounces follow.
 #ifndef BOUNCES
@@ -19,12 +18,9 @@ layout(push_constant) uniform Push {
     // 1 - albedo g
     vec3 kept;
     float inverse_chord;
-    // s
-    vec3 weakened;
-    float unused;
     // albedo (1-f)/s, and albedo (g-f)/s
     vec3 even;
-    float unused_too;
+    float unused;
     vec3 forward;
 } push;
 FLOATS(0, density)
@@ -32,8 +28,10 @@ FLOATS(0, density)
 TEXELS(1, phi)
 UPDATES(2, vec4, field)
 #if BOUNCES
-WRITES(3, vec4, arrived)
+TEXELS(3, arrived)
 WRITES(4, vec4, sent)
+
+vec3 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k).rgb); }
 #endif
 
 #include "flux.glsl"
@@ -47,12 +45,7 @@ void main() {
         float sigma = FLOAT(density, c);
         vec3 reach = 1.0 / (3.0 * sigma * push.kept + push.inverse_chord);
 #if BOUNCES
-        vec3 inverse = sigma > 0.0 ? 1.0 / (sigma * push.weakened) : vec3(0.0);
-        vec3 of_suns = field[4 * c].rgb * inverse;
-        arrived[4 * c] = vec4(of_suns, sigma);
-        sent[4 * c] = vec4(of_suns + push.even * phi_at(c), sigma);
-        // Beside q stands the flux of the sky that is in it.
-        vec3 fallen = vec3(field[4 * c + 1].w, field[4 * c + 2].w, field[4 * c + 3].w);
+        sent[4 * c] = vec4(arrived_at(4 * c) + push.even * phi_at(c), sigma);
 #endif
         field[4 * c].rgb = phi_at(c);
         for (int axis = 0; axis < 3; ++axis) {
@@ -60,10 +53,8 @@ void main() {
             vec3 flux = carried - reach * slope_along(level, at, c, axis, edges[axis]);
             field[4 * c + 1 + axis].rgb = flux;
 #if BOUNCES
-            vec3 of_sky = axis == 1 ? push.inverse_chord * fallen : vec3(0.0);
-            vec3 along = (carried / reach + of_sky) * inverse;
-            arrived[4 * c + 1 + axis] = vec4(along, 0.0);
-            sent[4 * c + 1 + axis] = vec4(along + 3.0 * push.forward * flux, 0.0);
+            int k = 4 * c + 1 + axis;
+            sent[k] = vec4(arrived_at(k) + 3.0 * push.forward * flux, 0.0);
 #endif
         }
     }

@@ -20,6 +20,11 @@
 #define SLOPES 0
 #endif
 
+// 1: bounces follow, which begin with what suns and lamps make every cell send out.
+#ifndef BOUNCES
+#define BOUNCES 0
+#endif
+
 // 1: the scene has surfaces or ground, which the sky reaches through the grid.
 #ifndef SOLIDS
 #define SOLIDS 0
@@ -42,6 +47,9 @@ TEXELS(1, regions)
 FLOATS(2, density)
 // By cell: Q0, q along x, y and z.
 WRITES(3, vec4, field)
+#if BOUNCES
+WRITES(4, vec4, arrived)
+#endif
 
 #include "sum.glsl"
 #include "density.glsl"
@@ -74,7 +82,7 @@ void main() {
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
             bool is_sky = light.kind == LIGHT_SKY;
-            bool is_wanted = is_sky ? SOLIDS != 0 : SLOPES != 0 || sigma > 0.0;
+            bool is_wanted = is_sky ? SOLIDS != 0 : SLOPES + BOUNCES != 0 || sigma > 0.0;
             bool is_on = is_wanted && any(notEqual(light.energy, vec3(0.0)));
             if (is_on && is_clear(p, light, 0xFFFFFFFFu, push.n_surfaces)) {
                 Arrival a = arrival_at(light, p);
@@ -96,8 +104,17 @@ void main() {
         vec3 carried = 3.0 * reach * push.albedo * (push.g - push.straight) * sigma;
         vec3 scattered = push.albedo * (1.0 - push.straight) * sigma * fluence;
         field[4 * c] = vec4(scattered, dot(direct, vec3(1.0 / 3.0)));
-        field[4 * c + 1] = vec4(carried * x, fallen.r);
-        field[4 * c + 2] = vec4(carried * y - reach * push.inverse_chord * fallen, fallen.g);
-        field[4 * c + 3] = vec4(carried * z, fallen.b);
+        field[4 * c + 1] = vec4(carried * x, 0.0);
+        field[4 * c + 2] = vec4(carried * y - reach * push.inverse_chord * fallen, 0.0);
+        field[4 * c + 3] = vec4(carried * z, 0.0);
+#if BOUNCES
+        // Also where nothing scatters yet: the cells about have a mixture.
+        vec3 share = push.albedo / max(weakened, vec3(1e-30));
+        vec3 along = 3.0 * (push.g - push.straight) * share;
+        arrived[4 * c] = vec4((1.0 - push.straight) * share * fluence, sigma);
+        arrived[4 * c + 1] = vec4(along * x, 0.0);
+        arrived[4 * c + 2] = vec4(along * y, 0.0);
+        arrived[4 * c + 3] = vec4(along * z, 0.0);
+#endif
     }
 }

@@ -5,6 +5,7 @@
 #include "light.glsl"
 #include "medium.glsl"
 #include "field.glsl"
+#include "functions.glsl"
 
 // Computes the radiance that clouds scatter toward the eye as a medium, and the first reflection of
 // surfaces and ground (model.md §18, passes.md "scatter").
@@ -189,8 +190,9 @@ vec3 seen_of(Facet facet, vec3 toward, out float mean, out vec3 relative) {
             float z = APART * (0.5 * float(N_PLACES - 1) - float(i));
             vec4 here = seen_at(facet.position + facet.sigma * (z * toward + aside));
             float depth = here.w * apart, on = through(vec3(depth)).x;
-            // The mean of e^-t over the step; below, it is 1 to a rounding.
-            float w = exp(-0.5 * z * z) * passed * (depth > 1e-6 ? (1.0 - on) / depth : 1.0);
+            // The mean of e^-t over the step.
+            float mean_passed = depth > 0.0 ? one_minus_exp(depth) / depth : 1.0;
+            float w = exp(-0.5 * z * z) * passed * mean_passed;
             passed *= on;
             weight += w;
             first += w * z;

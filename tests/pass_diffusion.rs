@@ -28,7 +28,7 @@ fn every_facet_has_the_light_of_the_twin() {
 fn wrong_shaders_are_found() {
     let wrong = [
         ("coloured", "diffusion", "diffusion_sources.comp", "z -= e", "z += e"),
-        ("boxes", "diffusion", "diffusion_sources.comp", "SLOPES != 0 || sigma", "sigma"),
+        ("boxes", "diffusion", "diffusion_sources.comp", "SLOPES + BOUNCES != 0 || sigma", "sigma"),
         ("coloured", "diffusion", "diffusion_sources.comp", "1.0 / 3.0", "0.0, 1.0, 0.0"),
         ("boxes", "diffusion", "scatter.comp", "0.5 * edges[axis]", "0.55 * edges[axis]"),
         ("coloured", "diffusion", "scatter.comp", "? 2.0 * first", "? first"),
@@ -48,7 +48,7 @@ fn wrong_shaders_are_found() {
         ("floors", "diffusion", "diffusion_faces.comp", "offset.y > 0.0", "offset.y < 0.0"),
         ("floors", "diffusion", "diffusion_faces.comp", "place.xyz - at", "place.xyz - to.center"),
         ("floors", "diffusion", "diffusion_faces.comp", "n = 32u", "n = 16u"),
-        ("floors", "diffusion", "diffusion_system.comp", "(axis + 2u) % 3u", "(axis + 1u) % 3u"),
+        ("floors", "diffusion", "include/faces.glsl", "(axis + 2u) % 3u", "(axis + 1u) % 3u"),
         (
             "floors",
             "diffusion",
@@ -65,10 +65,10 @@ fn wrong_shaders_are_found() {
         ),
         ("floors", "diffusion", "diffusion_patches.comp", "c.share *", "0.125 *"),
         ("coloured", "diffusion", "diffusion_sources.comp", "sinh(h)", "h"),
-        ("coloured", "bounces", "diffusion_sources.comp", "fallen.b", "0.0"),
+        ("coloured", "bounces", "diffusion_sources.comp", "along * z", "along * x"),
         ("coloured", "bounces", "diffusion_flux.comp", "push.even * phi_at(c)", "phi_at(c)"),
         ("coloured", "bounces", "diffusion_flux.comp", "3.0 * push.forward * flux", "flux"),
-        ("floors", "bounces", "diffusion_flux.comp", "axis == 1 ? push", "axis == 2 ? push"),
+        ("flat", "bounces", "diffusion_sources.comp", "SLOPES + BOUNCES != 0 || sigma", "sigma"),
         ("coloured", "bounces", "diffusion_bounce.comp", "0.908248290463863", "0.9"),
         ("coloured", "bounces", "diffusion_bounce.comp", "y += l * w.y", "y -= l * w.y"),
         ("flat", "bounces", "diffusion_bounce.comp", "reach * push.forward;", "push.forward;"),
@@ -130,7 +130,7 @@ fn wrong_shaders_are_found() {
         ("boxes", "diffusion", "include/equations.glsl", "if (at[axis] > 0)", "if (at[axis] > 1)"),
         ("boxes", "diffusion", "diffusion_sweep.comp", "(at) >> halved()", "(at)"),
         ("boxes", "diffusion", "include/diffusion.glsl", "SHORT_STEP = 0.6", "SHORT_STEP = 0.5"),
-        ("boxes", "diffusion", "diffusion_flux.comp", "-= reach * slope", "+= reach * slope"),
+        ("boxes", "diffusion", "diffusion_flux.comp", "carried - reach *", "carried + reach *"),
         ("boxes", "diffusion", "scatter.comp", "w.y * field_at(c + 2)", "w.y * field_at(c + 3)"),
     ];
     media::check_found(&Gpu::new(), &wrong);

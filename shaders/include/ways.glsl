@@ -1,6 +1,6 @@
-// Straight ways through the cells, which are even inside (model.md §18). Needs faces.glsl, sky.glsl,
-// medium.glsl, push.grid and push.weakened, and of each cell its extinction and 4 pi times what
-// it sends out along w: extinction_of(c), sent_along(c, w).
+// Straight ways through the cells, which are even inside (model.md §18). Needs faces.glsl,
+// sky.glsl, medium.glsl, push.grid and push.weakened. Of each cell it needs extinction_of(c), and
+// sent_along(c, w): 4 pi times what it sends out along w.
 
 // Returns 4 pi times the radiance along w in the middle of a cell.
 vec3 radiance_along(Level level, ivec3 at, vec3 w) {

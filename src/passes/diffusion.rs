@@ -224,7 +224,14 @@ impl Diffusion {
             step_length: (work.step_cells * f64::from(grid.cell)) as f32,
             max_steps: work.max_steps,
         };
-        rec.dispatch(&self.sources, &[lights, regions, density, field], &push, n_cells)?;
+        let sources = [lights, regions, density, field];
+        match &self.bounces {
+            None => rec.dispatch(&self.sources, &sources, &push, n_cells)?,
+            Some(Bounces { scratch, .. }) => {
+                let sources = [&sources[..], &[&scratch.arrived]].concat();
+                rec.dispatch(&self.sources, &sources, &push, n_cells)?;
+            }
+        }
         let system_push = SystemPush {
             grid: *grid,
             absorbed: of.absorbed,
@@ -247,7 +254,6 @@ impl Diffusion {
             grid: *grid,
             kept: of.kept,
             inverse_chord: of.inverse_chord,
-            weakened: of.weakened,
             even: of.even,
             forward: of.forward,
             ..FluxPush::default()
@@ -256,7 +262,7 @@ impl Diffusion {
         match &self.bounces {
             None => rec.dispatch(&self.flux, &flux, &push, n_cells)?,
             Some(bounces) => {
-                let flux = [flux.as_slice(), &bounces.begin()].concat();
+                let flux = [&flux[..], &[&bounces.scratch.arrived, &bounces.scratch.sent]].concat();
                 rec.dispatch(&self.flux, &flux, &push, n_cells)?;
                 for _ in 0..work.n_bounces {
                     bounces.record_gather(rec, [lights, field, faces], grid, of, work.n_lights)?;

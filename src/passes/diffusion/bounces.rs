@@ -116,11 +116,6 @@ impl Bounces {
         })
     }
 
-    /// Returns the buffers that the first bounce reads.
-    pub fn begin(&self) -> [&Buffer; 2] {
-        [&self.scratch.arrived, &self.scratch.sent]
-    }
-
     /// Computes φ and F of `field` anew, and their change.
     pub fn record_gather(
         &self,

@@ -97,14 +97,10 @@ record! {
         kept: [f32; 3],
         /// c, 1/length.
         inverse_chord: f32,
-        /// s.
-        weakened: [f32; 3],
-        /// Padding.
-        unused: f32,
         /// ϖ'.
         even: [f32; 3],
         /// Padding.
-        unused_too: f32,
+        unused: f32,
         /// ϖ'g'.
         forward: [f32; 3],
     }

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use super::moments::{Moments, flux_of};
+use super::moments::flux_of;
 use super::multigrid::Multigrid;
-use super::sources::{DiffusionMedium, Sources};
+use super::sources::{DiffusionMedium, Moments, Sources};
 use super::system::System;
 use super::ways::Ways;
 use crate::model::grid::GridSpec;
@@ -36,19 +36,15 @@ pub(super) struct Bounces<'a> {
 
 impl Bounces<'_> {
     /// Returns what suns and lamps make each cell send out, over s σ and times 4π: ϖ'U, and
-    /// 3ϖ'g'W along each axis. `sky` is the flux of the sky that is part of q.
+    /// 3ϖ'g'W along each axis.
     pub fn arrived(&self, sources: &Sources) -> Vec<Moments> {
-        let MeanMedium { albedo, straight, .. } = self.of.mean;
-        let weakened = DVec3::ONE - albedo * straight;
-        let of = |c: usize| {
-            let extinction = weakened * self.cells[c];
-            if self.cells[c] == 0.0 {
-                return [DVec3::ZERO; 4];
-            }
-            let [x, y, z] = sources.of_suns[c];
-            [sources.scattered[c], x, y, z].map(|v| v / extinction)
+        let MeanMedium { albedo, g, straight: f } = self.of.mean;
+        let share = albedo / (DVec3::ONE - albedo * f).max(DVec3::splat(f64::MIN_POSITIVE));
+        let of = |[u, x, y, z]: &Moments| {
+            let [x, y, z] = [x, y, z].map(|w| 3.0 * (g - f) * share * *w);
+            [(1.0 - f) * share * *u, x, y, z]
         };
-        (0..self.cells.len()).map(of).collect()
+        sources.of_suns.iter().map(of).collect()
     }
 
     /// Returns the light after one more bounce of `light`, and what diffusion makes of the change.
@@ -72,15 +68,21 @@ impl Bounces<'_> {
             sum
         });
         let change = |c: usize, k: usize| found[c][k] - light[c][k];
+        // Where cells are opaque, diffusion is right and the change is rounding.
+        let edge = self.grid.edges().min_element();
+        let counts = |c: usize| {
+            let depth = self.cells[c] * weakened * edge;
+            self.cells[c] / (depth * depth).max(DVec3::ONE)
+        };
         let of_axis = |c: usize| {
-            let times = 3.0 * self.of.reach(self.cells[c]) * albedo * (g - f) * self.cells[c];
+            let times = 3.0 * self.of.reach(self.cells[c]) * albedo * (g - f) * counts(c);
             [1, 2, 3].map(|k| times * change(c, k))
         };
         let cells = 0..self.cells.len();
         let sources = Sources {
             scattered: cells
                 .clone()
-                .map(|c| albedo * (1.0 - f) * self.cells[c] * change(c, 0))
+                .map(|c| albedo * (1.0 - f) * counts(c) * change(c, 0))
                 .collect(),
             carried: cells.map(of_axis).collect(),
             of_suns: vec![],

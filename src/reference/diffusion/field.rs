@@ -6,10 +6,10 @@ use glam::DVec3;
 
 use super::bounce::Bounces;
 use super::faces::FaceLight;
-use super::moments::{Moments, corners, flux_of};
+use super::moments::{corners, flux_of};
 use super::multigrid::Multigrid;
 use super::seen::SeenCells;
-use super::sources::{DiffusionMedium, Sources};
+use super::sources::{DiffusionMedium, Moments, Sources};
 use super::system::System;
 use super::ways::Ways;
 use crate::model::grid::GridSpec;

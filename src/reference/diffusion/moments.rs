@@ -2,12 +2,9 @@
 
 use glam::DVec3;
 
-use super::sources::{DiffusionMedium, Sources};
+use super::sources::{DiffusionMedium, Moments, Sources};
 use super::system::{before, next};
 use crate::model::grid::GridSpec;
-
-/// φ and F along each axis.
-pub(super) type Moments = [DVec3; 4];
 
 /// Returns φ with the flux F = q − D∇φ; at the faces of the box by one-sided differences.
 pub(super) fn flux_of(

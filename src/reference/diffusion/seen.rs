@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::moments::{Moments, corners};
-use super::sources::DiffusionMedium;
+use super::moments::corners;
+use super::sources::{DiffusionMedium, Moments};
 use super::ways::Ways;
 use crate::model::grid::GridSpec;
 use crate::model::light::UP;

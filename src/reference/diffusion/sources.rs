@@ -9,6 +9,9 @@ use crate::reference::parallel::parallel_map;
 use crate::reference::scatter::BARRED;
 use crate::reference::transmit::{Obstacles, Receiver};
 
+/// Fluence or φ, and the flux along each axis.
+pub(super) type Moments = [DVec3; 4];
+
 /// Numbers that diffusion depends on, besides densities and lights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DiffusionMedium {
@@ -40,8 +43,8 @@ pub struct Sources {
     /// q = D(3Q1 + cF₀): D times three times the momentum that it keeps, with the sky's where a
     /// scene has surfaces or ground; a row an axis, W m⁻².
     pub carried: Vec<[DVec3; 3]>,
-    /// 3Q1: three times the momentum of suns and lamps alone, a row an axis, W m⁻³.
-    pub of_suns: Vec<[DVec3; 3]>,
+    /// Fluence of suns and lamps, and their flux along each axis, means over the cell, W m⁻².
+    pub of_suns: Vec<Moments>,
     /// U: fluence of suns and lamps, mean over the channels, W m⁻².
     pub direct: Vec<f64>,
 }
@@ -82,9 +85,10 @@ impl Sources {
                 }
             }
             let extinction = obstacles.cells[c];
-            let of_suns =
-                [0, 1, 2].map(|axis| 3.0 * albedo * (g - f) * extinction * flux.col(axis));
-            let mut carried = of_suns.map(|q| of.reach(extinction) * q);
+            let of_suns = [fluence, flux.x_axis, flux.y_axis, flux.z_axis];
+            let mut carried = [0, 1, 2].map(|axis| {
+                3.0 * of.reach(extinction) * albedo * (g - f) * extinction * flux.col(axis)
+            });
             carried[1] -= of.reach(extinction) * of.inverse_chord * fallen;
             (albedo * (1.0 - f) * extinction * fluence, (carried, of_suns, direct))
         });

@@ -242,7 +242,7 @@ pub const FAULTS: &[Fault] = &[
         "light that goes straight on is not seen",
         "diffusion_seen.comp",
         "(1.0 - push.weakened) * behind",
-        "vec3(0.0)",
+        "0.5 * (1.0 - push.weakened) * behind",
         "scattering/furnace",
     ),
     (

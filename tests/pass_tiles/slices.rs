@@ -136,8 +136,8 @@ fn wrong_slices_are_noticed() {
         ("include/tile_slices.glsl", "here[j] / max(t[j], 1e-30)", "here[j]", 0),
         (
             "include/tile_slices.glsl",
-            "m < OPEN; ++m) { close_slice(true)",
-            "m < 3; ++m) { close_slice(true)",
+            "m < OPEN; ++m) { close_slice(true,",
+            "m < 3; ++m) { close_slice(true,",
             0,
         ),
         ("include/tile_slices.glsl", "(wall[j] - distance) * in_sigmas", "10.0", 1),

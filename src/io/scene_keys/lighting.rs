@@ -68,8 +68,8 @@ keys! { DIFFUSION: fn diffusion(s) -> DiffusionSettings { DiffusionSettings;
     /// Cycles of the multigrid solver of mode "diffusion". Each leaves about an eighth of the error
     /// of the one before.
     cycles ["diffusion_cycles"]: integer(2, 1, MAX_CYCLES);
-    /// Times that light is gathered anew in mode "diffusion" on straight ways between the cells,
-    /// after diffusion.
+    /// Number of bounces of mode "diffusion": times that cells gather light from all others, after
+    /// diffusion.
     bounces: integer(0, 0, MAX_BOUNCES);
     /// Whether the light of mode "diffusion" changes inside of each blob, as it does in the clouds
     /// around it.

@@ -44,8 +44,8 @@ READS(4, vec4, faces)
 #include "faces.glsl"
 #include "sky.glsl"
 
-// The means of 1, of a cosine over its half and of its square over the directions with these parts,
-// in each order and with each sign, are those over the sphere.
+// Parts of a direction, in each order and with each sign. The means of 1, of a cosine over its half
+// and of its square over these directions are those over the sphere.
 const float LONG_PART = 0.908248290463863, SHORT_PART = 0.295875854768068;
 const uint N_DIRECTIONS = 24u;
 

@@ -6,11 +6,18 @@
 
 // Writes fluence and flux of the diffuse light (model.md §18, passes.md "diffusion").
 // In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi; what
-// stands beside Q0 stays. With BOUNCES also what each cell sends out, beside its extinction.
+// stands beside Q0 stays. The slope is that between the cells on both sides. At the faces of the
+// box it is one-sided. With BOUNCES also what each cell sends out, beside its extinction. With
+// CORRECTS phi and F, of the change by a bounce, are added to those of the bounce.
 
 // 1: bounces follow.
 #ifndef BOUNCES
 #define BOUNCES 0
+#endif
+
+// 1: phi is that of a change.
+#ifndef CORRECTS
+#define CORRECTS 0
 #endif
 
 layout(push_constant) uniform Push {
@@ -18,9 +25,9 @@ layout(push_constant) uniform Push {
     // 1 - albedo g
     vec3 kept;
     float inverse_chord;
-    // albedo (1-f)/s, and albedo (g-f)/s
+    // albedo', and 3 albedo' g'
     vec3 even;
-    float unused;
+    float densest;
     vec3 forward;
 } push;
 FLOATS(0, density)
@@ -30,31 +37,48 @@ UPDATES(2, vec4, field)
 #if BOUNCES
 TEXELS(3, arrived)
 WRITES(4, vec4, sent)
-
-vec3 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k).rgb); }
+#endif
+#if CORRECTS
+// Q0 and q of the change.
+TEXELS(5, change)
 #endif
 
-#include "flux.glsl"
+vec3 phi_at(int c) { return uintBitsToFloat(TEXEL(phi, c).rgb); }
+
+#if BOUNCES
+vec3 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k).rgb); }
+#endif
 
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
     FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
         int c = int(i);
-        ivec3 at = place_of(level, i);
+        ivec3 at = place_of(level, i), stride = strides_of(level);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
-        float sigma = FLOAT(density, c);
+        float sigma = min(FLOAT(density, c), push.densest);
         vec3 reach = 1.0 / (3.0 * sigma * push.kept + push.inverse_chord);
-#if BOUNCES
-        sent[4 * c] = vec4(arrived_at(4 * c) + push.even * phi_at(c), sigma);
+        vec3 fluence = phi_at(c);
+#if CORRECTS
+        fluence += field[4 * c].rgb;
 #endif
-        field[4 * c].rgb = phi_at(c);
-        for (int axis = 0; axis < 3; ++axis) {
-            vec3 carried = field[4 * c + 1 + axis].rgb;
-            vec3 flux = carried - reach * slope_along(level, at, c, axis, edges[axis]);
-            field[4 * c + 1 + axis].rgb = flux;
+        field[4 * c].rgb = fluence;
 #if BOUNCES
+        sent[4 * c] = vec4(arrived_at(4 * c) + push.even * fluence, sigma);
+#endif
+        for (int axis = 0; axis < 3; ++axis) {
+            int after = at[axis] + 1 < int(level.n_cells[axis]) ? c + stride[axis] : c;
+            int prior = at[axis] > 0 ? c - stride[axis] : c;
+            int n_steps = (after - prior) / stride[axis];
+            vec3 rise = phi_at(after) - phi_at(prior);
+            vec3 slope = n_steps > 0 ? rise / (float(n_steps) * edges[axis]) : vec3(0.0);
             int k = 4 * c + 1 + axis;
-            sent[k] = vec4(arrived_at(k) + 3.0 * push.forward * flux, 0.0);
+            vec3 flux = field[k].rgb - reach * slope;
+#if CORRECTS
+            flux += uintBitsToFloat(TEXEL(change, k).rgb);
+#endif
+            field[k].rgb = flux;
+#if BOUNCES
+            sent[k] = vec4(arrived_at(k) + push.forward * flux, 0.0);
 #endif
         }
     }

@@ -20,7 +20,7 @@ void main() {
         for (int k = 0; k < 4; ++k) {
             vec4 sum = vec4(0.0);
             for (int corner = 0; corner < 8; ++corner) {
-                Corner c = corner_of(push.grid, of, corner);
+                Corner c = corner_of(ivec3(push.grid.n_cells), of, corner);
                 sum += c.share * uintBitsToFloat(TEXEL(field, 4 * c.i_cell + k));
             }
             patches[4u * i + uint(k)] = sum;

@@ -64,7 +64,7 @@ vec3 sent_along(int c, vec3 w) {
     float directed = fluence > 0.0 ? min(size * mean_of(push.even) / fluence, 1.0) : 0.0;
     vec3 bend = w - (size > 0.0 ? flux / size : vec3(0.0));
     float away = 0.5 * dot(bend, bend);
-    float phase = henyey_greenstein(push.g, away) / (INV_FOUR_PI * (1.0 - push.straight));
+    float phase = henyey_greenstein(push.g, away) / (INV_FOUR_PI * max(1.0 - push.straight, 1e-30));
     return max(diffuse, vec3(0.0)) + of_suns * mix(1.0, phase, directed);
 }
 

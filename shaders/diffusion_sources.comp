@@ -4,6 +4,7 @@
 #include "records.glsl"
 #include "each.glsl"
 #include "light.glsl"
+#include "functions.glsl"
 #include "occlude.glsl"
 #include "diffusion.glsl"
 
@@ -40,6 +41,7 @@ layout(push_constant) uniform Push {
     uint n_surfaces;
     float step_length;
     uint max_steps;
+    float densest;
 } push;
 READS(0, Light, lights)
 TEXELS(1, regions)
@@ -64,10 +66,30 @@ float chord_of(vec3 toward) {
     return min(across.x, min(across.y, across.z));
 }
 
-// Returns the mean of light over its way through a cell of this depth, over that in the middle.
-vec3 mean_over(vec3 depth) {
-    vec3 h = 0.5 * min(depth, vec3(40.0));
-    return mix(sinh(h) / max(h, vec3(1e-3)), vec3(1.0), lessThan(h, vec3(1e-3)));
+// Light of a beam in a cell.
+struct InCell {
+    vec3 mean;
+    // Light at the middle that does what scattered light does where it is, over that light.
+    vec3 share;
+};
+
+// Returns light in a cell behind the optical depth `front`, with `own` from face to face, of which
+// `counted` counts for diffusion. The factors are those of the depth that weakens the beam, and of
+// the depth that diffusion counts.
+InCell in_cell(float front, float own, float counted, vec3 weakened, vec3 kept) {
+    vec3 depth = own * weakened;
+    InCell of = InCell(vec3(1.0), vec3(1.0));
+    for (int k = 0; k < 3; ++k) {
+        float t = depth[k];
+        float absorbed = one_minus_exp(t);
+        // The mean place of what is scattered, as a share of the way. The series errs by t^3/720.
+        float place = t < 0.0625 ? 0.5 - t * (1.0 / 12.0) : 1.0 / t - (1.0 - absorbed) / absorbed;
+        of.mean[k] = t > 0.0 ? absorbed / (counted * weakened[k]) : 1.0;
+        of.share[k] = (2.0 + 3.0 * kept[k] * (front + min(place * own, 0.5 * counted)))
+                      / (2.0 + 3.0 * kept[k] * (front + 0.5 * counted));
+    }
+    of.mean *= through(front * weakened);
+    return of;
 }
 
 void main() {
@@ -75,9 +97,11 @@ void main() {
     FOR_EACH(c, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
         vec3 at = vec3(place_of(level, c)) + 0.5;
         vec3 p = push.grid.low + push.grid.cell * vec3(1.0, push.grid.aspect, 1.0) * at;
-        float sigma = cell_at(int(c));
+        float whole = cell_at(int(c)), sigma = min(whole, push.densest);
         vec3 weakened = 1.0 - push.albedo * push.straight;
-        vec3 fluence = vec3(0.0), fallen = vec3(0.0), direct = vec3(0.0);
+        vec3 kept = 1.0 - push.albedo * push.g;
+        vec3 fluence = vec3(0.0), from_middle = vec3(0.0);
+        vec3 fallen = vec3(0.0), direct = vec3(0.0);
         vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
@@ -88,21 +112,25 @@ void main() {
                 Arrival a = arrival_at(light, p);
                 float tau = depth_along(p, a.toward, a.distance, true);
                 if (is_sky) {
-                    fallen += light.energy * through(tau * (1.0 - push.albedo * push.g));
+                    fallen += light.energy * through(tau * kept);
                 } else {
-                    vec3 e = light.energy * a.falloff * through(tau * weakened);
-                    direct += e;
-                    e *= mean_over(sigma * weakened * chord_of(a.toward));
+                    vec3 e = light.energy * a.falloff;
+                    direct += e * through(tau * weakened);
+                    // Where the march finds less than half of the cell, light is whole at the face.
+                    float chord = chord_of(a.toward), front = max(tau - 0.5 * whole * chord, 0.0);
+                    InCell of = in_cell(front, whole * chord, sigma * chord, weakened, kept);
+                    e *= of.mean;
                     fluence += e;
+                    from_middle += of.share * e;
                     x -= e * a.toward.x;
                     y -= e * a.toward.y;
                     z -= e * a.toward.z;
                 }
             }
         }
-        vec3 reach = 1.0 / (3.0 * sigma * (1.0 - push.albedo * push.g) + push.inverse_chord);
+        vec3 reach = 1.0 / (3.0 * sigma * kept + push.inverse_chord);
         vec3 carried = 3.0 * reach * push.albedo * (push.g - push.straight) * sigma;
-        vec3 scattered = push.albedo * (1.0 - push.straight) * sigma * fluence;
+        vec3 scattered = push.albedo * (1.0 - push.straight) * sigma * from_middle;
         field[4 * c] = vec4(scattered, dot(direct, vec3(1.0 / 3.0)));
         field[4 * c + 1] = vec4(carried * x, 0.0);
         field[4 * c + 2] = vec4(carried * y - reach * push.inverse_chord * fallen, 0.0);

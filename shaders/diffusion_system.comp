@@ -25,6 +25,7 @@ layout(push_constant) uniform Push {
     vec3 kept;
     uint n_lights;
     uint n_all;
+    float densest;
 } push;
 READS(0, Light, lights)
 FLOATS(1, density)
@@ -41,9 +42,9 @@ READS(6, vec4, faces)
 
 vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
 
-vec3 reach_of(int c) {
-    return 1.0 / (3.0 * FLOAT(density, c) * push.kept + push.inverse_chord);
-}
+float extinction_of(int c) { return min(FLOAT(density, c), push.densest); }
+
+vec3 reach_of(int c) { return 1.0 / (3.0 * extinction_of(c) * push.kept + push.inverse_chord); }
 
 #include "faces.glsl"
 #include "sky.glsl"
@@ -55,7 +56,7 @@ void main() {
         ivec3 at = place_of(level, i), stride = strides_of(level);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 own = reach_of(c);
-        vec3 sink = FLOAT(density, c) * push.absorbed, right = field_at(4 * c);
+        vec3 sink = extinction_of(c) * push.absorbed, right = field_at(4 * c);
         vec3 prior_w = vec3(0.0);
         // w along each axis, by channel.
         vec3 next[3];

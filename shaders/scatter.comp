@@ -24,7 +24,7 @@
 #define SLOPES 0
 #endif
 
-// 1: and what the cells scatter toward the eye is known.
+// 1: and clouds have the light that the cells scatter toward the eye.
 #ifndef SEEN
 #define SEEN 0
 #endif
@@ -126,7 +126,7 @@ vec4 diffuse_along(vec3 p, vec3 w, float g) {
     Weights of = weights_at(push.grid, p);
     vec4 sum = vec4(0.0);
     for (int corner = 0; corner < 8; ++corner) {
-        Corner to = corner_of(push.grid, of, corner);
+        Corner to = corner_of(ivec3(push.grid.n_cells), of, corner);
         int c = 4 * to.i_cell;
         vec3 along =
             w.x * field_at(c + 1).rgb + w.y * field_at(c + 2).rgb + w.z * field_at(c + 3).rgb;
@@ -139,7 +139,6 @@ vec4 diffuse_along(vec3 p, vec3 w, float g) {
 float mean_of(vec3 v) { return dot(v, vec3(1.0 / 3.0)); }
 
 #if SLOPES
-
 // Returns the change of the light along each axis, relative to it: differences over a cell, of U
 // for the light that is scattered once.
 vec3 slope_at(vec3 p, vec3 w, float g, vec3 albedo, vec3 once, vec3 diffuse) {
@@ -164,7 +163,7 @@ vec4 seen_at(vec3 p) {
     Weights of = weights_at(push.grid, p);
     vec4 sum = vec4(0.0);
     for (int corner = 0; corner < 8; ++corner) {
-        Corner to = corner_of(push.grid, of, corner);
+        Corner to = corner_of(ivec3(push.grid.n_cells), of, corner);
         sum += to.share * uintBitsToFloat(TEXEL(seen, to.i_cell));
     }
     return sum;
@@ -260,7 +259,7 @@ vec3 of_sky_and_clouds(uint j, Facet facet) {
     Weights of = weights_at(push.grid, nearest);
     vec3 inside = vec3(0.0);
     for (int corner = 0; corner < 8; ++corner) {
-        Corner to = corner_of(push.grid, of, corner);
+        Corner to = corner_of(ivec3(push.grid.n_cells), of, corner);
         int c = 4 * to.i_cell;
         vec3 across = facet.normal.x * field_at(c + 1).rgb + facet.normal.y * field_at(c + 2).rgb
                       + facet.normal.z * field_at(c + 3).rgb;
@@ -304,10 +303,12 @@ void main() {
             } else {
                 Arrival a = arrival_at(light, facet.position);
                 vec3 e = light.energy * a.falloff;
+                fluence += e * through(tau * law.depth);
+#if !SEEN
                 // 1 - cos of the light's way and the way to the eye keeps its digits near 0.
                 vec3 bend = a.toward + outgoing;
-                fluence += e * through(tau * law.depth);
                 radiance += e * toward_eye(m, law, 0.5 * dot(bend, bend), tau);
+#endif
             }
         }
 #if SEEN
@@ -315,7 +316,7 @@ void main() {
         float mean;
         radiance = seen_of(facet, outgoing, mean, relative);
         radiance *= law.albedo * law.depth * push.inverse_scattered;
-        // Slices multiply it by the mean of the cells' light where they are.
+        // The colour. Slices multiply it by the mean of the cells' light where they are.
         lit[j].indirect = mean > 0.0 ? radiance / mean : vec3(0.0);
 #if SLOPES
         slopes[j].relative = relative;

@@ -71,6 +71,7 @@ TEXELS(11, shades)
 #if CELLS
 // Radiance toward the eye by cell.
 TEXELS(12, seen_cells)
+#include "field.glsl"
 #endif
 // 1: every splat has its own exponent at which it ends, the same for all its pixels. It is computed
 // where the splat is loaded: once, and not once for every row.

@@ -18,9 +18,22 @@ use nimbus::model::scene::Scene;
 #[test]
 fn every_facet_has_the_light_of_the_twin() {
     let gpu = Gpu::new();
-    for name in ["coloured", "droplets", "flat", "boxes", "floors"] {
+    for name in ["coloured", "droplets", "flat", "boxes", "opaque", "floors"] {
         media::check(&gpu, name, "diffusion");
         media::check(&gpu, name, "bounces");
+    }
+}
+
+#[test]
+fn bounces_have_the_same_light_without_slopes() {
+    let gpu = Gpu::new();
+    for name in ["boxes", "floors"] {
+        let scene = scene(name, "bounces", &["lighting.slopes=false"]);
+        let (found, truth) =
+            (media::on_device(&gpu, &gpu.compiler, &scene), media::by_twin(&scene));
+        assert!(found.slopes.is_empty());
+        let off = media::apart(&found.radiance, &truth.radiance);
+        assert!(off < media::bound(&scene), "{name}: {off:e}");
     }
 }
 
@@ -64,17 +77,40 @@ fn wrong_shaders_are_found() {
             "fallen += 0.0 * light",
         ),
         ("floors", "diffusion", "diffusion_patches.comp", "c.share *", "0.125 *"),
-        ("coloured", "diffusion", "diffusion_sources.comp", "sinh(h)", "h"),
+        ("coloured", "diffusion", "diffusion_sources.comp", "0.5 * whole", "0.6 * whole"),
+        ("coloured", "diffusion", "diffusion_sources.comp", "(1.0 - absorbed) /", "0.9 /"),
+        ("coloured", "diffusion", "diffusion_sources.comp", "of.share * e", "e"),
+        ("opaque", "diffusion", "diffusion_sources.comp", "min(place * own,", "(place * own +"),
+        ("opaque", "diffusion", "diffusion_sources.comp", "min(whole, push", "(whole + push"),
+        (
+            "opaque",
+            "bounces",
+            "diffusion_system.comp",
+            "min(FLOAT(density, c), push.densest)",
+            "FLOAT(density, c)",
+        ),
+        (
+            "opaque",
+            "bounces",
+            "diffusion_flux.comp",
+            "min(FLOAT(density, c), push.densest)",
+            "FLOAT(density, c)",
+        ),
         ("coloured", "bounces", "diffusion_sources.comp", "along * z", "along * x"),
-        ("coloured", "bounces", "diffusion_flux.comp", "push.even * phi_at(c)", "phi_at(c)"),
-        ("coloured", "bounces", "diffusion_flux.comp", "3.0 * push.forward * flux", "flux"),
+        ("coloured", "bounces", "diffusion_flux.comp", "push.even * fluence", "fluence"),
+        ("coloured", "bounces", "diffusion_flux.comp", "push.forward * flux", "flux"),
         ("flat", "bounces", "diffusion_sources.comp", "SLOPES + BOUNCES != 0 || sigma", "sigma"),
         ("coloured", "bounces", "diffusion_bounce.comp", "0.908248290463863", "0.9"),
         ("coloured", "bounces", "diffusion_bounce.comp", "y += l * w.y", "y -= l * w.y"),
         ("flat", "bounces", "diffusion_bounce.comp", "reach * push.forward;", "push.forward;"),
-        ("coloured", "bounces", "diffusion_correct.comp", ".rgb + phi_at(c)", ".rgb"),
-        ("coloured", "bounces", "diffusion_correct.comp", "field[k].rgb + carried", "field[k].rgb"),
-        ("coloured", "bounces", "diffusion_correct.comp", "3.0 * push.forward", "push.forward"),
+        (
+            "coloured",
+            "bounces",
+            "diffusion_flux.comp",
+            "fluence += field",
+            "fluence += 0.9 * field",
+        ),
+        ("coloured", "bounces", "diffusion_flux.comp", "flux += uint", "flux += 0.9 * uint"),
         ("coloured", "bounces", "diffusion_seen.comp", "0.5 * dot(bend", "dot(bend"),
         ("coloured", "bounces", "diffusion_seen.comp", "of_suns * mix(1.0", "of_suns * mix(0.9"),
         ("coloured", "bounces", "diffusion_seen.comp", "(1.0 - push.weakened) *", "0.9 *"),
@@ -130,7 +166,13 @@ fn wrong_shaders_are_found() {
         ("boxes", "diffusion", "include/equations.glsl", "if (at[axis] > 0)", "if (at[axis] > 1)"),
         ("boxes", "diffusion", "diffusion_sweep.comp", "(at) >> halved()", "(at)"),
         ("boxes", "diffusion", "include/diffusion.glsl", "SHORT_STEP = 0.6", "SHORT_STEP = 0.5"),
-        ("boxes", "diffusion", "diffusion_flux.comp", "carried - reach *", "carried + reach *"),
+        (
+            "boxes",
+            "diffusion",
+            "diffusion_flux.comp",
+            ".rgb - reach * slope",
+            ".rgb + reach * slope",
+        ),
         ("boxes", "diffusion", "scatter.comp", "w.y * field_at(c + 2)", "w.y * field_at(c + 3)"),
     ];
     media::check_found(&Gpu::new(), &wrong);

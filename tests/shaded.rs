@@ -156,7 +156,7 @@ fn wrong_shaders_are_found() {
         (thin, false, "sprites.frag", "vec3(delta, seen)", "vec3(delta, 0.0)"),
         ("slices", true, sliced, "- nearer * middle", ""),
         ("slices", true, sliced, "exp(-0.5 * min", "exp(-5.0 * min"),
-        ("cells", true, sliced, "mix(base, next, to)", "mix(next, base, to)"),
+        ("cells", true, "include/field.glsl", "of.base + to", "of.base + 1 - to"),
         ("cells", true, sliced, "NEAREST_MIDDLE = 1.5", "NEAREST_MIDDLE = 1.6"),
         ("cells", true, sliced, "middle += 1.0;", ""),
         ("cells", true, sliced, "middle / length_of_ray(j)", "middle"),

@@ -95,22 +95,17 @@ void find_shares(inout Loaded splat, uint t, bool is_splat) {
 // A slice's thickness along the rays through x = 0 of the row, in cells.
 vec3 along_row;
 
-// Returns the light that cells scatter toward the eye in the middle of a slice, at pixel j, mean
-// over the channels: trilinear between their centres, and beyond the outermost as on them.
+// Returns the light that cells scatter toward the eye in the middle of a slice at pixel j, as a
+// mean over the channels.
 float light_at(uint j, float middle) {
     ivec3 n = ivec3(push.n_x, push.n_y, push.n_z);
     vec3 ray = along_row + x_of[j] * push.right_in_cells;
-    vec3 at = push.eye_in_cells + middle / length_of_ray(j) * ray;
-    at = clamp(at, vec3(0.0), vec3(n - 1));
-    ivec3 base = ivec3(at), next = min(base + 1, n - 1);
-    vec3 part = at - vec3(base);
+    Weights of = weights_among(n, push.eye_in_cells + middle / length_of_ray(j) * ray);
     float sum = 0.0;
     [[unroll]] for (int corner = 0; corner < 8; ++corner) {
-        bvec3 to = bvec3(corner & 1, corner & 2, corner & 4);
-        ivec3 i = mix(base, next, to);
-        vec3 share = mix(1.0 - part, part, to);
-        vec4 here = uintBitsToFloat(TEXEL(seen_cells, i.x + n.x * (i.y + n.y * i.z)));
-        sum += share.x * share.y * share.z * dot(here.rgb, vec3(1.0 / 3.0));
+        Corner to = corner_of(n, of, corner);
+        vec4 here = uintBitsToFloat(TEXEL(seen_cells, to.i_cell));
+        sum += to.share * dot(here.rgb, vec3(1.0 / 3.0));
     }
     return sum;
 }

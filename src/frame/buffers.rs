@@ -59,12 +59,12 @@ buffers! {
         /// Fluence and flux of diffuse light by cell, and fluence of suns and lamps.
         field: Buffer => [[f32; 4]; 4], n_if(has_diffusion(scene), n_cells(scene)),
             "diffusion.field", Texels;
-        /// Radiance that cells scatter toward the eye, and extinction, with bounces.
-        seen: Buffer => [f32; 4], n_if(has_bounces(scene), n_cells(scene)), "scatter.seen", Texels;
         /// The same by patch of the grid's box, for surfaces and ground.
         patches: Buffer => [[f32; 4]; 4],
             n_if(has_diffusion(scene) && scene.has_solids(), u64::from(N_PATCHES)),
             "diffusion.patches", Texels;
+        /// Radiance that cells scatter toward the eye, and extinction, with bounces.
+        seen: Buffer => [f32; 4], n_if(has_bounces(scene), n_cells(scene)), "scatter.seen", Texels;
         regions: StagedBuffer => RegionRecord, scene.n_regions() as u64, "first.regions", Texels;
         /// Lobes by material, then the vectors of the basis, N_NODES numbers each.
         table: StagedBuffer => f32, n_table_rows(scene) * N_NODES as u64, "first.table", Floats;
@@ -171,10 +171,8 @@ pub(super) fn diffusion_room(scene: &Scene) -> Option<Room> {
     let plain = |c: &Cloud| is_grey(&scene.materials[c.i_material]) && !has_colors(c);
     let n_sets = if scene.clouds.iter().all(plain) { 1 } else { 3 };
     let n_solid_facets = scene.n_solid_facets();
-    has_diffusion(scene).then(|| Room {
-        has_bounces: has_bounces(scene),
-        ..Room::new(n_cells(scene), n_sets, has_slopes(scene), n_solid_facets)
-    })
+    let more = (has_slopes(scene), has_bounces(scene));
+    has_diffusion(scene).then(|| Room::new(n_cells(scene), n_sets, more, n_solid_facets))
 }
 
 /// Returns the most cells of a density grid at any time. Clouds that drift apart or grow change its

@@ -1,6 +1,6 @@
 //! The numbers of a scene that passes take as arguments. They are constant over a run.
 
-use super::features::{blob_variant, has_diffusion, is_medium, saturation_bound, target_format};
+use super::features::{has_diffusion, is_medium, saturation_bound, target_format};
 use super::packet::Packet;
 use crate::gpu::TargetFormat;
 use crate::layout::frame::CameraRecord;
@@ -84,7 +84,7 @@ impl FrameConstants {
             n_bounces: scene.lighting.diffusion.bounces,
             texture_seed: scene.draw.texture_seed,
             edge: scene.draw.edge(),
-            in_cells: blob_variant(scene).in_cells,
+            in_cells: scene.has_light_of_cells(),
             slices: scene.draw.overlap == Overlap::Slices,
             smallest: scene.draw.smallest.bound(),
             saturated: saturation_bound(scene.film.format),

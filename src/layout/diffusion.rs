@@ -76,17 +76,17 @@ pub struct DiffusionParams {
     pub weakened: [f32; 3],
     /// ϖ' = ϖ(1 − f)/s.
     pub even: [f32; 3],
-    /// ϖ'g' = ϖ(g − f)/s.
+    /// 3ϖ'g' = 3ϖ(g − f)/s.
     pub forward: [f32; 3],
+    /// Extinction beyond which a cell counts as no denser, 1/length.
+    pub densest: f32,
 }
 
 impl DiffusionParams {
     /// Returns the numbers of a medium on a grid.
     pub fn new(mean: &MeanMedium, grid: &GridSpec) -> DiffusionParams {
         let f32s = |v: DVec3| v.as_vec3().to_array();
-        let MeanMedium { albedo, g, straight } = *mean;
-        let weakened = DVec3::ONE - albedo * straight;
-        let scattered = albedo / weakened.max(DVec3::splat(f64::MIN_POSITIVE));
+        let [even, forward] = mean.scattered();
         DiffusionParams {
             albedo: f32s(mean.albedo),
             absorbed: f32s(DVec3::ONE - mean.albedo),
@@ -94,14 +94,13 @@ impl DiffusionParams {
             g: mean.g as f32,
             straight: mean.straight as f32,
             inverse_chord: grid.inverse_chord() as f32,
-            weakened: f32s(weakened),
-            even: f32s(scattered * (1.0 - straight)),
-            forward: f32s(scattered * (g - straight)),
+            weakened: f32s(mean.weakened()),
+            even: f32s(even),
+            forward: f32s(forward),
+            densest: mean.densest(grid) as f32,
         }
     }
-}
 
-impl DiffusionParams {
     /// Returns ϖ(1 − f).
     pub fn scattered(&self) -> [f32; 3] {
         self.albedo.map(|albedo| albedo * (1.0 - self.straight))

@@ -57,7 +57,8 @@ record! {
         direct: [f32; 3],
         /// Pairs of this receiver that stayed too wide at the last level.
         n_unresolved: f32,
-        /// Indirect irradiance I_i.
+        /// Indirect irradiance I_i. Of clouds with bounces of diffuse light their colour: what the
+        /// cells show by its mean over the channels.
         indirect: [f32; 3],
         /// Bound on the change by those pairs of L2's greatest channel; infinite where no bound is
         /// known: with lost sources or tensors.

@@ -127,7 +127,8 @@ pub const MAX_OCTAVES: u32 = 16;
 /// Greatest number of cycles of the multigrid solver: what is left is rounding.
 pub const MAX_CYCLES: u32 = 32;
 
-/// Greatest number of bounces between cells.
+/// Greatest number of bounces between cells: with the correction of each, many more than light
+/// needs.
 pub const MAX_BOUNCES: u32 = 64;
 
 /// Greatest number of divisions of an emitter: it is 2¹⁶ times smaller then.

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::cloud::{CloudSource, Group, mass};
+use super::grid::GridSpec;
 use super::lighting::{Lighting, LightingMode, Octaves};
 use super::material::Material;
 use super::phase::{Phase, albedo_of};
@@ -144,7 +145,35 @@ pub struct MeanMedium {
     pub straight: f64,
 }
 
+/// Transport mean free paths across a cell beyond which it counts as no denser.
+const MOST_DEPTH: f64 = 2.0;
+/// Least 1 − ϖg of which that depth is reckoned.
+const LEAST_KEPT: f64 = 1e-6;
+
 impl MeanMedium {
+    /// Returns s = 1 − ϖf: the share of the optical depth that counts.
+    pub fn weakened(&self) -> DVec3 {
+        DVec3::ONE - self.albedo * self.straight
+    }
+
+    /// Returns ϖ' = ϖ(1 − f)/s and 3ϖ'g' = 3ϖ(g − f)/s: factors of φ and of the flux in what is
+    /// scattered. Where all goes straight on, they are 0.
+    pub fn scattered(&self) -> [DVec3; 2] {
+        let MeanMedium { albedo, g, straight } = *self;
+        let all = albedo / self.weakened().max(DVec3::splat(f64::MIN_POSITIVE));
+        [1.0 - straight, 3.0 * (g - straight)].map(|share| share * all)
+    }
+
+    /// Returns the extinction beyond which a cell of `grid` counts as no denser, 1/length: two
+    /// transport mean free paths across its shortest edge, of the channel that scatters most.
+    ///
+    /// Light that an opaque cell sends out comes from its faces. A cell has one φ, that of its
+    /// middle, which grows with the depth of the faces before it.
+    pub fn densest(&self, grid: &GridSpec) -> f64 {
+        let kept = DVec3::ONE - self.albedo * self.g;
+        MOST_DEPTH / (grid.edges().min_element() * kept.min_element().max(LEAST_KEPT))
+    }
+
     /// Returns the mean over the particles of all clouds, weighted by their greatest mass: the
     /// medium itself where all have the same, and one that scatters nothing without particles.
     pub fn new(scene: &Scene, groups: &[Group], time_s: f64) -> MeanMedium {

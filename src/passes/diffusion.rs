@@ -15,14 +15,14 @@ use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers
 use crate::layout::diffusion::{DiffusionParams, LEVELS_ROOM, LevelStep, N_PATCHES, levels};
 use crate::layout::frame::GridRecord;
 
-/// Sweeps of the coarsest grid.
-const COARSEST_SWEEPS: u32 = 16;
-
 use bounces::Bounces;
-pub use bounces::{BouncePush, CorrectPush, SeenPush};
+pub use bounces::{BouncePush, SeenPush};
 pub use push::{CoarsestPush, FluxPush, PairPush, SourcesPush, SweepPush, SystemPush};
 use solids::Solids;
 pub use solids::{FacesPush, PatchesPush, SolidsPush, SolidsWork};
+
+/// Sweeps of the coarsest grid.
+const COARSEST_SWEEPS: u32 = 16;
 
 bindings! {
     /// The buffers of the pass that others share.
@@ -82,9 +82,14 @@ pub struct Room {
 
 impl Room {
     /// Returns the room for a grid of at most `n_cells`.
-    pub fn new(n_cells: u64, n_sets: u32, has_slopes: bool, n_solid_facets: u64) -> Room {
+    pub fn new(
+        n_cells: u64,
+        n_sets: u32,
+        (has_slopes, has_bounces): (bool, bool),
+        n_solid_facets: u64,
+    ) -> Room {
         let n_cells = LEVELS_ROOM * n_cells;
-        Room { n_cells, n_sets, has_slopes, n_solid_facets, has_bounces: false }
+        Room { n_cells, n_sets, has_slopes, n_solid_facets, has_bounces }
     }
 
     /// Returns the number of patches through which light passes to and from surfaces and ground.
@@ -133,7 +138,7 @@ pub struct Diffusion {
     flux: Kernel,
     /// Light from and to surfaces and ground, where a scene has them.
     solids: Option<Solids>,
-    /// What follows diffusion.
+    /// Bounces between cells, where a scene has them.
     bounces: Option<Bounces>,
     scratch: Scratch,
     room: Room,
@@ -223,13 +228,16 @@ impl Diffusion {
             n_surfaces: work.n_surfaces,
             step_length: (work.step_cells * f64::from(grid.cell)) as f32,
             max_steps: work.max_steps,
+            densest: of.densest,
         };
-        let sources = [lights, regions, density, field];
         match &self.bounces {
-            None => rec.dispatch(&self.sources, &sources, &push, n_cells)?,
-            Some(Bounces { scratch, .. }) => {
-                let sources = [&sources[..], &[&scratch.arrived]].concat();
-                rec.dispatch(&self.sources, &sources, &push, n_cells)?;
+            None => {
+                let buffers = [lights, regions, density, field];
+                rec.dispatch(&self.sources, &buffers, &push, n_cells)?;
+            }
+            Some(bounces) => {
+                let buffers = [lights, regions, density, field, &bounces.scratch.arrived];
+                rec.dispatch(&self.sources, &buffers, &push, n_cells)?;
             }
         }
         let system_push = SystemPush {
@@ -239,6 +247,7 @@ impl Diffusion {
             kept: of.kept,
             n_lights: work.n_lights,
             n_all,
+            densest: of.densest,
         };
         let system = [lights, density, field, operators, phi, source, faces];
         let n_buffers = 6 + usize::from(self.solids.is_some());
@@ -250,30 +259,31 @@ impl Diffusion {
         for i in 0..work.n_cycles {
             self.record_cycle(rec, &steps, n_all, i == 0)?;
         }
-        let push = FluxPush {
+        let push_of_flux = FluxPush {
             grid: *grid,
             kept: of.kept,
             inverse_chord: of.inverse_chord,
             even: of.even,
+            densest: of.densest,
             forward: of.forward,
-            ..FluxPush::default()
         };
         let flux = [density, next_phi, field];
         match &self.bounces {
-            None => rec.dispatch(&self.flux, &flux, &push, n_cells)?,
+            None => rec.dispatch(&self.flux, &flux, &push_of_flux, n_cells)?,
             Some(bounces) => {
-                let flux = [&flux[..], &[&bounces.scratch.arrived, &bounces.scratch.sent]].concat();
-                rec.dispatch(&self.flux, &flux, &push, n_cells)?;
+                let bounces::Scratch { arrived, sent, change } = &bounces.scratch;
+                let all = [density, next_phi, field, arrived, sent];
+                rec.dispatch(&self.flux, &all, &push_of_flux, n_cells)?;
                 for _ in 0..work.n_bounces {
                     bounces.record_gather(rec, [lights, field, faces], grid, of, work.n_lights)?;
+                    // No light comes in at the box: the bounce has it.
                     let push = SystemPush { n_lights: 0, ..system_push };
-                    let change = &bounces.scratch.change;
                     let system = [lights, density, change, operators, phi, source];
                     rec.dispatch(&bounces.system, &system, &push, n_cells)?;
                     for i in 0..work.n_cycles {
                         self.record_cycle(rec, &steps, n_all, i == 0)?;
                     }
-                    bounces.record_correction(rec, [density, next_phi, field], grid, of)?;
+                    bounces.record_correction(rec, flux, &push_of_flux)?;
                 }
             }
         }
@@ -313,7 +323,8 @@ impl Diffusion {
         Ok(())
     }
 
-    /// Writes the radiance that each cell scatters toward the eye.
+    /// Writes the radiance that each cell scatters toward the eye, with bounces. `of` is the
+    /// medium, the number of lights, and the eye.
     ///
     /// # Errors
     /// Fails if a buffer does not fit the shader's binding.
@@ -322,22 +333,11 @@ impl Diffusion {
         rec: &mut Recorder<'_>,
         [lights, field, seen]: [&Buffer; 3],
         grid: &GridRecord,
-        (of, n_lights, eye): (&DiffusionParams, u32, [f32; 3]),
+        of: (&DiffusionParams, u32, [f32; 3]),
     ) -> Result<()> {
         let Some(bounces) = &self.bounces else { return Ok(()) };
-        let push = SeenPush {
-            grid: *grid,
-            weakened: of.weakened,
-            n_lights,
-            even: of.even,
-            g: of.g,
-            forward: of.forward.map(|v| 3.0 * v),
-            straight: of.straight,
-            eye,
-        };
-        let all = [lights, field, &bounces.scratch.arrived, seen, &self.scratch.faces];
-        let n_buffers = 4 + usize::from(self.solids.is_some());
-        rec.dispatch(&bounces.seen, &all[..n_buffers], &push, grid.n_cells.iter().product())
+        let all = [lights, field, seen, &self.scratch.faces];
+        bounces.record_seen(rec, all, grid, of)
     }
 
     fn record_sweep(

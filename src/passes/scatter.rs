@@ -100,7 +100,7 @@ pub struct ScatterVariant {
     pub has_slopes: bool,
     /// Diffuse light reaches surfaces or ground.
     pub has_solids: bool,
-    /// What the cells scatter toward the eye is known.
+    /// Clouds have the light that the cells scatter toward the eye.
     pub has_seen: bool,
 }
 

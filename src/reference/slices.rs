@@ -159,6 +159,17 @@ fn mixtures(
 }
 
 impl Ray<'_> {
+    /// Returns the light of blob `j` in the middle of a slice, over its own, and by how much a
+    /// device's may differ. That is the error of the place in cells, and of the sum of eight.
+    fn light_of(&self, cells: &CellLight<'_>, j: usize, i_slice: i64) -> (f64, f64) {
+        let (eye, slice) = (self.view.pose.position, self.view.slice);
+        let along = (i_slice as f64 + MIDDLE) * slice;
+        let p = eye + along * self.direction;
+        let (light, greatest) = cells.factor(j, p);
+        let in_cells = (eye.length() + along.abs()) / cells.cells.edge();
+        (light, N_ROUNDINGS * U * (in_cells + 4.0) * greatest)
+    }
+
     /// Returns the part that `layer` of blob `j` has in each slice, with the slice's number.
     fn dealt(&self, j: usize, layer: &Layer, r: &Rounding) -> Vec<(i64, Part)> {
         let (blob, slice) = (&self.sprites.blobs[j], self.view.slice);
@@ -246,19 +257,6 @@ impl Ray<'_> {
             }
         }
         found
-    }
-}
-
-impl Ray<'_> {
-    /// Returns the light of blob `j` in the middle of a slice, over its own, and by how much a
-    /// device's may differ: that of the place in cells, and the sum of eight.
-    fn light_of(&self, cells: &CellLight<'_>, j: usize, i_slice: i64) -> (f64, f64) {
-        let (eye, slice) = (self.view.pose.position, self.view.slice);
-        let along = (i_slice as f64 + MIDDLE) * slice;
-        let p = eye + along * self.direction;
-        let (light, greatest) = cells.factor(j, p);
-        let in_cells = (eye.length() + along.abs()) / cells.cells.edge();
-        (light, N_ROUNDINGS * U * (in_cells + 4.0) * greatest)
     }
 }
 

@@ -69,7 +69,6 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("diffusion_bounce.comp", diffusion::BouncePush::FIELDS, "Light T 16 16"),
     ("diffusion_coarsen.comp", diffusion::PairPush::FIELDS, "16"),
     ("diffusion_coarsest.comp", diffusion::CoarsestPush::FIELDS, "T 16 16"),
-    ("diffusion_correct.comp", diffusion::CorrectPush::FIELDS, "F T T T 16 16"),
     ("diffusion_faces.comp", diffusion::FacesPush::FIELDS, "Light T 16"),
     ("diffusion_flux.comp", diffusion::FluxPush::FIELDS, "F T 16"),
     ("diffusion_patches.comp", diffusion::PatchesPush::FIELDS, "T 16"),

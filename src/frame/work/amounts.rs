@@ -253,8 +253,8 @@ fn tensor_numbers(scene: &Scene, packet: &Packet) -> f64 {
     of_light * bright_lights(&packet.lights).count() as f64
 }
 
-/// Returns the visits of cells by bounces, at least: each of 24 ways from a cell leaves the box, in
-/// the mean, after half of the cells along its shortest axis.
+/// Returns the visits of cells by bounces, at least. Of each cell 24 ways lead to the box. In the
+/// mean they pass more than half of the cells along its shortest axis.
 fn gathered(scene: &Scene, [x, y, z]: [f64; 3]) -> f64 {
     if !has_bounces(scene) {
         return 0.0;

@@ -1,6 +1,6 @@
 //! Bounces: light on straight ways between cells, scattered again where it arrives.
 
-use super::push::SystemPush;
+use super::push::{FluxPush, SystemPush};
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
 use crate::layout::diffusion::DiffusionParams;
@@ -26,24 +26,6 @@ record! {
         unused: f32,
         /// 1 − ϖg.
         kept: [f32; 3],
-    }
-}
-
-record! {
-    /// Push constants of `diffusion_correct.comp`.
-    pub struct CorrectPush {
-        /// The density grid.
-        grid: GridRecord,
-        /// 1 − ϖg.
-        kept: [f32; 3],
-        /// c, 1/length.
-        inverse_chord: f32,
-        /// ϖ'.
-        even: [f32; 3],
-        /// Padding.
-        unused: f32,
-        /// ϖ'g'.
-        forward: [f32; 3],
     }
 }
 
@@ -88,7 +70,7 @@ pub(super) struct Bounces {
     /// The equations of a change.
     pub system: Kernel,
     correct: Kernel,
-    pub seen: Kernel,
+    seen: Kernel,
     pub scratch: Scratch,
     has_solids: bool,
 }
@@ -109,14 +91,18 @@ impl Bounces {
         Ok(Bounces {
             bounce: kernel("diffusion.bounce", BouncePush::FIELDS, &solids)?,
             system: kernel("diffusion.system", SystemPush::FIELDS, &alone)?,
-            correct: kernel("diffusion.correct", CorrectPush::FIELDS, &[])?,
+            correct: kernel(
+                "diffusion.flux",
+                FluxPush::FIELDS,
+                &[("BOUNCES", 1), ("CORRECTS", 1)],
+            )?,
             seen: kernel("diffusion.seen", SeenPush::FIELDS, &solids)?,
             scratch: Scratch::new(device, n_cells)?,
             has_solids,
         })
     }
 
-    /// Computes φ and F of `field` anew, and their change.
+    /// Replaces φ and F of `field` by those of what cells gather, and writes their change.
     pub fn record_gather(
         &self,
         rec: &mut Recorder<'_>,
@@ -147,19 +133,33 @@ impl Bounces {
         &self,
         rec: &mut Recorder<'_>,
         [density, phi, field]: [&Buffer; 3],
-        grid: &GridRecord,
-        of: &DiffusionParams,
+        push: &FluxPush,
     ) -> Result<()> {
         let Scratch { arrived, sent, change } = &self.scratch;
-        let push = CorrectPush {
+        let buffers = [density, phi, field, arrived, sent, change];
+        rec.dispatch(&self.correct, &buffers, push, push.grid.n_cells.iter().product())
+    }
+
+    /// Writes the radiance that each cell scatters toward the eye.
+    pub fn record_seen(
+        &self,
+        rec: &mut Recorder<'_>,
+        [lights, field, seen, faces]: [&Buffer; 4],
+        grid: &GridRecord,
+        (of, n_lights, eye): (&DiffusionParams, u32, [f32; 3]),
+    ) -> Result<()> {
+        let push = SeenPush {
             grid: *grid,
-            kept: of.kept,
-            inverse_chord: of.inverse_chord,
+            weakened: of.weakened,
+            n_lights,
             even: of.even,
+            g: of.g,
             forward: of.forward,
-            ..CorrectPush::default()
+            straight: of.straight,
+            eye,
         };
-        let buffers = [density, phi, change, arrived, field, sent];
-        rec.dispatch(&self.correct, &buffers, &push, grid.n_cells.iter().product())
+        let all = [lights, field, &self.scratch.arrived, seen, faces];
+        let n_buffers = 4 + usize::from(self.has_solids);
+        rec.dispatch(&self.seen, &all[..n_buffers], &push, grid.n_cells.iter().product())
     }
 }

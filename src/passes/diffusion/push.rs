@@ -25,6 +25,8 @@ record! {
         step_length: f32,
         /// The most steps of a march.
         max_steps: u32,
+        /// Extinction beyond which a cell counts as no denser, 1/length.
+        densest: f32,
     }
 }
 
@@ -43,6 +45,8 @@ record! {
         n_lights: u32,
         /// Cells of all levels.
         n_all: u32,
+        /// Extinction beyond which a cell counts as no denser, 1/length.
+        densest: f32,
     }
 }
 
@@ -99,9 +103,9 @@ record! {
         inverse_chord: f32,
         /// ϖ'.
         even: [f32; 3],
-        /// Padding.
-        unused: f32,
-        /// ϖ'g'.
+        /// Extinction beyond which a cell counts as no denser, 1/length.
+        densest: f32,
+        /// 3ϖ'g'.
         forward: [f32; 3],
     }
 }

@@ -11,8 +11,8 @@ use crate::model::grid::GridSpec;
 use crate::model::medium::MeanMedium;
 use crate::reference::parallel::parallel_map;
 
-/// Returns 24 directions: with these means of 1, of a cosine over its half, and of its square, as
-/// over the sphere.
+/// Returns 24 directions. The means of 1, of a cosine over its half and of its square over them are
+/// those over the sphere.
 pub(super) fn directions() -> [DVec3; 24] {
     // 2a + b = 3/2 and 2a² + b² = 1.
     let root = 6f64.sqrt();
@@ -25,7 +25,7 @@ pub(super) fn directions() -> [DVec3; 24] {
     })
 }
 
-/// What bounces need besides the ways.
+/// The cells that bounces lead between.
 pub(super) struct Bounces<'a> {
     pub of: &'a DiffusionMedium,
     pub grid: &'a GridSpec,
@@ -38,24 +38,19 @@ impl Bounces<'_> {
     /// Returns what suns and lamps make each cell send out, over s σ and times 4π: ϖ'U, and
     /// 3ϖ'g'W along each axis.
     pub fn arrived(&self, sources: &Sources) -> Vec<Moments> {
-        let MeanMedium { albedo, g, straight: f } = self.of.mean;
-        let share = albedo / (DVec3::ONE - albedo * f).max(DVec3::splat(f64::MIN_POSITIVE));
-        let of = |[u, x, y, z]: &Moments| {
-            let [x, y, z] = [x, y, z].map(|w| 3.0 * (g - f) * share * *w);
-            [(1.0 - f) * share * *u, x, y, z]
-        };
+        let [even, forward] = self.of.mean.scattered();
+        let of = |[u, x, y, z]: &Moments| [even * *u, forward * *x, forward * *y, forward * *z];
         sources.of_suns.iter().map(of).collect()
     }
 
     /// Returns the light after one more bounce of `light`, and what diffusion makes of the change.
     pub fn next(&self, ways: &Ways<'_>, arrived: &[Moments], light: &[Moments]) -> Vec<Moments> {
         let MeanMedium { albedo, g, straight: f } = self.of.mean;
-        let weakened = DVec3::ONE - albedo * f;
-        let (even, forward) = (albedo * (1.0 - f) / weakened, albedo * (g - f) / weakened);
+        let ([even, forward], weakened) = (self.of.mean.scattered(), self.of.mean.weakened());
         let sent = |c: usize, toward: DVec3| {
             let along = |m: &Moments| -(m[1] * toward.x + m[2] * toward.y + m[3] * toward.z);
             let (own, sun) = (&light[c], &arrived[c]);
-            even * own[0] + 3.0 * forward * along(own) + sun[0] + along(sun)
+            even * own[0] + forward * along(own) + sun[0] + along(sun)
         };
         let all = directions();
         let found: Vec<Moments> = parallel_map(light.len(), |c| {

@@ -50,7 +50,9 @@ impl DiffuseLight {
         (n_cycles, n_bounces): (u32, u32),
         eye: DVec3,
     ) -> (DiffuseLight, Option<SeenCells>) {
-        let (grid, cells) = (obstacles.spec, obstacles.cells);
+        let grid = obstacles.spec;
+        let counted: Vec<f64> = obstacles.cells.iter().map(|c| c.min(of.densest)).collect();
+        let cells = &counted[..];
         let sources = Sources::new(of, obstacles, lights, of_solids.is_some());
         let system = System::new(of, grid, cells, &sources, lights, of_solids);
         let phi = Multigrid::new(system, grid.edges()).solve(n_cycles);
@@ -58,7 +60,7 @@ impl DiffuseLight {
         if n_bounces == 0 {
             return (light, None);
         }
-        let weakened = DVec3::ONE - of.mean.albedo * of.mean.straight;
+        let weakened = of.mean.weakened();
         let all = cells.iter().map(|sigma| weakened * *sigma).collect();
         let ways = Ways::new(grid, all, lights, of_solids);
         let bounces = Bounces { of, grid, cells, n_cycles };

@@ -50,9 +50,8 @@ impl SeenCells {
         (arrived, ways): (&[Moments], &Ways<'_>),
         eye: DVec3,
     ) -> SeenCells {
-        let MeanMedium { albedo, g, straight: f } = of.mean;
-        let weakened = DVec3::ONE - albedo * f;
-        let (even, forward) = (albedo * (1.0 - f) / weakened, 3.0 * albedo * (g - f) / weakened);
+        let MeanMedium { g, straight: f, .. } = of.mean;
+        let ([even, forward], weakened) = (of.mean.scattered(), of.mean.weakened());
         let phase = Phase::HenyeyGreenstein { g };
         let sent = |c: usize, w: DVec3| {
             let along = |m: &Moments| m[1] * w.x + m[2] * w.y + m[3] * w.z;
@@ -63,7 +62,7 @@ impl SeenCells {
             let of_flux = if fluence > 0.0 { flux.length() * mean(even) / fluence } else { 0.0 };
             let directed = of_flux.min(1.0);
             let cosine = flux.normalize_or_zero().dot(w);
-            let peak = 4.0 * PI * phase.at(cosine) / (1.0 - f);
+            let peak = 4.0 * PI * phase.at(cosine) / (1.0 - f).max(f64::MIN_POSITIVE);
             diffuse.max(DVec3::ZERO) + suns[0] * (1.0 - directed + directed * peak)
         };
         let cells = parallel_map(extinction.len(), |c| {
@@ -111,8 +110,8 @@ impl SeenCells {
         self.grid.edges().min_element()
     }
 
-    /// Returns the light of a blob of size σ at `p`: the mean over its mass on four ways `toward`
-    /// the eye, by how much of it is seen through the cells.
+    /// Returns the light of a blob of size σ at `p`: the mean over places on four ways `toward` the
+    /// eye. They count by the blob's mass there, and by what the cells before them let through.
     pub fn of_blob(&self, p: DVec3, sigma: f64, toward: DVec3) -> SeenBlob {
         let (mut weight, mut at, mut sum) = (0.0, 0.0, DVec3::ZERO);
         let other = if toward.y.abs() < 0.9 { DVec3::Y } else { DVec3::X };

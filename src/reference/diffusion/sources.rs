@@ -19,19 +19,21 @@ pub struct DiffusionMedium {
     pub mean: MeanMedium,
     /// c: inverse length that bounds how far light travels where nothing scatters.
     pub inverse_chord: f64,
+    /// Extinction beyond which a cell counts as no denser, 1/length.
+    pub densest: f64,
 }
 
 impl DiffusionMedium {
     /// Returns the numbers for a grid: c is 1 over the mean chord 4V/A of its box.
     pub fn new(mean: MeanMedium, grid: &GridSpec) -> DiffusionMedium {
-        DiffusionMedium { mean, inverse_chord: grid.inverse_chord() }
+        DiffusionMedium { mean, inverse_chord: grid.inverse_chord(), densest: mean.densest(grid) }
     }
 
     /// Returns D = 1/(3σ(1 − ϖg) + c) at an extinction.
     pub fn reach(&self, extinction: f64) -> DVec3 {
         let MeanMedium { albedo, g, .. } = self.mean;
         let loss = DVec3::ONE - albedo * g;
-        (3.0 * extinction * loss + DVec3::splat(self.inverse_chord)).recip()
+        (3.0 * extinction.min(self.densest) * loss + DVec3::splat(self.inverse_chord)).recip()
     }
 }
 
@@ -61,10 +63,11 @@ impl Sources {
         let (depth, kept) = (DVec3::ONE - albedo * f, DVec3::ONE - albedo * g);
         let spec = obstacles.spec;
         let found = parallel_map(obstacles.cells.len(), |c| {
-            let p = spec.center(c);
+            let (p, whole) = (spec.center(c), obstacles.cells[c]);
+            let extinction = whole.min(of.densest);
             let receiver = Receiver { position: p, i_region: u32::MAX };
             let (mut fluence, mut flux, mut fallen) = (DVec3::ZERO, DMat3::ZERO, DVec3::ZERO);
-            let mut direct = 0.0;
+            let (mut direct, mut from_middle) = (0.0, DVec3::ZERO);
             for light in lights.iter().filter(|light| has_sky_flux || !light.is_sky()) {
                 let way = light.arrival(p);
                 let tau = obstacles.depths(&[receiver], std::slice::from_ref(light))[0];
@@ -75,22 +78,27 @@ impl Sources {
                     fallen += light.energy() * (-tau * kept).exp();
                     continue;
                 }
-                let e = light.energy() * way.falloff * (-tau * depth).exp();
-                direct += e.element_sum() / 3.0;
-                let e = e * mean_over(obstacles.cells[c] * depth * chord(spec.edges(), way.toward));
+                let e = light.energy() * way.falloff;
+                direct += (e * (-tau * depth).exp()).element_sum() / 3.0;
+                let chord = chord(spec.edges(), way.toward);
+                // Where the march finds less than half of the cell, light is whole at the face.
+                let front = (tau - 0.5 * whole * chord).max(0.0);
+                let own = [whole * chord, extinction * chord];
+                let (mean, share) = in_cell(front, own, depth, kept);
+                let e = e * mean;
                 fluence += e;
+                from_middle += share * e;
                 // A column an axis.
                 for axis in 0..3 {
                     *flux.col_mut(axis) -= e * way.toward[axis];
                 }
             }
-            let extinction = obstacles.cells[c];
             let of_suns = [fluence, flux.x_axis, flux.y_axis, flux.z_axis];
             let mut carried = [0, 1, 2].map(|axis| {
                 3.0 * of.reach(extinction) * albedo * (g - f) * extinction * flux.col(axis)
             });
             carried[1] -= of.reach(extinction) * of.inverse_chord * fallen;
-            (albedo * (1.0 - f) * extinction * fluence, (carried, of_suns, direct))
+            (albedo * (1.0 - f) * extinction * from_middle, (carried, of_suns, direct))
         });
         let (scattered, rest): (Vec<DVec3>, Vec<_>) = found.into_iter().unzip();
         let direct = rest.iter().map(|(.., direct)| *direct).collect();
@@ -104,11 +112,64 @@ fn chord(edges: DVec3, toward: DVec3) -> f64 {
     (edges / toward.abs().max(DVec3::splat(1e-6))).min_element()
 }
 
-/// Returns the mean of light over its way through a cell of the depth `depth`, over the light at
-/// the middle.
-fn mean_over(depth: DVec3) -> DVec3 {
-    (0.5 * depth)
-        .to_array()
-        .map(|h| if h > 0.0 { h.min(20.0).sinh() / h.min(20.0) } else { 1.0 })
-        .into()
+/// Returns the mean light of a beam in a cell, and the share of it that does at the middle what
+/// scattered light does where it is.
+///
+/// `front` is the optical depth before the cell, `own` that from face to face, and `counted` what
+/// of it counts for diffusion. `weakened` and `kept` are the factors of the depth that weakens the
+/// beam, and of the depth for diffusion.
+fn in_cell(front: f64, [own, counted]: [f64; 2], weakened: DVec3, kept: DVec3) -> (DVec3, DVec3) {
+    let of = |axis: usize| {
+        let t = own * weakened[axis];
+        if t == 0.0 {
+            return (1.0, 1.0);
+        }
+        let absorbed = -libm::expm1(-t);
+        // The mean place of what is scattered, as a share of the way.
+        let place = if t < 1e-3 { 0.5 - t / 12.0 } else { 1.0 / t - (-t).exp() / absorbed };
+        let middle = 0.5 * counted;
+        let rise = |depth: f64| 2.0 + 3.0 * kept[axis] * (front + depth);
+        let mean = absorbed / (counted * weakened[axis]);
+        (mean, rise(middle.min(place * own)) / rise(middle))
+    };
+    let [(x, i), (y, j), (z, k)] = [0, 1, 2].map(of);
+    let passed = (-front * weakened).to_array().map(f64::exp);
+    (DVec3::new(x, y, z) * DVec3::from(passed), DVec3::new(i, j, k))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_takes_what_falls_on_it() {
+        // Behind a depth of 1: the light before the cell less that behind it, by its depth.
+        let depths = DVec3::new(0.0, 1.0, 5e4);
+        let (mean, _) = in_cell(1.0, [2.0; 2], depths, DVec3::ONE);
+        let expected =
+            DVec3::new(1.0, ((-1f64).exp() - (-3f64).exp()) / 2.0, (-5e4f64).exp() / 1e5);
+        assert!((mean - expected).abs().max_element() < 1e-16, "{mean}");
+        // Never more than falls on it.
+        let (mean, _) = in_cell(0.0, [4.0; 2], DVec3::ONE, DVec3::ONE);
+        assert!((mean.x - 0.25 * (1.0 - (-4f64).exp())).abs() < 1e-16, "{mean}");
+        // Where half of the cell counts, it has twice the light.
+        let (mean, share) = in_cell(0.0, [4.0, 2.0], DVec3::ONE, DVec3::ONE);
+        assert!((mean.x - 0.5 * (1.0 - (-4f64).exp())).abs() < 1e-16, "{mean}");
+        let place = 1.0 - 4.0 / 4f64.exp_m1();
+        assert!((share.x - (2.0 + 3.0 * place) / 5.0).abs() < 1e-15, "{share}");
+    }
+
+    #[test]
+    fn light_at_the_face_of_an_opaque_cell_leaves_it_there() {
+        let share = |front, own, kept| in_cell(front, [own; 2], DVec3::ONE, DVec3::splat(kept)).1.x;
+        // Scattered at a depth of 1 on average, where (2 + 3)/(2 + 3 own/2) is left at the middle.
+        assert!((share(0.0, 1e6, 1.0) - 5.0 / (2.0 + 1.5e6)).abs() < 1e-12);
+        // Thin cells scatter at their middle, and what absorbs all has no diffusion.
+        assert!((share(0.0, 1e-4, 1.0) - 1.0).abs() < 1e-8);
+        assert_eq!(share(0.0, 10.0, 0.0), 1.0);
+        // Behind much depth the difference is of no account.
+        assert!((share(1e9, 10.0, 1.0) - 1.0).abs() < 1e-8);
+        // The series meets the formula.
+        assert!((share(0.0, 0.9999e-3, 1.0) - share(0.0, 1.0001e-3, 1.0)).abs() < 1e-9);
+    }
 }

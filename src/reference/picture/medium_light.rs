@@ -17,7 +17,7 @@ use crate::reference::transmit::{Obstacles, Receiver};
 pub(super) struct MediumLight {
     /// That of the cells.
     pub cells: DiffuseLight,
-    /// What they scatter toward the eye, with bounces.
+    /// Light that the cells scatter toward the eye, with bounces.
     pub seen: Option<SeenCells>,
     /// ϖ(1 − f) of the mean medium.
     pub scattered: DVec3,
@@ -77,7 +77,7 @@ pub struct CloudCells {
     pub means: Vec<f64>,
 }
 
-/// What a blob scatters toward the eye.
+/// Light that a blob scatters toward the eye.
 pub(super) struct BlobLight {
     /// Fluence of suns and lamps.
     pub fluence: DVec3,

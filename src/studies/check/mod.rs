@@ -69,7 +69,7 @@ pub fn check(device: &DevicePicture, plan: &CheckPlan<'_>) -> Result<Check> {
         return Ok(Check { reason, seconds, ..found });
     }
     let cached = plan.folder.map(|folder| cache::path(folder, exact, device.time_s, &pixels));
-    // The light of cells is not kept: computing it takes seconds.
+    // The kept file has no light of cells.
     let cached = cached.filter(|_| !exact.has_light_of_cells());
     let kept = cached.as_deref().and_then(|path| cache::read(path, exact.n_facets()));
     let from_cache = kept.is_some();

@@ -101,6 +101,7 @@ fn study(law: &mut Law, plan: &StudyPlan, found: &mut StudyResults, stop: &Atomi
     let reference = Reference {
         rgba: vec![[0.0; 4]; n],
         own_error: 1e-6,
+        variances: vec![],
         accuracy: String::new(),
         seconds: 0.0,
         pixels_s: 0.0,

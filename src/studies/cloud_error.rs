@@ -7,7 +7,9 @@ use crate::error::Result;
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::figure::Figure;
 use crate::model::scene::Scene;
-use crate::reference::picture::{FrameReference, Pixels, ReferenceKind, sums_by_settings};
+use crate::reference::picture::{
+    FrameReference, Pixels, Reference, ReferenceKind, sums_by_settings,
+};
 
 /// Optical depth of the clouds from which on they cover a pixel: half of it.
 const COVERING: f64 = LN_2;
@@ -32,29 +34,35 @@ impl CloudPixels {
     /// their mean in `reference`. There is none without such pixels or light in them, or where a
     /// value is not finite.
     ///
-    /// The reference's own error, `own_error` over all pixels, is part of the value. Its square is
-    /// taken off the lower end of the interval as if all of it were in these pixels.
+    /// Random paths add their variance to the square of a difference. It is taken off there, so
+    /// that the mean of the squares is that of more paths. Another reference's own error over all
+    /// pixels is part of the value. Its square is taken off the lower end of the interval as if all
+    /// of it were in these pixels.
     pub fn error(
         &self,
         pixels: &Pixels,
         picture: &[[f64; 4]],
-        reference: &[[f64; 4]],
-        own_error: f64,
+        reference: &Reference,
     ) -> Option<Figure> {
+        let Reference { rgba, own_error, variances, .. } = reference;
         // Sums over the covered pixels of each part of the picture, and their number.
-        let of = |f: fn(f64, f64) -> f64| {
-            let of_pixel = |((p, r), is): ((&[f64; 4], &[f64; 4]), &bool)| {
-                is.then(|| (0..3).map(|k| f(p[k], r[k])).sum::<f64>() / 3.0)
-            };
-            parts(pixels, picture.iter().zip(reference).zip(&self.0).map(of_pixel))
+        let of = |f: &dyn Fn(usize) -> f64| {
+            let covered = self.0.iter().enumerate();
+            parts(pixels, covered.map(|(i, is)| is.then(|| f(i) / 3.0)))
         };
-        let (squares, light) = (of(|p, r| (p - r) * (p - r)), of(|_, r| r));
+        let squares = of(&|i| {
+            let square = |k: usize| (picture[i][k] - rgba[i][k]).powi(2);
+            (0..3).map(square).sum::<f64>() - variances.get(i).unwrap_or(&0.0)
+        });
+        let light = of(&|i| rgba[i][..3].iter().sum());
         let mean = |of: &[(f64, f64)], rows: &[usize]| {
             let sum = rows.iter().map(|&i| of[i]).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
             if sum.1 > 0.0 { sum.0 / sum.1 } else { 0.0 }
         };
         let relative = |rows: &[usize]| {
             let (squares, light) = (mean(&squares, rows), mean(&light, rows));
+            // Not max(), which would hide what is no number.
+            let squares = if squares < 0.0 { 0.0 } else { squares };
             if light > 0.0 { squares.sqrt() / light } else { 0.0 }
         };
         let all: Vec<usize> = (0..squares.len()).collect();
@@ -64,6 +72,7 @@ impl CloudPixels {
         if !(value.is_finite() && brightness > 0.0) {
             return None;
         }
+        let own_error = if variances.is_empty() { *own_error } else { 0.0 };
         let noise = own_error / brightness * (self.0.len() as f64 / n_covered as f64).sqrt();
         let interval = Bootstrap::default().interval([squares.len()], |[rows]| relative(rows));
         Some(Figure {
@@ -82,21 +91,35 @@ mod tests {
     fn only_covered_pixels_count() {
         let pixels = Pixels::all(4, 2);
         let of_cloud = CloudPixels([true, true, false, false, true, true, false, false].to_vec());
-        let reference = vec![[0.5, 0.4, 0.6, 1.0]; 8];
+        let of = |rgba: [f64; 4], own_error: f64, variances: &[f64]| Reference {
+            rgba: vec![rgba; 8],
+            own_error,
+            variances: variances.to_vec(),
+            accuracy: String::new(),
+            seconds: 0.0,
+            pixels_s: 0.0,
+        };
+        let light = [0.5, 0.4, 0.6, 1.0];
         // 0.1 too bright in clouds, by 0.5; anything beside them.
         let picture: Vec<[f64; 4]> =
             of_cloud.0.iter().map(|is| if *is { [0.6, 0.5, 0.7, 0.3] } else { [9.0; 4] }).collect();
-        let error = of_cloud.error(&pixels, &picture, &reference, 0.0).unwrap();
+        let error = of_cloud.error(&pixels, &picture, &of(light, 0.0, &[])).unwrap();
         assert!((error.value - 0.2).abs() < 1e-15 && (error.low.unwrap() - 0.2).abs() < 1e-12);
         // Noise of 0.03 over all is 0.03 √2 in clouds, a fifth of their light twice.
-        let noisy = of_cloud.error(&pixels, &picture, &reference, 0.03).unwrap();
+        let noisy = of_cloud.error(&pixels, &picture, &of(light, 0.03, &[])).unwrap();
         let low = (0.04f64 - 2.0 * 0.06 * 0.06).sqrt();
         assert!((noisy.low.unwrap() - low).abs() < 1e-12 && noisy.high == error.high);
+        // Of 0.03 in the squares of three channels 0.0192 are the paths': 0.06² by 0.5² is left.
+        let by_paths = of_cloud.error(&pixels, &picture, &of(light, 0.5, &[0.0192; 8])).unwrap();
+        assert!((by_paths.value - 0.12).abs() < 1e-15, "{by_paths:?}");
+        assert!((by_paths.low.unwrap() - 0.12).abs() < 1e-12);
+        // More than all: nothing is left.
+        let by_chance = of_cloud.error(&pixels, &picture, &of(light, 0.5, &[0.1; 8])).unwrap();
+        assert_eq!((by_chance.value, by_chance.high), (0.0, Some(0.0)));
         let none = CloudPixels(vec![false; 8]);
-        assert_eq!(none.error(&pixels, &picture, &reference, 0.0), None);
-        let dark = vec![[0.0, 0.0, 0.0, 1.0]; 8];
-        assert_eq!(of_cloud.error(&pixels, &picture, &dark, 0.0), None);
+        assert_eq!(none.error(&pixels, &picture, &of(light, 0.0, &[])), None);
+        assert_eq!(of_cloud.error(&pixels, &picture, &of([0.0; 4], 0.0, &[])), None);
         let bad = vec![[f64::NAN; 4]; 8];
-        assert_eq!(of_cloud.error(&pixels, &bad, &reference, 0.0), None);
+        assert_eq!(of_cloud.error(&pixels, &bad, &of(light, 0.0, &[])), None);
     }
 }

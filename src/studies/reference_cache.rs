@@ -128,6 +128,7 @@ fn read(path: &Path, hash: &str, n_pixels: usize) -> Option<Reference> {
     (is_whole && rgba.len() == n_pixels).then_some(Reference {
         rgba,
         own_error,
+        variances: vec![],
         accuracy,
         seconds,
         pixels_s,
@@ -165,6 +166,7 @@ mod tests {
         let reference = Reference {
             rgba,
             own_error: 1e-7,
+            variances: vec![],
             accuracy: "rounding".into(),
             seconds: 2.5,
             pixels_s: 0.5,

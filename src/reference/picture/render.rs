@@ -26,6 +26,9 @@ pub struct Reference {
     pub rgba: Vec<[f64; 4]>,
     /// Root mean square of the pixels' error estimates.
     pub own_error: f64,
+    /// By pixel the variance of the mean of random paths, the sum over the channels. Empty where
+    /// there are none.
+    pub variances: Vec<f64>,
     /// Description of that estimate.
     pub accuracy: String,
     /// Time to compute the picture.
@@ -70,6 +73,7 @@ impl ReferenceKind {
         })?;
         Ok(Reference {
             own_error: drawn.own_error(),
+            variances: vec![],
             rgba: drawn.rgba,
             accuracy: self.accuracy_text(scene, 1),
             seconds: begin.elapsed().as_secs_f64(),
@@ -121,6 +125,7 @@ pub fn render_paths(
     let (mean, seconds) = (found.mean(), begin.elapsed().as_secs_f64());
     Ok(Reference {
         own_error: mean.random_error,
+        variances: mean.variances,
         rgba: mean.rgba,
         accuracy: request.kind.accuracy_text(request.scene, found.n_samples),
         seconds,

@@ -28,6 +28,8 @@ pub struct MeanPicture {
     /// Root mean square of the standard errors of all channels of all pixels, were the samples
     /// random: what they add to a picture's RMSE.
     pub random_error: f64,
+    /// By pixel the variance of the mean, the sum over the channels, were the samples random.
+    pub variances: Vec<f64>,
     /// Standard error of the mean over all pixels, were the samples random, as a share of it; 0 of
     /// a black picture.
     pub relative_error: f64,
@@ -69,6 +71,7 @@ impl SampleSums {
             rgba: pixels().map(rgba).collect(),
             own_error: root_mean_square(pixels().map(error)),
             random_error: root_mean_square(pixels().map(|v| 0.5 * spread(v))),
+            variances: pixels().map(|v| spread(v).powi(2)).collect(),
             relative_error: if all > 0.0 { off / all } else { 0.0 },
         }
     }
@@ -201,6 +204,7 @@ mod tests {
             rgba: vec![[2.0, 0.0, 0.0, 0.0]],
             own_error: 1.25,
             random_error: 0.5,
+            variances: vec![1.0],
             relative_error: 0.5,
         };
         assert_eq!(two.mean(), mean);

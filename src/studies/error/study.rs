@@ -223,8 +223,7 @@ impl ErrorStudy<'_> {
             Ok(rgba) => {
                 let Reference { rgba: reference, own_error, .. } = self.reference;
                 let drawn = sampled(self.pixels, &rgba);
-                let cloud =
-                    |cloud: &CloudPixels| cloud.error(self.pixels, &drawn, reference, *own_error);
+                let cloud = |cloud: &CloudPixels| cloud.error(self.pixels, &drawn, self.reference);
                 configuration.error = picture_error(self.pixels, &drawn, reference, *own_error)
                     .map(|error| PictureError { cloud: self.cloud.and_then(cloud), ..error });
                 if configuration.error.is_none() {

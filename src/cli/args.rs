@@ -57,6 +57,20 @@ pub struct Args {
     pub color: ColorChoice,
 }
 
+impl Command {
+    /// Makes settings of the scene from a budget of the light.
+    pub fn set_budget(&mut self) {
+        let (budget, options) = match self {
+            Command::Render(of) => (&of.budget, &mut of.options),
+            Command::Bench(of) => (&of.budget, &mut of.options),
+            #[cfg(feature = "window")]
+            Command::View(of) => (&of.budget, &mut of.options),
+            _ => return,
+        };
+        budget.put_before(&mut options.set);
+    }
+}
+
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {

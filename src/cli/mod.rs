@@ -69,10 +69,11 @@ fn with_plain_words(shown: clap::Error) -> clap::Error {
 
 /// Parses the command line, runs the command, prints its error and returns the exit code.
 pub fn main() -> ExitCode {
-    let args = match Args::try_parse() {
+    let mut args = match Args::try_parse() {
         Ok(args) => args,
         Err(shown) => return usage(&with_plain_words(shown)),
     };
+    args.command.set_budget();
     // If no handler can be set, Ctrl-C still ends the program, but leaves temporary files.
     let _ = ctrlc::set_handler(interrupt::handle);
     let zones = attach::attach(matches!(&args.command, Command::Bench(a) if a.trace.is_some()));

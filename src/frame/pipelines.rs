@@ -4,8 +4,9 @@ use super::renderer::Renderer;
 use super::stage::GpuContext;
 use crate::error::{Error, Result};
 use crate::gpu::PipelineReport;
+
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Draw, DrawPath, Impostors, Overlap, Scene};
+use crate::model::scene::{Draw, DrawPath, Impostors, LightingMode, Overlap, RUNGS, Scene};
 
 /// Makes every pipeline that the scene may need, for each value that its "auto" knobs can take, and
 /// returns the reports on them, each variant once. The device must have been opened for reports.
@@ -15,8 +16,10 @@ use crate::model::scene::{Draw, DrawPath, Impostors, Overlap, Scene};
 pub fn pipelines(context: &GpuContext, scene: &Scene) -> Result<Vec<PipelineReport>> {
     let mut all: Vec<PipelineReport> = Vec::new();
     context.device.take_pipeline_reports();
-    for (i, draw) in draws(scene.draw).into_iter().enumerate() {
-        let scene = Scene { draw, ..scene.clone() };
+    let lit = lit_scenes(scene);
+    let drawn = draws(scene.draw).into_iter().map(|draw| Scene { draw, ..lit[0].clone() });
+    let others = lit[1..].iter().map(|scene| scene.exact().into_owned());
+    for (i, scene) in drawn.chain(others).enumerate() {
         match Renderer::new(&context.device, context.compiler(), &scene, true) {
             Ok(renderer) => drop(renderer),
             // A setting that does not fit is not chosen; the exact one must fit.
@@ -33,6 +36,14 @@ pub fn pipelines(context: &GpuContext, scene: &Scene) -> Result<Vec<PipelineRepo
         }
     }
     Ok(all)
+}
+
+/// Returns the scene in the light nearest to transport, then in all else that "auto" can take.
+fn lit_scenes(scene: &Scene) -> Vec<Scene> {
+    match scene.lighting.mode {
+        LightingMode::Auto => RUNGS.iter().rev().map(|rung| scene.on(rung)).collect(),
+        _ => vec![scene.clone()],
+    }
 }
 
 /// Returns the exact settings, then one for each other value of an "auto" knob that changes

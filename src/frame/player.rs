@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::choice::{Choice, ImpostorChoice};
+use super::choice::{Choice, ImpostorChoice, LightChoice, choose_light};
 use super::game::Game;
 use super::renderer::Renderer;
 use crate::error::{Error, Result};
@@ -15,8 +15,10 @@ pub struct Player {
     pub renderer: Renderer,
     /// The game side.
     pub game: Game,
-    /// The scene; in its `draw` no knob is "auto".
+    /// The scene; in its `draw` and lighting nothing is "auto".
     pub scene: Arc<Scene>,
+    /// The lighting that "auto" has taken.
+    pub light_choice: Option<LightChoice>,
     /// The values that "auto" knobs of the scene's `draw` have taken.
     pub choices: Vec<Choice>,
     /// The choice of `draw.impostors`, if it is "auto".
@@ -37,13 +39,39 @@ impl Player {
     ) -> Result<Player> {
         // Frames of trials are none of the scene's.
         device.count_frames(false);
-        let player = match scene.draw.impostors {
-            Impostors::Auto => with_faster_impostors(device, compiler, &scene, skip),
-            _ => with_given_impostors(device, compiler, scene, skip),
-        };
+        let player = Player::with_choices(device, compiler, scene, skip);
         device.count_frames(true);
         player
     }
+
+    fn with_choices(
+        device: &Device,
+        compiler: &Compiler,
+        scene: Arc<Scene>,
+        skip: bool,
+    ) -> Result<Player> {
+        let (scene, light_choice) = choose_light(device, compiler, scene)?;
+        let player = match scene.draw.impostors {
+            Impostors::Auto => with_faster_impostors(device, compiler, &scene, skip)?,
+            _ => with_given_impostors(device, compiler, scene, skip)?,
+        };
+        Ok(Player { light_choice, ..player })
+    }
+}
+
+/// Makes render and game side of a scene, with nothing chosen.
+pub(super) fn open(
+    device: &Device,
+    compiler: &Compiler,
+    scene: &Arc<Scene>,
+    skip: bool,
+) -> Result<(Renderer, Game)> {
+    let mut renderer = Renderer::new(device, compiler, scene, skip)?;
+    let rest = match scene.threads.simulate {
+        Simulate::Gpu => None,
+        Simulate::Cpu => Some(renderer.generate_now(device)?.0),
+    };
+    Ok((renderer, Game::new(scene.clone(), rest).with_culling(skip)))
 }
 
 /// Makes the player of a scene whose `draw.impostors` is not "auto".
@@ -53,18 +81,14 @@ fn with_given_impostors(
     mut scene: Arc<Scene>,
     skip: bool,
 ) -> Result<Player> {
-    let mut renderer = Renderer::new(device, compiler, &scene, skip)?;
-    let rest = match scene.threads.simulate {
-        Simulate::Gpu => None,
-        Simulate::Cpu => Some(renderer.generate_now(device)?.0),
-    };
-    let mut game = Game::new(scene.clone(), rest).with_culling(skip);
+    let (mut renderer, mut game) = open(device, compiler, &scene, skip)?;
     let (draw, choices) = renderer.choose(device, compiler, &scene, &mut game)?;
     if draw != scene.draw {
         Arc::make_mut(&mut scene).draw = draw;
         game = game.with_scene(scene.clone());
     }
-    Ok(Player { renderer, game, scene, choices, impostor_choice: None })
+    let (light_choice, impostor_choice) = (None, None);
+    Ok(Player { renderer, game, scene, light_choice, choices, impostor_choice })
 }
 
 /// Makes the player with or without impostors, whichever draws the first frames faster.

@@ -15,7 +15,7 @@ use crate::gpu::{Buffer, Device, MemoryUsage};
 use crate::layout::particle::ParticleRecord;
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::{Cloud, CloudSource, Group};
-use crate::model::scene::{Scene, Simulate};
+use crate::model::scene::{LightingMode, Scene, Simulate};
 
 /// How a player's buffers and pipelines have followed an edit of boxes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,7 +37,7 @@ struct SharedRange {
 
 impl Player {
     /// Continues with `scene`, which differs from the player's only in boxes and seeds of clouds
-    /// made from boxes. Its `draw` is replaced by the player's.
+    /// made from boxes. Its `draw` is replaced by the player's, and "auto" lighting, too.
     ///
     /// `touched` has the indices of `scene`'s groups, rising, whose particles may change; all
     /// others must be unchanged relative to their boxes' centers. The next frame runs every pass
@@ -56,6 +56,9 @@ impl Player {
         let mut scene: Arc<Scene> = scene.into();
         if scene.draw != self.scene.draw {
             Arc::make_mut(&mut scene).draw = self.scene.draw;
+        }
+        if scene.lighting.mode == LightingMode::Auto {
+            Arc::make_mut(&mut scene).lighting = self.scene.lighting;
         }
         if !differs_in_boxes_alone(&self.scene, &scene) {
             return Err(Error::usage(

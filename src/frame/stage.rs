@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::choice::{Choice, ImpostorChoice};
+use super::choice::{self, Choice, ImpostorChoice, LightChoice};
 use super::game::Game;
 use super::player::Player;
 use super::renderer::Renderer;
@@ -134,8 +134,10 @@ pub struct Stage {
     pub renderer: Renderer,
     /// The game side.
     pub game: Game,
-    /// The scene; in its `draw` no knob is "auto".
+    /// The scene; in its `draw` and lighting nothing is "auto".
     pub scene: Arc<Scene>,
+    /// The lighting that "auto" has taken.
+    pub light_choice: Option<LightChoice>,
     /// The values that "auto" knobs of the scene's `draw` have taken.
     pub choices: Vec<Choice>,
     /// The choice of `draw.impostors`, if it is "auto".
@@ -167,10 +169,20 @@ impl Stage {
     }
 
     fn with_context(scene: Arc<Scene>, skip: bool, context: GpuContext) -> Result<Stage> {
-        let Player { renderer, game, scene, choices, impostor_choice } =
+        let Player { renderer, game, scene, light_choice, choices, impostor_choice } =
             context.player(scene, skip)?;
         let GpuContext { compiler, device, instance } = context;
-        Ok(Stage { renderer, game, scene, choices, impostor_choice, compiler, device, instance })
+        Ok(Stage {
+            renderer,
+            game,
+            scene,
+            light_choice,
+            choices,
+            impostor_choice,
+            compiler,
+            device,
+            instance,
+        })
     }
 
     fn into_context(self) -> GpuContext {
@@ -182,8 +194,7 @@ impl Stage {
     /// Returns sentences about the values that "auto" knobs have taken, once.
     pub fn take_chosen(&mut self) -> Vec<String> {
         let choices = std::mem::take(&mut self.choices);
-        let of_impostors = self.impostor_choice.take().map(|choice| choice.text());
-        choices.iter().map(Choice::text).chain(of_impostors).collect()
+        choice::texts(self.light_choice.take(), &choices, self.impostor_choice.take())
     }
 
     /// Runs `frames` from a fresh start and calls `on_frame` with each as it ends.

@@ -21,6 +21,8 @@ named! {
         Octaves = "octaves",
         /// Once, and all further scatterings by diffusion.
         Diffusion = "diffusion",
+        /// The one of [`RUNGS`] that a budget allows on the device.
+        Auto = "auto",
     }
 }
 
@@ -33,7 +35,8 @@ impl LightingMode {
             LightingMode::Single
             | LightingMode::Similarity
             | LightingMode::Octaves
-            | LightingMode::Diffusion => true,
+            | LightingMode::Diffusion
+            | LightingMode::Auto => true,
         }
     }
 }
@@ -74,6 +77,53 @@ pub struct DiffusionSettings {
     pub slopes: bool,
 }
 
+/// What "auto" may cost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightBudget {
+    /// Greatest device time of a frame, ms.
+    pub ms: Option<f64>,
+    /// Greatest error against transport: root mean square over pixels of cloud, by their mean.
+    pub error: Option<f64>,
+}
+
+/// A setting that "auto" may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rung {
+    /// How light is computed.
+    pub mode: LightingMode,
+    /// Cells along the density grid's longest axis.
+    pub grid: u32,
+    /// Bounces of "diffusion".
+    pub bounces: u32,
+    /// Whether tiles are composed by slices where `draw.overlap` is "auto".
+    pub is_sliced: bool,
+    /// Error against transport of thin sprites, and of slices: the greatest of the scenes of
+    /// docs/explanation/studies/lighting.md.
+    pub errors: [f64; 2],
+}
+
+/// The settings that "auto" may take: those that no other one beats in time and error there. Each
+/// costs more than the one before, and is nearer to transport.
+pub const RUNGS: [Rung; 8] = [
+    rung(LightingMode::Similarity, (24, 0), false, [0.6, 0.6]),
+    rung(LightingMode::Diffusion, (16, 0), false, [0.31, 0.29]),
+    rung(LightingMode::Diffusion, (24, 0), false, [0.25, 0.22]),
+    rung(LightingMode::Diffusion, (16, 2), false, [0.17, 0.16]),
+    rung(LightingMode::Diffusion, (24, 1), true, [0.16, 0.14]),
+    rung(LightingMode::Diffusion, (24, 2), true, [0.155, 0.11]),
+    rung(LightingMode::Diffusion, (32, 2), true, [0.15, 0.09]),
+    rung(LightingMode::Diffusion, (48, 2), true, [0.145, 0.07]),
+];
+
+const fn rung(
+    mode: LightingMode,
+    (grid, bounces): (u32, u32),
+    is_sliced: bool,
+    errors: [f64; 2],
+) -> Rung {
+    Rung { mode, grid, bounces, is_sliced, errors }
+}
+
 /// Lighting settings of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lighting {
@@ -107,9 +157,17 @@ pub struct Lighting {
     pub octaves: Octaves,
     /// Settings of "diffusion".
     pub diffusion: DiffusionSettings,
+    /// Budget of "auto".
+    pub budget: LightBudget,
 }
 
 impl Lighting {
+    /// Returns the settings with those of a rung.
+    pub fn on(&self, rung: &Rung) -> Lighting {
+        let diffusion = DiffusionSettings { bounces: rung.bounces, ..self.diffusion };
+        Lighting { mode: rung.mode, grid: rung.grid, diffusion, ..*self }
+    }
+
     /// Returns whether the light changes inside of each blob.
     pub fn has_slopes(&self) -> bool {
         self.mode == LightingMode::Diffusion && self.diffusion.slopes
@@ -143,4 +201,19 @@ pub struct Pairs {
     pub levels: u32,
     /// Greatest number of steps of the march through the density grid between two facets.
     pub steps: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_rung_is_nearer_to_transport_than_the_one_before() {
+        for pair in RUNGS.windows(2) {
+            let [thin, sliced] = [0, 1].map(|k| pair[1].errors[k] < pair[0].errors[k]);
+            assert!(thin && sliced, "{pair:?}");
+            assert!(pair[1].is_sliced >= pair[0].is_sliced);
+        }
+        assert!(RUNGS.iter().all(|rung| rung.mode.is_medium()));
+    }
 }

@@ -13,8 +13,8 @@ use super::film::Film;
 use super::grid::GridSpec;
 use super::light::Light;
 pub use super::lighting::{
-    DiffusionSettings, Gather, Lighting, LightingMode, MAX_BOUNCES, MAX_CYCLES, MAX_OCTAVES,
-    MAX_PAIR_LEVELS, Octaves, Pairs,
+    DiffusionSettings, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCES, MAX_CYCLES,
+    MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs, RUNGS, Rung,
 };
 use super::material::Material;
 use super::named::named;
@@ -116,14 +116,36 @@ pub struct Threads {
 
 impl Scene {
     /// Returns the scene with every "auto" of its drawing replaced by the choice that changes
-    /// nothing.
+    /// nothing, and "auto" lighting by the setting nearest to transport.
     pub fn exact(&self) -> Cow<'_, Scene> {
+        if self.lighting.mode == LightingMode::Auto {
+            let nearest = self.on(&RUNGS[RUNGS.len() - 1]);
+            return Cow::Owned(nearest.exact().into_owned());
+        }
         let draw = self.draw.exact();
         if draw == self.draw {
             Cow::Borrowed(self)
         } else {
             Cow::Owned(Scene { draw, ..self.clone() })
         }
+    }
+
+    /// Returns the scene with a rung in place of "auto" lighting. Where `draw.overlap` is "auto",
+    /// too, tiles are composed as the rung says.
+    pub fn on(&self, rung: &Rung) -> Scene {
+        let is_free = self.draw.overlap == Overlap::Auto && self.draw.path == DrawPath::Tiles;
+        let overlap = match rung.is_sliced {
+            _ if !is_free => self.draw.overlap,
+            true => Overlap::Slices,
+            false => Overlap::Thin,
+        };
+        let draw = Draw { overlap, ..self.draw };
+        Scene { lighting: self.lighting.on(rung), draw, ..self.clone() }
+    }
+
+    /// Returns a rung's error against transport in this scene's drawing.
+    pub fn error_of(&self, rung: &Rung) -> f64 {
+        rung.errors[usize::from(self.on(rung).exact().draw.overlap == Overlap::Slices)]
     }
 
     /// Returns the number of particles of all clouds.

@@ -7,7 +7,9 @@ use crate::error::Result;
 use crate::model::basis::Sampling;
 use crate::model::cloud::CloudSource;
 use crate::model::film::{Film, FilmFormat, ToneMap};
-use crate::model::scene::{Gather, Lighting, Pairs, Scene, Simulate, Threading, Threads};
+use crate::model::scene::{
+    Gather, LightBudget, Lighting, Pairs, Scene, Simulate, Threading, Threads,
+};
 use crate::model::sums::Sums;
 use crate::reference::picture::{Pixels, ReferenceKind, TransportParts};
 
@@ -90,6 +92,7 @@ fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
         sun_radius,
         octaves,
         diffusion,
+        budget: LightBudget { ms: None, error: None },
     };
     let film = Film {
         format: FilmFormat::Rgba32f,

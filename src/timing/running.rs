@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::frame::{Amounts, Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
 use crate::gpu::hex;
 use crate::io::image::display_bytes;
-use crate::model::scene::{Draw, LightingMode, Scene};
+use crate::model::scene::{Draw, Lighting, LightingMode, Scene};
 
 /// What a bench tells while it runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,7 +80,7 @@ struct Bench<'a> {
     stop: &'a AtomicBool,
     on: &'a mut dyn FnMut(Event),
     /// The settings that "auto" chose in each case's first block, which hold for all its blocks.
-    drawing: Vec<Option<Draw>>,
+    drawing: Vec<Option<(Draw, Lighting)>>,
     /// The cases that have further rounds.
     open: Vec<bool>,
     /// The round at which the intervals of each case are looked at next.
@@ -123,7 +123,7 @@ impl Bench<'_> {
         };
         self.staged = i_case;
         let stage = self.stage.insert(stage);
-        self.drawing[i_case] = Some(stage.scene.draw);
+        self.drawing[i_case] = Some((stage.scene.draw, stage.scene.lighting));
         // A new stage, or the first one, knows nothing of cold caches.
         let is_new = !is_same || i_block == 0;
         if let Some(bytes) = self.plan.cold_bytes.filter(|_| is_new) {
@@ -291,9 +291,11 @@ fn keep_drawn(
 }
 
 /// Returns the scene with the settings that "auto" chose, if they are known.
-fn with_drawing(scene: &Arc<Scene>, chosen: Option<Draw>) -> Arc<Scene> {
+fn with_drawing(scene: &Arc<Scene>, chosen: Option<(Draw, Lighting)>) -> Arc<Scene> {
     match chosen {
-        Some(draw) if draw != scene.draw => Arc::new(Scene { draw, ..Scene::clone(scene) }),
+        Some((draw, lighting)) if (draw, lighting) != (scene.draw, scene.lighting) => {
+            Arc::new(Scene { draw, lighting, ..Scene::clone(scene) })
+        }
         _ => scene.clone(),
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::farm_plan::{Span, parse_span};
-use super::scene::SceneArgs;
+use super::scene::{BudgetArgs, SceneArgs};
 use super::values::{limited, parse_precision, parse_time_limit};
 use crate::timing::limits::{MOST_BLOCKS, MOST_FRAMES};
 
@@ -158,6 +158,9 @@ pub struct BenchArgs {
     /// Print run.json instead of the table
     #[arg(long)]
     pub json: bool,
+    /// Budget of the light.
+    #[command(flatten)]
+    pub budget: BudgetArgs,
     /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,

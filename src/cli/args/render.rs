@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::scene::SceneArgs;
+use super::scene::{BudgetArgs, SceneArgs};
 use super::values::{parse_positive, parse_samples};
 use crate::reference::picture::ReferenceKind;
 
@@ -73,6 +73,9 @@ pub struct RenderArgs {
     /// Print JSON: hash of the picture, device and passes, or the reference and its error
     #[arg(long)]
     pub json: bool,
+    /// Budget of the light.
+    #[command(flatten)]
+    pub budget: BudgetArgs,
     /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,

@@ -60,6 +60,32 @@ pub struct SceneArgs {
     pub verbose: bool,
 }
 
+/// Budget of the light, of the commands that draw.
+#[derive(Debug, Clone, ClapArgs)]
+pub struct BudgetArgs {
+    /// Light clouds as near to transport as a frame of MS milliseconds of device time allows:
+    /// lighting.mode = "auto" with lighting.budget_ms
+    #[arg(long, value_name = "MS", value_parser = parse_positive, help_heading = "Scene")]
+    pub budget_ms: Option<f64>,
+    /// Light clouds by the fastest way whose error against transport is at most this share of their
+    /// light: lighting.mode = "auto" with lighting.budget_error
+    #[arg(long, value_name = "SHARE", value_parser = parse_positive, help_heading = "Scene")]
+    pub budget_error: Option<f64>,
+}
+
+impl BudgetArgs {
+    /// Puts the budget before other settings, which may replace it.
+    pub fn put_before(&self, set: &mut Vec<String>) {
+        let ms = self.budget_ms.map(|ms| format!("lighting.budget_ms={ms}"));
+        let error = self.budget_error.map(|error| format!("lighting.budget_error={error}"));
+        let budget: Vec<String> = ms.into_iter().chain(error).collect();
+        if !budget.is_empty() {
+            let all = std::iter::once("lighting.mode=\"auto\"".to_owned()).chain(budget);
+            set.splice(0..0, all);
+        }
+    }
+}
+
 /// Arguments of `nimbus devices`.
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "All devices, and what the driver's compiler makes of two scenes:\n  \

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
-use super::scene::SceneArgs;
+use super::scene::{BudgetArgs, SceneArgs};
 use super::values::{at_least_one, limited};
 use crate::gpu::PresentMode;
 
@@ -36,6 +36,9 @@ pub struct ViewArgs {
     /// Print the times of the loops that ran as JSON when the window is closed
     #[arg(long)]
     pub json: bool,
+    /// Budget of the light.
+    #[command(flatten)]
+    pub budget: BudgetArgs,
     /// Arguments of every command with a scene.
     #[command(flatten)]
     pub options: SceneArgs,

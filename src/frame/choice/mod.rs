@@ -1,9 +1,10 @@
-//! The choice of "auto" knobs of a scene's `draw`: the scene's first frame is drawn with each
+//! The choice of "auto" lighting, and of "auto" knobs of a scene's `draw`: the scene's first frame is drawn with each
 //! candidate value, timed, and compared with the exact picture. A further knob is a row in
 //! [`knobs::KNOBS`].
 
 mod impostors;
 mod knobs;
+mod light;
 mod rule;
 mod trial;
 
@@ -11,6 +12,8 @@ pub use impostors::ImpostorChoice;
 #[cfg(test)]
 pub use knobs::tests::ASKED;
 pub use knobs::toml_name;
+pub use light::LightChoice;
+pub(super) use light::choose_light;
 pub use rule::{Candidate, Choice};
 
 use super::game::Game;
@@ -20,6 +23,16 @@ use crate::gpu::{Compiler, Device};
 use crate::model::scene::{Draw, Scene};
 use knobs::{Changes, KNOBS, Knob};
 use trial::Trial;
+
+/// Returns what "auto" settings have taken as sentences for users.
+pub fn texts(
+    light: Option<LightChoice>,
+    choices: &[Choice],
+    impostors: Option<ImpostorChoice>,
+) -> Vec<String> {
+    let (light, impostors) = (light.map(|c| c.text()), impostors.map(|c| c.text()));
+    light.into_iter().chain(choices.iter().map(Choice::text)).chain(impostors).collect()
+}
 
 impl Renderer {
     /// Chooses a value for every "auto" knob of `scene`, which `game` plays, and returns the chosen

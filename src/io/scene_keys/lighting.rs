@@ -8,8 +8,8 @@ use crate::io::document::section::Section;
 use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, min_step};
 use crate::model::scene::{
-    DiffusionSettings, Gather, Lighting, LightingMode, MAX_BOUNCES, MAX_CYCLES, MAX_OCTAVES,
-    MAX_PAIR_LEVELS, Octaves, Pairs,
+    DiffusionSettings, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCES, MAX_CYCLES,
+    MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs,
 };
 use crate::model::sums::{Precision, Summation, Sums};
 
@@ -20,7 +20,9 @@ keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
     /// How light is computed. "none": particles have their colours as given. "first": the first
     /// reflection, C (15); "two-reflection": and the second, C (16). In the others clouds are a
     /// medium (model.md, 18). Light is scattered once in "single", "similarity" (without what goes
-    /// forward) and "octaves", and in "diffusion" many times.
+    /// forward) and "octaves", and in "diffusion" many times. "auto" takes the setting nearest to
+    /// transport that budget_ms and budget_error allow, or else one that takes no longer than
+    /// "first" on this device, with grid and bounces.
     mode: choice("two-reflection", &LightingMode::NAMES);
     /// Cells along the longest axis of the density grid.
     grid: integer(64, MIN_CELLS, MAX_CELLS);
@@ -51,6 +53,7 @@ keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
         "degree";
     octaves => octaves(s)?;
     diffusion => diffusion(s)?;
+    budget => budget(s)?;
 }}
 
 keys! { OCTAVES: fn octaves(s) -> Octaves { Octaves;
@@ -76,6 +79,17 @@ keys! { DIFFUSION: fn diffusion(s) -> DiffusionSettings { DiffusionSettings;
     slopes: flag(true);
 }}
 
+keys! { BUDGET: fn budget(s) -> LightBudget { LightBudget;
+    /// Greatest device time of a frame with mode "auto"; 0: any.
+    ms ["budget_ms"]: number(0.0, Bounds::Within(0.0, 1e9)).map(given), "ms";
+    /// Greatest error of mode "auto" against transport, over pixels of cloud by their mean; 0: any.
+    error ["budget_error"]: number(0.0, Bounds::Within(0.0, 1e3)).map(given);
+}}
+
+fn given(budget: f64) -> Option<f64> {
+    Some(budget).filter(|budget| *budget > 0.0)
+}
+
 keys! { PAIRS: fn pairs(s) -> Pairs { Pairs;
     /// Share of its distance above which the width of an emitter quarters it.
     size ["pair_size"]: number(0.5, Bounds::Within(0.01, 100.0));
@@ -93,7 +107,7 @@ keys! { SUMS: fn sums(s) -> Sums { Sums;
 }}
 
 /// Keys of `[lighting]`.
-pub const KEYS: [Keys; 5] = [LIGHTING, PAIRS, SUMS, OCTAVES, DIFFUSION];
+pub const KEYS: [Keys; 6] = [LIGHTING, PAIRS, SUMS, OCTAVES, DIFFUSION, BUDGET];
 
 /// Reads `[lighting]`. `of_materials` are the exponents n_s of the scene's materials.
 pub fn read_lighting(root: &mut Section, of_materials: &[f64]) -> Result<Lighting> {

@@ -85,8 +85,9 @@ impl Knob {
             Knob::Threading => cycle(&mut threads.mode, &[Threading::Serial, Threading::Parallel]),
             Knob::Simulate => cycle(&mut threads.simulate, &[Simulate::Gpu, Simulate::Cpu]),
             Knob::Lighting => {
-                use LightingMode::{First, None, TwoReflection};
-                cycle(&mut lighting.mode, &[None, First, TwoReflection]);
+                use LightingMode::{Diffusion, First, None, Similarity, TwoReflection};
+                let all = [None, First, TwoReflection, Similarity, Diffusion];
+                cycle(&mut lighting.mode, &all);
             }
             Knob::Bases => cycle(&mut lighting.bases, &[2, 4, 8, 16, 32]),
             Knob::Gather => {

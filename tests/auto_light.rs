@@ -71,13 +71,14 @@ fn the_fastest_of_those_near_enough_is_taken() {
 #[test]
 fn the_nearest_in_time_is_taken() {
     let any = check(&scene(&["lighting.budget_ms=1e6"]));
-    assert_eq!(any.taken, RUNGS.len() - 1);
+    assert!(any.errors.iter().all(|error| any.errors[any.taken] <= *error));
     assert!(any.times_ms.iter().all(|ms| ms.is_some_and(|ms| ms > 0.0)));
     // A time that none has: the first one, which is not near enough to time another.
     let none = check(&scene(&["lighting.budget_ms=1e-6"]));
     assert_eq!((none.taken, none.times_ms[1]), (0, None));
     // Slices where the drawing leaves it free.
     let free = check(&scene(&["lighting.budget_ms=1e6", "draw.overlap='auto'"]));
+    assert_eq!(free.taken, RUNGS.len() - 1);
     assert_eq!(free.errors[free.taken], RUNGS[free.taken].errors[1]);
 }
 

@@ -34,7 +34,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let waiting = spinner("inspecting", args.options.quiet);
     // The text is complete before any of it is printed.
     if args.reference {
-        let scene = &scene;
+        let scene = &*scene.lit();
         let text = match (args.particles, args.facets) {
             (true, _) => output::rows(&inspect::particles_reference(scene, i_frame)?, args.json),
             (_, true) => facets(args, scene, inspect::facets_reference(scene, i_frame)?),

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::io::console::say;
 use crate::io::image::{self, image_hash};
 use crate::io::layers::{self, CHANNELS};
-use crate::model::scene::{Draw, LightingMode, RUNGS, Scene};
+use crate::model::scene::{Draw, Scene};
 use crate::reference::picture::{
     self, BlobModel, DrawnPicture, Enough, Grown, MAX_SAMPLES, MeanPicture, Pixels, ReferenceKind,
     ReferenceRequest, SampleSums, check_memory, drawn_as_set, layers_as_set, transport_layers,
@@ -33,9 +33,7 @@ struct Computed {
 /// # Errors
 /// Fails if the scene has no such reference or the file cannot be written.
 pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -> Result<()> {
-    let nearest = &RUNGS[RUNGS.len() - 1];
-    let is_auto = scene.lighting.mode == LightingMode::Auto;
-    let scene = &if is_auto { scene.on(nearest) } else { scene.clone() };
+    let scene = &*scene.lit();
     let film = scene.film;
     let n_pixels = u64::from(film.width) * u64::from(film.height);
     let n_samples = args.samples.unwrap_or(kind.usual_samples());

@@ -98,21 +98,20 @@ pub struct Rung {
     /// Whether tiles are composed by slices where `draw.overlap` is "auto".
     pub is_sliced: bool,
     /// Error against transport of thin sprites, and of slices: the greatest of the scenes of
-    /// docs/explanation/studies/lighting.md.
+    /// docs/explanation/studies.md, "Clouds against transport".
     pub errors: [f64; 2],
 }
 
-/// The settings that "auto" may take: those that no other one beats in time and error there. Each
-/// costs more than the one before, and is nearer to transport.
-pub const RUNGS: [Rung; 8] = [
-    rung(LightingMode::Similarity, (24, 0), false, [0.6, 0.6]),
+/// The settings that "auto" may take: those that no other one beats in time and error in most of
+/// these scenes. Each costs more than the one before. In slices it is nearer to transport.
+pub const RUNGS: [Rung; 7] = [
+    rung(LightingMode::Similarity, (24, 0), false, [0.94, 0.94]),
     rung(LightingMode::Diffusion, (16, 0), false, [0.31, 0.29]),
     rung(LightingMode::Diffusion, (24, 0), false, [0.25, 0.22]),
-    rung(LightingMode::Diffusion, (16, 2), false, [0.17, 0.16]),
-    rung(LightingMode::Diffusion, (24, 1), true, [0.16, 0.14]),
-    rung(LightingMode::Diffusion, (24, 2), true, [0.155, 0.11]),
-    rung(LightingMode::Diffusion, (32, 2), true, [0.15, 0.09]),
-    rung(LightingMode::Diffusion, (48, 2), true, [0.145, 0.07]),
+    rung(LightingMode::Diffusion, (32, 0), true, [0.22, 0.20]),
+    rung(LightingMode::Diffusion, (24, 1), true, [0.20, 0.16]),
+    rung(LightingMode::Diffusion, (24, 2), true, [0.22, 0.13]),
+    rung(LightingMode::Diffusion, (32, 2), true, [0.25, 0.11]),
 ];
 
 const fn rung(
@@ -208,10 +207,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_rung_is_nearer_to_transport_than_the_one_before() {
+    fn in_slices_each_rung_is_nearer_to_transport_than_the_one_before() {
         for pair in RUNGS.windows(2) {
-            let [thin, sliced] = [0, 1].map(|k| pair[1].errors[k] < pair[0].errors[k]);
-            assert!(thin && sliced, "{pair:?}");
+            assert!(pair[1].errors[1] < pair[0].errors[1], "{pair:?}");
             assert!(pair[1].is_sliced >= pair[0].is_sliced);
         }
         assert!(RUNGS.iter().all(|rung| rung.mode.is_medium()));

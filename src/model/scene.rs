@@ -118,15 +118,16 @@ impl Scene {
     /// Returns the scene with every "auto" of its drawing replaced by the choice that changes
     /// nothing, and "auto" lighting by the setting nearest to transport.
     pub fn exact(&self) -> Cow<'_, Scene> {
-        if self.lighting.mode == LightingMode::Auto {
-            let nearest = self.on(&RUNGS[RUNGS.len() - 1]);
-            return Cow::Owned(nearest.exact().into_owned());
-        }
-        let draw = self.draw.exact();
-        if draw == self.draw {
-            Cow::Borrowed(self)
-        } else {
-            Cow::Owned(Scene { draw, ..self.clone() })
+        let lit = self.lit();
+        let draw = lit.draw.exact();
+        if draw == lit.draw { lit } else { Cow::Owned(Scene { draw, ..lit.into_owned() }) }
+    }
+
+    /// Returns the scene with the setting nearest to transport in place of "auto" lighting.
+    pub fn lit(&self) -> Cow<'_, Scene> {
+        match self.lighting.mode {
+            LightingMode::Auto => Cow::Owned(self.on(&RUNGS[RUNGS.len() - 1])),
+            _ => Cow::Borrowed(self),
         }
     }
 

@@ -85,6 +85,7 @@ impl FrameReference {
         time_s: f64,
         on_facet: &(dyn Fn(usize) + Sync),
     ) -> Result<FrameReference> {
+        let scene = &*scene.lit();
         let mut frame = FrameReference::unlit(scene, time_s)?;
         if scene.lighting.mode == LightingMode::None {
             return Ok(frame);
@@ -114,6 +115,7 @@ impl FrameReference {
         time_s: f64,
         take: impl FnOnce(&FrameReference, &SecondOf<'_>) -> T,
     ) -> Result<T> {
+        let scene = &*scene.lit();
         let mut frame = FrameReference::unlit(scene, time_s)?;
         Ok(match scene.lighting.mode {
             LightingMode::TwoReflection => frame.light(scene, take),

@@ -1,12 +1,14 @@
 //! Measures the error of the view while it stands still: requests the reference, asks the render
 //! thread for pictures, and compares the two.
 
+use std::borrow::Cow;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use super::render_links::Readback;
 use super::status::{ErrorStatus, ViewStatus};
 use super::view_state::ViewState;
+use crate::model::scene::Scene;
 use crate::studies::picture_error::PictureError;
 use crate::studies::reference_cache::default_folder;
 use crate::viewer::error_probe::{ErrorProbe, ProbeRequest, ProbeStatus, ReferencePicture};
@@ -108,9 +110,16 @@ impl ErrorMeter {
     }
 }
 
+fn lit(scene: &Arc<Scene>) -> Arc<Scene> {
+    match scene.lit() {
+        Cow::Borrowed(_) => scene.clone(),
+        Cow::Owned(lit) => Arc::new(lit),
+    }
+}
+
 fn request(state: &ViewState, view: &View) -> ProbeRequest {
     ProbeRequest {
-        scene: state.scene.clone(),
+        scene: lit(&state.scene),
         position: view.camera.position(),
         target: view.camera.target(),
         time_s: state.scene.time.at(view.i_frame),

@@ -2,6 +2,17 @@
 // sky.glsl, medium.glsl, push.grid and push.weakened. Of each cell it needs extinction_of(c), and
 // sent_along(c, w): 4 pi times what it sends out along w.
 
+// What a depth lets through, by channel where they differ.
+#if N_SETS == 1
+#define KEPT float
+float kept_by(float depth) {
+    return depth == 0.0 ? 1.0 : exp(-min(push.weakened.x * depth, OPAQUE_DEPTH));
+}
+#else
+#define KEPT vec3
+vec3 kept_by(float depth) { return through(push.weakened * depth); }
+#endif
+
 // Returns 4 pi times the radiance along w in the middle of a cell.
 vec3 radiance_along(Level level, ivec3 at, vec3 w) {
     vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
@@ -12,13 +23,14 @@ vec3 radiance_along(Level level, ivec3 at, vec3 w) {
     ivec3 stride = turn * strides_of(level);
     ivec3 left = mix(at, ivec3(level.n_cells) - 1 - at, greaterThan(turn, ivec3(0)));
     int c = index_of(level, at);
-    vec3 sum = vec3(0.0), passed = vec3(1.0);
+    vec3 sum = vec3(0.0);
+    KEPT passed = KEPT(1.0);
     float done = 0.0;
     uint axis = 0u;
     for (bool is_inside = true; is_inside;) {
         axis = face.x <= face.y && face.x <= face.z ? 0u : face.y <= face.z ? 1u : 2u;
         float to = face[axis];
-        vec3 kept = through(push.weakened * (extinction_of(c) * (to - done)));
+        KEPT kept = kept_by(extinction_of(c) * (to - done));
         sum += passed * (1.0 - kept) * sent_along(c, w);
         passed *= kept;
         done = to;

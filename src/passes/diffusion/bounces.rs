@@ -83,7 +83,7 @@ impl Bounces {
         n_cells: u64,
         (n_sets, has_solids): (u32, bool),
     ) -> Result<Bounces> {
-        let solids = [("SOLIDS", u32::from(has_solids))];
+        let solids = [("N_SETS", n_sets), ("SOLIDS", u32::from(has_solids))];
         let kernel = |name: &str, fields: &_, macros: &[(&str, u32)]| {
             Kernel::with_macros(device, compiler, name, fields, &[], macros)
         };

@@ -1,5 +1,5 @@
-//! `lighting.mode = "auto"`: a budget of time or error takes a setting of the list, which draws what
-//! a scene that names it draws, and is told and kept.
+//! Auto light: a budget of time or error takes a setting of the list. A scene that names the setting
+//! draws the same picture. The choice is told and kept.
 
 mod harness;
 
@@ -62,7 +62,7 @@ fn the_fastest_of_those_near_enough_is_taken() {
         let times = choice.times_ms.iter().zip(&choice.errors);
         let least = times.filter(|(_, e)| **e <= most).filter_map(|(ms, _)| *ms);
         assert_eq!(choice.times_ms[choice.taken], least.min_by(f64::total_cmp));
-        // Those that err more are not even timed.
+        // Rungs that err more are not even timed.
         let is_left_out = |i: usize| choice.errors[i] > most && choice.times_ms[i].is_none();
         assert!((0..RUNGS.len()).all(|i| choice.errors[i] <= most || is_left_out(i)));
     }

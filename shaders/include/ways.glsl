@@ -2,7 +2,7 @@
 // sky.glsl, medium.glsl, push.grid and push.weakened. Of each cell it needs extinction_of(c), and
 // sent_along(c, w): 4 pi times what it sends out along w.
 
-// What a depth lets through, by channel where they differ.
+// Returns the share of light that passes a depth, by channel where channels differ.
 #if N_SETS == 1
 #define KEPT float
 float kept_by(float depth) {

@@ -40,6 +40,7 @@ mod render;
 mod renderer;
 mod reshape;
 pub mod serial;
+mod sides;
 mod solids;
 mod stage;
 mod staging;

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use super::choice::{Choice, ImpostorChoice, LightChoice, choose_light};
 use super::game::Game;
 use super::renderer::Renderer;
+use super::sides::open;
 use crate::error::{Error, Result};
 use crate::gpu::{Compiler, Device};
-use crate::model::scene::{Impostors, Scene, Simulate};
+use crate::model::scene::{Impostors, Scene};
 
 /// A scene's buffers and pipelines on a device, and its game.
 pub struct Player {
@@ -57,21 +58,6 @@ impl Player {
         };
         Ok(Player { light_choice, ..player })
     }
-}
-
-/// Makes render and game side of a scene, with nothing chosen.
-pub(super) fn open(
-    device: &Device,
-    compiler: &Compiler,
-    scene: &Arc<Scene>,
-    skip: bool,
-) -> Result<(Renderer, Game)> {
-    let mut renderer = Renderer::new(device, compiler, scene, skip)?;
-    let rest = match scene.threads.simulate {
-        Simulate::Gpu => None,
-        Simulate::Cpu => Some(renderer.generate_now(device)?.0),
-    };
-    Ok((renderer, Game::new(scene.clone(), rest).with_culling(skip)))
 }
 
 /// Makes the player of a scene whose `draw.impostors` is not "auto".

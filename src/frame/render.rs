@@ -1,5 +1,5 @@
 //! The whole frame on one page: every dispatch and draw call in order, with its buffers.
-//! Those of the light have a page of their own.
+//! The light has a page of its own.
 
 mod light;
 

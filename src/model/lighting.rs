@@ -77,7 +77,7 @@ pub struct DiffusionSettings {
     pub slopes: bool,
 }
 
-/// What "auto" may cost.
+/// Limits of the choice of "auto".
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightBudget {
     /// Greatest device time of a frame, ms.

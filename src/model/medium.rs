@@ -236,6 +236,7 @@ mod tests {
         sun_radius: 0.005,
         octaves: ONCE,
         diffusion: crate::model::scene::DiffusionSettings { cycles: 1, bounces: 0, slopes: false },
+        budget: crate::model::scene::LightBudget { ms: None, error: None },
     };
 
     fn lighting(mode: LightingMode) -> Lighting {

@@ -30,8 +30,8 @@ const FROM_BELOW: &str = "[[light]]\nkind = 'sky'\nirradiance = [0.8, 0.87, 1]\n
     [[light]]\nkind = 'point'\nposition = [0.3, -2.6, 0.2]\nintensity = [0.4, 0.2, 0.1]\n";
 
 /// Scenes by name: coloured balls among lamps and surfaces, droplets in facets of several, flat
-/// blobs over one another, boxes, "opaque" ones whose cells are; "floors" whose lamps no cloud hides, in the box of the grid, near
-/// it, and far from it.
+/// blobs over one another, boxes, boxes with "opaque" cells; "floors" whose lamps no cloud hides, in
+/// the box of the grid, near it, and far from it.
 pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
     let dir = tempfile::tempdir().expect("a folder");
     let write = |file: &str, text: &str| std::fs::write(dir.path().join(file), text).expect("room");
@@ -192,7 +192,7 @@ pub fn check(gpu: &Gpu, name: &str, mode: &str) {
     };
     let off = [
         of_solids,
-        // What gets through opaque clouds errs by more than that share of itself.
+        // Light that gets through opaque clouds errs by more than that share of itself.
         if name == "opaque" { 0.0 } else { apart(&found.direct, &truth.direct) },
         apart(&found.radiance, &truth.radiance),
         slopes_apart(&scene, &found, &truth),

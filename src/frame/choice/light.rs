@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::knobs::toml_name;
 use crate::error::{Error, Result};
-use crate::frame::player::open;
+use crate::frame::sides::open;
 use crate::gpu::{Compiler, Device};
 use crate::model::scene::{LightBudget, Lighting, LightingMode, RUNGS, Rung, Scene};
 
@@ -186,7 +186,7 @@ mod tests {
         thin.errors[4] = 0.01;
         assert_eq!((thin.allowed(None), thin.allowed(Some(4.5))), (4, 3));
         assert_eq!(allowed(&times, None, Some(1e-9)), n - 1);
-        // What does not fit the device is not taken.
+        // A rung that does not fit the device is not taken.
         let mut few = times;
         few[2] = None;
         assert_eq!(allowed(&few, Some(3.5), None), 1);

@@ -1,6 +1,6 @@
-//! The choice of "auto" lighting, and of "auto" knobs of a scene's `draw`: the scene's first frame is drawn with each
-//! candidate value, timed, and compared with the exact picture. A further knob is a row in
-//! [`knobs::KNOBS`].
+//! The choice of "auto" lighting, and of "auto" knobs of a scene's `draw`. The scene's first frame
+//! is drawn with each candidate value, timed, and compared with the exact picture. A further knob
+//! is a row in [`knobs::KNOBS`].
 
 mod impostors;
 mod knobs;

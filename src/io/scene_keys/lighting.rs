@@ -20,9 +20,9 @@ keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
     /// How light is computed. "none": particles have their colours as given. "first": the first
     /// reflection, C (15); "two-reflection": and the second, C (16). In the others clouds are a
     /// medium (model.md, 18). Light is scattered once in "single", "similarity" (without what goes
-    /// forward) and "octaves", and in "diffusion" many times. "auto" takes the setting nearest to
-    /// transport that budget_ms and budget_error allow, or else one that takes no longer than
-    /// "first" on this device, with grid and bounces.
+    /// forward) and "octaves", and in "diffusion" many times. "auto" takes the mode, grid and
+    /// bounces nearest to transport within budget_ms and budget_error. Without a budget these take
+    /// no longer than "first" on this device.
     mode: choice("two-reflection", &LightingMode::NAMES);
     /// Cells along the longest axis of the density grid.
     grid: integer(64, MIN_CELLS, MAX_CELLS);

@@ -66,10 +66,10 @@ float chord_of(vec3 toward) {
     return min(across.x, min(across.y, across.z));
 }
 
-// Light of a beam in a cell.
+// Light of a beam in a cell: its mean, and the share of what is scattered that would make as much
+// phi deep in the cloud if it were scattered at the cell's middle.
 struct InCell {
     vec3 mean;
-    // Light at the middle that does what scattered light does where it is, over that light.
     vec3 share;
 };
 

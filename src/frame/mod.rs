@@ -54,7 +54,7 @@ mod visibility;
 mod work;
 
 pub use buffers::n_cells;
-pub use choice::{Candidate, Choice, ImpostorChoice, LightChoice, texts, toml_name};
+pub use choice::{Candidate, Choice, ImpostorChoice, LightChoice, chosen_texts, toml_name};
 pub use chunked_sprites::{ChunkCount, ChunkedSprites};
 pub use counts::Counts;
 pub use features::{

@@ -194,7 +194,7 @@ impl Stage {
     /// Returns sentences about the values that "auto" knobs have taken, once.
     pub fn take_chosen(&mut self) -> Vec<String> {
         let choices = std::mem::take(&mut self.choices);
-        choice::texts(self.light_choice.take(), &choices, self.impostor_choice.take())
+        choice::chosen_texts(self.light_choice.take(), &choices, self.impostor_choice.take())
     }
 
     /// Runs `frames` from a fresh start and calls `on_frame` with each as it ends.

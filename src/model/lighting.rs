@@ -105,9 +105,9 @@ pub struct Rung {
 /// The settings that "auto" may take: those that no other one beats in time and error in most of
 /// these scenes. Each costs more than the one before. In slices it is nearer to transport.
 pub const RUNGS: [Rung; 7] = [
-    rung(LightingMode::Similarity, (24, 0), false, [0.94, 0.94]),
+    rung(LightingMode::Similarity, (24, 0), false, [1.01, 1.03]),
     rung(LightingMode::Diffusion, (16, 0), false, [0.31, 0.29]),
-    rung(LightingMode::Diffusion, (24, 0), false, [0.25, 0.22]),
+    rung(LightingMode::Diffusion, (24, 0), false, [0.24, 0.21]),
     rung(LightingMode::Diffusion, (32, 0), true, [0.22, 0.20]),
     rung(LightingMode::Diffusion, (24, 1), true, [0.20, 0.16]),
     rung(LightingMode::Diffusion, (24, 2), true, [0.22, 0.13]),

@@ -131,22 +131,26 @@ impl Scene {
         }
     }
 
-    /// Returns the scene with a rung in place of "auto" lighting. Where `draw.overlap` is "auto",
-    /// too, tiles are composed as the rung says.
+    /// Returns the scene with a rung in place of "auto" lighting.
     pub fn on(&self, rung: &Rung) -> Scene {
+        Scene { lighting: self.lighting.on(rung), draw: self.draw_on(rung), ..self.clone() }
+    }
+
+    /// Returns the drawing with a rung. Where `draw.overlap` is "auto", tiles are composed as the
+    /// rung says.
+    fn draw_on(&self, rung: &Rung) -> Draw {
         let is_free = self.draw.overlap == Overlap::Auto && self.draw.path == DrawPath::Tiles;
         let overlap = match rung.is_sliced {
             _ if !is_free => self.draw.overlap,
             true => Overlap::Slices,
             false => Overlap::Thin,
         };
-        let draw = Draw { overlap, ..self.draw };
-        Scene { lighting: self.lighting.on(rung), draw, ..self.clone() }
+        Draw { overlap, ..self.draw }
     }
 
     /// Returns a rung's error against transport in this scene's drawing.
     pub fn error_of(&self, rung: &Rung) -> f64 {
-        rung.errors[usize::from(self.on(rung).exact().draw.overlap == Overlap::Slices)]
+        rung.errors[usize::from(self.draw_on(rung).exact().overlap == Overlap::Slices)]
     }
 
     /// Returns the number of particles of all clouds.

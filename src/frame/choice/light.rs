@@ -41,13 +41,16 @@ impl LightChoice {
             Some(format!("{} takes {ms:.2} ms (error {})", name(&RUNGS[i]), self.errors[i]))
         };
         let missed = self.budget.error.is_some_and(|most| self.errors[self.taken] > most);
-        let missed = if missed { ", which none here has" } else { "" };
+        let missed = if missed { ", an error that none in time has" } else { "" };
         let times: Vec<String> = (0..RUNGS.len()).filter_map(of).collect();
         let of_times = if times.is_empty() { "" } else { ": a frame with " };
+        let limits = match budget.is_empty() {
+            true => String::new(),
+            false => format!(" ({}{missed})", budget.join(", ")),
+        };
         format!(
-            "lighting.mode = \"auto\" took {} ({}{missed}){of_times}{}",
+            "lighting.mode = \"auto\" took {}{limits}{of_times}{}",
             name(&RUNGS[self.taken]),
-            budget.join(", "),
             times.join(", ")
         )
     }
@@ -96,6 +99,9 @@ pub(in crate::frame) fn choose_light(
     if scene.lighting.mode != LightingMode::Auto {
         return Ok((scene, None));
     }
+    if scene.n_particles() == 0 {
+        return Ok((Arc::new(scene.lit().into_owned()), None));
+    }
     let LightBudget { ms, error } = scene.lighting.budget;
     let mut choice = LightChoice {
         taken: RUNGS.len() - 1,
@@ -104,38 +110,36 @@ pub(in crate::frame) fn choose_light(
         first_ms: None,
         budget: scene.lighting.budget,
     };
-    if scene.n_particles() > 0 {
-        let time = |scene: Scene| frame_ms(device, compiler, scene);
-        if ms.is_none() && error.is_none() {
-            // As fast as the paper's sprites.
-            let plain = scene.on(&RUNGS[0]);
-            let lighting = Lighting { mode: LightingMode::First, ..scene.lighting };
-            choice.first_ms = time(Scene { lighting, ..plain })?;
-        }
-        let limit_ms = ms.or(choice.first_ms);
-        let nearest = choice.errors.iter().copied().fold(f64::INFINITY, f64::min);
-        // Others serve where none of those within the error is in time.
-        let is_needed = |of: f64| limit_ms.is_some() || error.is_none_or(|most| of <= most);
-        for (i, rung) in RUNGS.iter().enumerate() {
-            if !is_needed(choice.errors[i]) && choice.errors[i] > nearest {
-                continue;
-            }
-            let ms = time(scene.on(rung))?;
-            choice.times_ms[i] = ms;
-            // The next ones take longer.
-            if ms.zip(limit_ms).is_some_and(|(ms, limit)| ms > 2.0 * limit) {
-                break;
-            }
-        }
-        choice.taken = choice.allowed(limit_ms);
+    let time = |scene: Scene| frame_ms(device, compiler, scene);
+    if ms.is_none() && error.is_none() {
+        // As fast as the paper's sprites.
+        let plain = scene.on(&RUNGS[0]);
+        let lighting = Lighting { mode: LightingMode::First, ..scene.lighting };
+        choice.first_ms = time(Scene { lighting, ..plain })?;
     }
+    let limit_ms = ms.or(choice.first_ms);
+    let nearest = choice.errors.iter().copied().fold(f64::INFINITY, f64::min);
+    // Others serve where none of those within the error is in time.
+    let is_needed = |of: f64| limit_ms.is_some() || error.is_none_or(|most| of <= most);
+    for (i, rung) in RUNGS.iter().enumerate() {
+        if !is_needed(choice.errors[i]) && choice.errors[i] > nearest {
+            continue;
+        }
+        let ms = time(scene.on(rung))?;
+        choice.times_ms[i] = ms;
+        // The next ones take longer.
+        if ms.zip(limit_ms).is_some_and(|(ms, limit)| ms > 2.0 * limit) {
+            break;
+        }
+    }
+    choice.taken = choice.allowed(limit_ms);
     Ok((Arc::new(scene.on(&RUNGS[choice.taken])), Some(choice)))
 }
 
 /// Returns the least device time of a scene's first frame, ms, as if everything moved; wall time
 /// without timestamps. `None` if it does not fit the device.
 fn frame_ms(device: &Device, compiler: &Compiler, scene: Scene) -> Result<Option<f64>> {
-    let scene = Arc::new(scene.exact().into_owned());
+    let scene = Arc::new(Scene { draw: scene.draw.exact(), ..scene });
     let (mut renderer, mut game) = match open(device, compiler, &scene, true) {
         Err(Error::Limit { .. }) => return Ok(None),
         opened => opened?,

@@ -25,7 +25,7 @@ use knobs::{Changes, KNOBS, Knob};
 use trial::Trial;
 
 /// Returns what "auto" settings have taken as sentences for users.
-pub fn texts(
+pub fn chosen_texts(
     light: Option<LightChoice>,
     choices: &[Choice],
     impostors: Option<ImpostorChoice>,

@@ -112,8 +112,8 @@ fn chord(edges: DVec3, toward: DVec3) -> f64 {
     (edges / toward.abs().max(DVec3::splat(1e-6))).min_element()
 }
 
-/// Returns the mean light of a beam in a cell, and the share of it that does at the middle what
-/// scattered light does where it is.
+/// Returns the mean light of a beam in a cell, and the share of what is scattered that would make
+/// as much φ deep in the cloud if it were scattered at the cell's middle.
 ///
 /// `front` is the optical depth before the cell, `own` that from face to face, and `counted` what
 /// of it counts for diffusion. `weakened` and `kept` are the factors of the depth that weakens the

@@ -9,7 +9,7 @@ use super::render_links::{RenderEvent, RenderLinks};
 use super::shown_times::{ShownClock, ShownTimes};
 use super::view_state::{Variant, ViewState};
 use crate::error::{Error, Result};
-use crate::frame::{DeviceChoice, Player, texts};
+use crate::frame::{DeviceChoice, Player, chosen_texts};
 use crate::gpu::{Compiler, Instance, PresentMode, Surface};
 use crate::model::film::Film;
 use crate::model::scene::Scene;
@@ -260,7 +260,7 @@ impl SceneRenderer {
     fn play(&mut self, active: ActiveScene, state: &ViewState) -> Result<()> {
         let ActiveScene { draw, player, variant } = active;
         let Player { mut renderer, game, scene, light_choice, choices, impostor_choice } = player;
-        let chosen = texts(light_choice, &choices, impostor_choice);
+        let chosen = chosen_texts(light_choice, &choices, impostor_choice);
         chosen.into_iter().for_each(|text| self.links.note(text));
         let (shared, cameras) = (self.links.state.clone(), CameraQueue::default());
         let queue = cameras.clone();

@@ -98,7 +98,7 @@ pub struct Rung {
     /// Whether tiles are composed by slices where `draw.overlap` is "auto".
     pub is_sliced: bool,
     /// Error against transport of thin sprites, and of slices: the greatest of the scenes of
-    /// docs/explanation/studies.md, "Clouds against transport".
+    /// docs/explanation/studies.md, "Clouds against transport", but katrina, where all err more.
     pub errors: [f64; 2],
 }
 

@@ -145,7 +145,8 @@ pub struct MeanMedium {
     pub straight: f64,
 }
 
-/// Transport mean free paths across a cell beyond which it counts as no denser.
+/// Transport mean free paths across a cell beyond which it counts as no denser. With 4, light grows
+/// from bounce to bounce in clouds of optical depth 10⁴.
 const MOST_DEPTH: f64 = 2.0;
 /// Least 1 − ϖg of which that depth is reckoned.
 const LEAST_KEPT: f64 = 1e-6;

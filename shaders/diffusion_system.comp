@@ -1,5 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 #include "each.glsl"
 #include "light.glsl"
@@ -60,7 +61,7 @@ void main() {
         vec3 prior_w = vec3(0.0);
         // w along each axis, by channel.
         vec3 next[3];
-        for (int axis = 0; axis < 3; ++axis) {
+        [[unroll]] for (int axis = 0; axis < 3; ++axis) {
             float inverse = 1.0 / edges[axis];
             vec3 half_cell = 0.5 * edges[axis] / own;
             vec3 through = inverse / (2.0 + half_cell);
@@ -87,7 +88,7 @@ void main() {
                 right += through * (4.0 * max(j, vec3(0.0)) + half_cell * carried);
             }
         }
-        for (int set = 0; set < N_SETS; ++set) {
+        [[unroll]] for (int set = 0; set < N_SETS; ++set) {
             operators[c + set * int(push.n_all)] =
                 vec4(next[0][set], next[1][set], next[2][set], sink[set]);
         }

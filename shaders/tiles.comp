@@ -35,8 +35,8 @@
 #ifndef THRESHOLD
 #define THRESHOLD 0
 #endif
-// 1: splats that overlap are composed by slices, and lie near to far by their centres' distances;
-// 0: one after the other.
+// Above 1: splats that overlap are composed by slices, and lie near to far by their centres'
+// distances. A splat is dealt among so many. 0: one after the other.
 #ifndef SLICES
 #define SLICES 0
 #endif

@@ -65,6 +65,10 @@ fn pictures() -> Vec<(String, Picture)> {
     all.push(("cells".to_owned(), in_cells(&mixed(100, 3, 3.0, -1.0).sliced(0.7))));
     all.push(("cells of ellipsoids".to_owned(), in_cells(&flat.clone().sliced(0.7))));
     all.push(("cells over surfaces".to_owned(), in_cells(&over.clone().sliced(0.7))));
+    let two = mixed(100, 3, 3.0, -1.0).sliced(1.5).in_parts(2);
+    all.push(("two slices".to_owned(), shaded(&two)));
+    all.push(("cells in two slices".to_owned(), in_cells(&two)));
+    all.push(("cells in three slices".to_owned(), in_cells(&over.clone().sliced(0.9).in_parts(3))));
     let scenery = over.scenery.clone();
     let flat_over = Picture { scenery, ..flat };
     all.push(("slices of ellipsoids over surfaces".to_owned(), sliced(&flat_over)));
@@ -160,7 +164,7 @@ fn wrong_shaders_are_found() {
         ("cells", true, sliced, "NEAREST_MIDDLE = 1.5", "NEAREST_MIDDLE = 1.6"),
         ("cells", true, sliced, "middle += 1.0;", ""),
         ("cells", true, sliced, "middle / length_of_ray(j)", "middle"),
-        ("cells of ellipsoids", true, sliced, "light_at(j, middle);", "light_at(j ^ 1u, middle);"),
+        ("cells of ellipsoids", true, sliced, "light_at(RUN - 1u, middle)", "light_at(RUN - 3u, middle)"),
         ("cells", true, "tiles.comp", "y * push.up_in_cells", "-y * push.up_in_cells"),
         ("cells", true, "tiles_splat.comp", "4 * facet + 1)", "4 * facet + 2)"),
         ("slices over surfaces", true, sliced, "density_here = density(to_wall)", ""),

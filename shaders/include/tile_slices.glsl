@@ -1,9 +1,9 @@
 // Composition near to far of splats that overlap, by slices: shells of one thickness about the eye
-// (passes.md "slices"). A splat's optical depth is dealt among four slices by the share of a
-// Gaussian in each: the two beside the boundary that is nearest to its centre, the one before
-// them, and all that is nearer. All that is farther belongs to the last. A slice is composed as
-// the mixture it is: C += (1 - A) (1 - e^-t) q/t, A += (1 - A)(1 - e^-t), t the slice's optical
-// depth and q the sum of depths times radiances. Needs the row of tiles.comp.
+// (passes.md "slices"). A splat's optical depth is dealt among OPEN slices by the share of a
+// Gaussian in each: the two beside the boundary that is nearest to its centre, and those before
+// them. All that is nearer belongs to the first, all that is farther to the last. A slice is
+// composed as the mixture it is: C += (1 - A) (1 - e^-t) q/t, A += (1 - A)(1 - e^-t), t the slice's
+// optical depth and q the sum of depths times radiances. Needs the row of tiles.comp.
 
 // Fours of a pixel's state: colour and opacity, the open slices, their place.
 const uint STATE_FOURS = 2 + OPEN;
@@ -82,7 +82,7 @@ void find_shares(inout Loaded splat, uint t, bool is_splat) {
 #if !ELLIPSOIDS
     float slice_in_sigmas = splat.near_in_sigmas / push.near_in_slices;
     [[unroll]] for (uint m = 0; m < OPEN - 1u; ++m) {
-        float u = (float(splat.boundary + int(m) - 2) - at) * slice_in_sigmas;
+        float u = (float(splat.boundary + int(m) + 2 - int(OPEN)) - at) * slice_in_sigmas;
         splat.within[m] = below(u);
 #if SHADED
         splat.density[m] = density(u);
@@ -120,17 +120,22 @@ void close_slice(bool is_on, float middle) {
         t[j] = open[0][j].w;
         here[j] = is_on ? one_minus_exp(t[j]) : 0.0;
     }
+#if CELLS
+    // Light of the first and the last pixel; between them it is linear.
+    float first = 0.0, last = 0.0;
+    // The same for all pixels: where nothing is composed, nothing is fetched.
+    if (is_on) {
+        first = light_at(0, middle);
+        last = light_at(RUN - 1u, middle);
+    }
+#endif
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         float passed = 1.0 - alpha[j];
         // Each pixel decides by itself, so that it does not depend on which others are drawn.
         here[j] *= passed < saturated ? 0.0 : passed;
         alpha[j] += here[j];
 #if CELLS
-        float light = 0.0;
-        // The same for all pixels: where nothing is composed, nothing is fetched.
-        if (is_on) {
-            light = light_at(j, middle);
-        }
+        float light = mix(first, last, float(j) / float(RUN - 1u));
         color[j] += here[j] / max(t[j], 1e-30) * open[0][j].xyz * light;
 #else
         color[j] += here[j] / max(t[j], 1e-30) * open[0][j].xyz;
@@ -231,7 +236,7 @@ void compose(Loaded splat, float y) {
 #endif
             if (m + 1u < OPEN) {
 #if ELLIPSOIDS
-                float at = float(splat.boundary + int(m) - 2) * slice;
+                float at = float(splat.boundary + int(m) + 2 - int(OPEN)) * slice;
                 float u = (at - distance) * in_sigmas;
                 within = min(all, below(u));
 #else

@@ -7,7 +7,7 @@
 const uint I_SHADE = 2 + 3 * TEXTURED;
 const uint N_FOURS = I_SHADE + SHADED + ELLIPSOIDS;
 // Slices that are open at once (tile_slices.glsl).
-const uint OPEN = 4;
+const uint OPEN = SLICES;
 struct Loaded {
     uvec4 fours[N_FOURS];
 #if OWN_EDGE

@@ -6,7 +6,7 @@ use crate::gpu::{
     Buffer, Compiler, Device, MemoryUsage, RecordCount, Recorder, Target, TargetFormat,
 };
 use crate::model::overlap::MAX_SLICES;
-use crate::model::scene::{Overlap, Scene};
+use crate::model::scene::Scene;
 use crate::passes::blobs::{BlobBuffers, BlobCount, BlobView};
 use crate::passes::sort::{Count, Sort, TILE};
 use crate::passes::tiles::{self, Division, Tiles, Variant, invocations};
@@ -74,7 +74,7 @@ impl Tiling {
             blobs: blob_variant(scene),
             format,
             has_under,
-            slices: scene.draw.overlap == Overlap::Slices,
+            slices: scene.draw.n_parts(),
             sharing: None,
             max_pairs: None,
             max_tiles: None,

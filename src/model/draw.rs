@@ -4,7 +4,7 @@ use super::count::Count;
 use super::cutoff::Cutoff;
 use super::edge::{Edge, Reach};
 use super::named::named;
-use super::overlap::Overlap;
+use super::overlap::{Overlap, n_parts};
 use super::resolution::Resolution;
 use super::sort_bits::SortBits;
 
@@ -96,6 +96,14 @@ pub struct Draw {
 }
 
 impl Draw {
+    /// Returns the number of slices that a blob is dealt among; 0 without slices.
+    pub fn n_parts(&self) -> u32 {
+        match self.overlap {
+            Overlap::Slices => n_parts(self.slice),
+            Overlap::Thin | Overlap::Auto => 0,
+        }
+    }
+
     /// Returns where blobs end.
     pub fn edge(&self) -> Edge {
         let tau = self.threshold.bound();

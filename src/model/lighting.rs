@@ -95,8 +95,9 @@ pub struct Rung {
     pub grid: u32,
     /// Bounces of "diffusion".
     pub bounces: u32,
-    /// Whether tiles are composed by slices where `draw.overlap` is "auto".
-    pub is_sliced: bool,
+    /// `draw.slice` where `draw.overlap` is "auto", and tiles are composed by slices then; `None`:
+    /// thin.
+    pub slice: Option<f64>,
     /// Error against transport of thin sprites, and of slices: the greatest of the scenes of
     /// docs/explanation/studies.md, "Clouds against transport", but katrina, where all err more.
     pub errors: [f64; 2],
@@ -105,22 +106,22 @@ pub struct Rung {
 /// The settings that "auto" may take: those that no other one beats in time and error in most of
 /// these scenes. Each costs more than the one before. In slices it is nearer to transport.
 pub const RUNGS: [Rung; 7] = [
-    rung(LightingMode::Similarity, (24, 0), false, [1.01, 1.03]),
-    rung(LightingMode::Diffusion, (16, 0), false, [0.31, 0.29]),
-    rung(LightingMode::Diffusion, (24, 0), false, [0.24, 0.21]),
-    rung(LightingMode::Diffusion, (32, 0), true, [0.22, 0.20]),
-    rung(LightingMode::Diffusion, (24, 1), true, [0.20, 0.16]),
-    rung(LightingMode::Diffusion, (24, 2), true, [0.22, 0.13]),
-    rung(LightingMode::Diffusion, (32, 2), true, [0.25, 0.11]),
+    rung(LightingMode::Similarity, (24, 0), None, [1.01, 1.03]),
+    rung(LightingMode::Diffusion, (16, 0), None, [0.31, 0.29]),
+    rung(LightingMode::Diffusion, (24, 0), None, [0.24, 0.21]),
+    rung(LightingMode::Diffusion, (32, 0), Some(3.0), [0.22, 0.20]),
+    rung(LightingMode::Diffusion, (24, 1), Some(3.0), [0.20, 0.16]),
+    rung(LightingMode::Diffusion, (24, 2), Some(3.0), [0.22, 0.13]),
+    rung(LightingMode::Diffusion, (32, 2), Some(3.0), [0.25, 0.11]),
 ];
 
 const fn rung(
     mode: LightingMode,
     (grid, bounces): (u32, u32),
-    is_sliced: bool,
+    slice: Option<f64>,
     errors: [f64; 2],
 ) -> Rung {
-    Rung { mode, grid, bounces, is_sliced, errors }
+    Rung { mode, grid, bounces, slice, errors }
 }
 
 /// Lighting settings of a scene.
@@ -210,7 +211,7 @@ mod tests {
     fn in_slices_each_rung_is_nearer_to_transport_than_the_one_before() {
         for pair in RUNGS.windows(2) {
             assert!(pair[1].errors[1] < pair[0].errors[1], "{pair:?}");
-            assert!(pair[1].is_sliced >= pair[0].is_sliced);
+            assert!(pair[1].slice.is_some() >= pair[0].slice.is_some());
         }
         assert!(RUNGS.iter().all(|rung| rung.mode.is_medium()));
     }

@@ -19,6 +19,16 @@ named! {
 /// what lies apart (studies.md, "draw.overlap and draw.slice").
 pub const SLICE: f64 = 1.25;
 
+/// Returns the number of slices that a blob is dealt among. Thicker slices hold it in fewer, which
+/// cost less: with those that are left out, the error is the same within a tenth in study-cloud.
+pub fn n_parts(slice: f64) -> u32 {
+    match slice {
+        s if s < 1.75 => 4,
+        s if s < 2.75 => 3,
+        _ => 2,
+    }
+}
+
 /// The most slices between a scene's nearest and farthest particle.
 pub const MAX_SLICES: f64 = 1000.0;
 

@@ -140,12 +140,11 @@ impl Scene {
     /// rung says.
     fn draw_on(&self, rung: &Rung) -> Draw {
         let is_free = self.draw.overlap == Overlap::Auto && self.draw.path == DrawPath::Tiles;
-        let overlap = match rung.is_sliced {
-            _ if !is_free => self.draw.overlap,
-            true => Overlap::Slices,
-            false => Overlap::Thin,
-        };
-        Draw { overlap, ..self.draw }
+        match rung.slice {
+            _ if !is_free => self.draw,
+            Some(slice) => Draw { overlap: Overlap::Slices, slice, ..self.draw },
+            None => Draw { overlap: Overlap::Thin, ..self.draw },
+        }
     }
 
     /// Returns a rung's error against transport in this scene's drawing.

@@ -48,8 +48,9 @@ pub struct Variant {
     pub format: TargetFormat,
     /// The blobs are composed over a picture of surfaces or of an impostor layer.
     pub has_under: bool,
-    /// Overlapping blobs are composed by slices. Views have a slice then.
-    pub slices: bool,
+    /// Slices among which an overlapping blob is dealt; 0: blobs are composed one after the other.
+    /// Views have a slice where it is above 0.
+    pub slices: u32,
     /// The way in which invocations share splats; by default as suits the device.
     pub sharing: Option<Sharing>,
     /// Bound of the pairs held at once; by default as many as suit the device.
@@ -95,7 +96,7 @@ fn one_unless(is_used: bool, n: u64) -> u64 {
 }
 
 /// Returns the number of fours of the state of all pixels.
-fn n_state(division: &Division, slices: bool) -> u64 {
+fn n_state(division: &Division, slices: u32) -> u64 {
     rounds::state_fours(slices) * division.n_pixels()
 }
 
@@ -117,7 +118,7 @@ pub struct Tiles {
     division: Division,
     n_compose_bindings: usize,
     rounds_spec: Rounds,
-    slices: bool,
+    slices: u32,
     max_groups: u32,
     max_tiles: u32,
     scratch: Scratch,
@@ -166,7 +167,7 @@ impl Tiles {
             ("SHADED", u32::from(blobs.shaded)),
             ("CELLS", u32::from(blobs.in_cells)),
             ("THRESHOLD", u32::from(blobs.threshold)),
-            ("SLICES", u32::from(slices)),
+            ("SLICES", slices),
             ("QUEUE", u32::from(sharing == Sharing::Registers)),
             ("PIXEL_WORDS", pixel_words),
             ("TOGETHER", if division.width.is_multiple_of(together) { together } else { 1 }),

@@ -93,6 +93,7 @@ mod tests {
         edge: Edge::at(3.0),
         smallest: 0.0,
         slice: 0.0,
+        n_parts: 4,
         shift: glam::DVec2::ZERO,
     };
 

@@ -18,10 +18,8 @@ use super::composite::{OpaquePixel, Rounding};
 use super::shade::below;
 use super::view::View;
 
-/// Boundaries of slices that part a blob, before and at the one nearest to its centre.
-const BOUNDARIES: [i64; 3] = [-2, -1, 0];
-/// Middle of a slice from the boundary of its number.
-const MIDDLE: f64 = -2.5;
+/// Pixels of a row between whose first and last the light of cells is linear.
+const LIGHT_RUN: u32 = 8;
 /// Error of the device's share of a Gaussian below a boundary: half that of its erf.
 const SHARE: f64 = 1.5e-6;
 /// Greatest slope of that share.
@@ -63,6 +61,10 @@ struct Ray<'a> {
     sprites: &'a Sprites<'a>,
     /// Unit direction.
     direction: DVec3,
+    /// Those of the first and the last pixel that share light of cells with this one, and the
+    /// place between them.
+    ends: [DVec3; 2],
+    place: f64,
     /// Distance of the opaque pixel, and its bound.
     wall: (f64, f64),
 }
@@ -117,24 +119,23 @@ fn each<T: Send + Clone>(
         .map(|pixel| OpaquePixel { depth: f64::INFINITY, depth_bound: 0.0, ..*pixel })
         .collect();
     let of = |k: usize, pixel: Vec<(usize, Layer)>| {
-        let [i, j] = raster.at[k];
         let wall = (opaque[k].depth, opaque[k].depth_bound);
-        finish(mixtures(view, sprites, &pixel, view.ray(i, j), wall, rounding))
+        finish(mixtures(view, sprites, &pixel, raster.at[k], wall, rounding))
     };
     composed(view, raster, &hides_none, (sprites, rounding), |_| Vec::new(), layers, of, on_row)
 }
 
-/// Returns the pixel whose `layers` lie along `ray`, before an opaque one of the view depth `wall`,
-/// given with its bound.
+/// Returns the pixel `at` [column, row] with these layers, before an opaque one of the view depth
+/// `wall`, given with its bound.
 pub(super) fn pixel(
     view: &View,
     sprites: &Sprites<'_>,
     layers: &[(usize, Layer)],
-    ray: DVec3,
+    at: [u32; 2],
     wall: (f64, f64),
     rounding: &Rounding,
 ) -> Composed {
-    compose(mixtures(view, sprites, layers, ray, wall, rounding), sprites.radiance)
+    compose(mixtures(view, sprites, layers, at, wall, rounding), sprites.radiance)
 }
 
 /// Returns the mixtures near to far.
@@ -142,13 +143,17 @@ fn mixtures(
     view: &View,
     sprites: &Sprites<'_>,
     layers: &[(usize, Layer)],
-    ray: DVec3,
+    [i, j]: [u32; 2],
     (depth, depth_bound): (f64, f64),
     rounding: &Rounding,
 ) -> Vec<Mixture> {
+    let ray = view.ray(i, j);
     let length = ray.length();
     let wall = (depth * length, depth_bound * length);
-    let ray = Ray { view, sprites, direction: ray / length, wall };
+    let first = i / LIGHT_RUN * LIGHT_RUN;
+    let ends = [first, first + LIGHT_RUN - 1].map(|i| view.ray(i, j).normalize());
+    let place = f64::from(i - first) / f64::from(LIGHT_RUN - 1);
+    let ray = Ray { view, sprites, direction: ray / length, ends, place, wall };
     let mut slices: BTreeMap<i64, Mixture> = BTreeMap::new();
     for (j, layer) in layers {
         for (i_slice, part) in ray.dealt(*j, layer, rounding) {
@@ -163,9 +168,11 @@ impl Ray<'_> {
     /// device's may differ. That is the error of the place in cells, and of the sum of eight.
     fn light_of(&self, cells: &CellLight<'_>, j: usize, i_slice: i64) -> (f64, f64) {
         let (eye, slice) = (self.view.pose.position, self.view.slice);
-        let along = (i_slice as f64 + MIDDLE) * slice;
-        let p = eye + along * self.direction;
-        let (light, greatest) = cells.factor(j, p);
+        // The last slice of a blob begins at the boundary nearest to its centre.
+        let along = (i_slice as f64 + 1.5 - f64::from(self.view.n_parts)) * slice;
+        let [first, last] = self.ends.map(|d| cells.factor(j, eye + along * d));
+        let light = first.0 + self.place * (last.0 - first.0);
+        let greatest = first.1.max(last.1);
         let in_cells = (eye.length() + along.abs()) / cells.cells.edge();
         (light, N_ROUNDINGS * U * (in_cells + 4.0) * greatest)
     }
@@ -194,22 +201,27 @@ impl Ray<'_> {
         };
         let wall = (self.wall.0 - foot) / width;
         // The share of each slice, and the light of the part times that.
-        let at = |i_boundary: i64| {
-            let [a, b, c] =
-                BOUNDARIES.map(|k| (((i_boundary + k) as f64 * slice - foot) / width).min(wall));
-            let parts = [[f64::NEG_INFINITY, a], [a, b], [b, c], [c, wall]];
-            std::array::from_fn::<_, 4, _>(|m| {
-                let [from, to] = parts[m];
+        let n_parts = i64::from(self.view.n_parts);
+        let at = |i_boundary: i64| -> Vec<(f64, (f64, f64))> {
+            // The end of part m; the first begins at the eye.
+            let end = |m: i64| match m {
+                m if m < 0 => f64::NEG_INFINITY,
+                m if m + 1 == n_parts => wall,
+                m => (((i_boundary + m + 2 - n_parts) as f64 * slice - foot) / width).min(wall),
+            };
+            let part = |m: i64| {
+                let [from, to] = [end(m - 1), end(m)];
                 let share = below(to) - below(from);
                 let light = match self.sprites.cells {
                     None => layer.light.between([from, to], share, off_share + off_hidden),
                     Some(cells) => {
-                        let (light, off) = self.light_of(cells, j, i_boundary + m as i64);
+                        let (light, off) = self.light_of(cells, j, i_boundary + m);
                         (share * light, (share + off_share + off_hidden) * off)
                     }
                 };
                 (share, light)
-            })
+            };
+            (0..n_parts).map(part).collect()
         };
         let place_in_slices = distance / slice;
         let nearest = place_in_slices.round();
@@ -244,7 +256,7 @@ impl Ray<'_> {
                 }
             }
             // A slice that only the nearest boundary has.
-            let lost = |i: i64| !(0..4).contains(&(i - other as i64));
+            let lost = |i: i64| !(0..n_parts).contains(&(i - other as i64));
             for (_, part) in found.iter_mut().filter(|(i, _)| lost(*i)) {
                 part.off += part.tau;
             }

@@ -222,6 +222,7 @@ mod tests {
             edge: Edge::at(3.0),
             smallest: 0.0,
             slice: 0.0,
+            n_parts: 4,
             shift: DVec2::ZERO,
         }
     }

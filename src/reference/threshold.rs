@@ -92,6 +92,7 @@ mod tests {
             edge: Edge { tau: 0.1, ..Edge::at(3.0) },
             smallest,
             slice: 0.0,
+            n_parts: 4,
             shift,
         };
         // From a centre at depth 2 the outer rays pass at b = √2: b²/2σ² = 1 at σ = 1.

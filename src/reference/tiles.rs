@@ -3,8 +3,6 @@
 //!
 //! In: blobs and eye relative to O, an order far to near. Out: the same picture as `sprites`.
 
-use glam::DVec3;
-
 use super::blob_layers::{Bounded, Seen, Sprites};
 use super::composed::Composed;
 use super::composite::{OpaquePixel, Rounding};
@@ -49,13 +47,14 @@ pub(super) fn render_by(of: &Composition<'_>, behind: &[OpaquePixel], layer: Add
     let (view, most) = (of.view, of.sprites.brightest());
     let pixel = |(i_pixel, under): (usize, &OpaquePixel)| {
         let (i, j) = (i_pixel as u32 % view.width, i_pixel as u32 / view.width);
-        compose(of, view.ray(i, j), under, layer).over(under, &of.rounding, of.saturated, most)
+        compose(of, [i, j], under, layer).over(under, &of.rounding, of.saturated, most)
     };
     behind.iter().enumerate().map(pixel).unzip()
 }
 
-fn compose(of: &Composition<'_>, ray: DVec3, under: &OpaquePixel, layer: AddLayer) -> Composed {
+fn compose(of: &Composition<'_>, at: [u32; 2], under: &OpaquePixel, layer: AddLayer) -> Composed {
     let Composition { view, sprites, rounding, .. } = of;
+    let ray = view.ray(at[0], at[1]);
     let mut pixel = Composed::NOTHING;
     let opaque = (under.depth, under.depth_bound);
     let is_sliced = view.slice > 0.0;
@@ -78,13 +77,15 @@ fn compose(of: &Composition<'_>, ray: DVec3, under: &OpaquePixel, layer: AddLaye
         }
     }
     match is_sliced {
-        true => slices::pixel(view, sprites, &layers, ray, opaque, rounding),
+        true => slices::pixel(view, sprites, &layers, at, opaque, rounding),
         false => pixel,
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
@@ -104,6 +105,7 @@ mod tests {
             edge: Edge::at(3.0),
             smallest: 0.0,
             slice: 0.0,
+            n_parts: 4,
             shift: glam::DVec2::ZERO,
         };
         let at = |x: f64, z: f64, tau: f64| Blob {

@@ -26,6 +26,8 @@ pub struct View {
     pub smallest: f64,
     /// Thickness of a slice; 0 where blobs are composed one after the other.
     pub slice: f64,
+    /// Slices among which a blob is dealt, where there are any.
+    pub n_parts: u32,
     /// Offset of the rays from the pixels' centres, to the right and down, pixels within ±½.
     pub shift: DVec2,
 }
@@ -42,6 +44,7 @@ impl View {
         edge: Edge::at(3.0),
         smallest: 0.0,
         slice: 0.0,
+        n_parts: 4,
         shift: DVec2::ZERO,
     };
 }

@@ -92,6 +92,7 @@ impl Picture {
             edge: Edge::at(3.0),
             smallest: 0.0,
             slice: 0.0,
+            n_parts: 4,
             shift: DVec2::ZERO,
         };
         Picture {
@@ -132,6 +133,12 @@ impl Picture {
     /// Composes overlapping blobs by slices of this thickness.
     pub fn sliced(mut self, slice: f64) -> Picture {
         self.view.slice = slice;
+        self
+    }
+
+    /// Deals each blob among `n` slices.
+    pub fn in_parts(mut self, n: u32) -> Picture {
+        self.view.n_parts = n;
         self
     }
 

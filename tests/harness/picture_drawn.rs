@@ -330,7 +330,7 @@ impl Picture {
             blobs: self.variant(),
             format,
             has_under: self.scenery.is_some(),
-            slices: self.view.slice > 0.0,
+            slices: if self.view.slice > 0.0 { self.view.n_parts } else { 0 },
             sharing: tiled.sharing,
             max_pairs: tiled.max_pairs,
             max_tiles: tiled.max_tiles,

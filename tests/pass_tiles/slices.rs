@@ -57,8 +57,11 @@ fn blobs_of_all_kinds_by_slices() {
 #[test]
 fn slices_of_every_thickness() {
     let mut gpu = Gpu::new();
-    for slice in [0.02, 0.1, 0.37, 1.0, 30.0] {
-        compare(&mut gpu, &format!("slices of {slice}"), &crowd(120, 3).sliced(slice));
+    for n in [2, 3, 4] {
+        for slice in [0.02, 0.1, 0.37, 1.0, 30.0] {
+            let picture = crowd(120, 3).sliced(slice).in_parts(n);
+            compare(&mut gpu, &format!("{n} slices of {slice}"), &picture);
+        }
     }
 }
 
@@ -75,6 +78,8 @@ fn ellipsoids_surfaces_and_edges_by_slices() {
         ("ellipsoids over surfaces", over(&shaped(&crowd))),
         ("edges", auto.clone()),
         ("edges of ellipsoids over surfaces", over(&shaped(&auto))),
+        ("two slices over surfaces", over(&crowd.clone().in_parts(2))),
+        ("two slices of ellipsoids over surfaces", over(&shaped(&crowd)).in_parts(2)),
     ] {
         assert!(compare(&mut gpu, &format!("slices, {what}"), &picture) > 0.3, "{what}");
     }
@@ -97,6 +102,7 @@ fn workgroups_and_rounds_of_slices_do_not_show() {
         picture.clone(),
         Picture { scenery: Some(scenery()), ..picture.clone() },
         Picture { scenery: Some(scenery()), ..shaped(&picture) },
+        picture.clone().in_parts(2),
     ];
     for picture in scenes {
         let mut draw = |tiled: &Tiled| picture.draw_by(&mut gpu, None, target, Way::Tiles(*tiled));
@@ -129,7 +135,7 @@ fn wrong_slices_are_noticed() {
     // The picture that tells: the one of balls, or that of ellipsoids over surfaces.
     for (file, from, to, i) in [
         ("include/tile_slices.glsl", "int(roundEven(at))", "int(floor(at))", 0),
-        ("include/tile_slices.glsl", "int(m) - 2) - at)", "int(m) - 1) - at)", 0),
+        ("include/tile_slices.glsl", "int(m) + 2 - int(OPEN)) - at)", "int(m) - 1) - at)", 0),
         ("include/tile_slices.glsl", "1.38629436112", "1.2", 0),
         ("include/tile_slices.glsl", "share = within - before", "share = within", 0),
         ("include/tile_slices.glsl", "clamp(boundary - i_boundary, 0, int(OPEN))", "1", 0),

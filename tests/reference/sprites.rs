@@ -42,6 +42,7 @@ fn view(width: u32, height: u32) -> View {
         edge: Edge::at(3.0),
         smallest: 0.0,
         slice: 0.0,
+        n_parts: 4,
         shift: DVec2::ZERO,
     }
 }

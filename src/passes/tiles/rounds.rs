@@ -31,8 +31,8 @@ const PAIRS_PER_ITERATION: u64 = SORT_TILE / 4;
 const SORT_TILE: u64 = 1024;
 
 /// Returns the fours of floats of a pixel that a round hands to the next; the shaders' STATE_FOURS.
-pub(super) fn state_fours(slices: bool) -> u64 {
-    if slices { 6 } else { 1 }
+pub(super) fn state_fours(slices: u32) -> u64 {
+    if slices > 0 { 2 + u64::from(slices) } else { 1 }
 }
 
 /// How tiles are composed, as far as the loops of a round depend on it.
@@ -40,22 +40,22 @@ pub(super) fn state_fours(slices: bool) -> u64 {
 pub(super) struct Form {
     /// A tile's invocations use subgroup operations.
     pub is_one_subgroup: bool,
-    /// Overlapping blobs are composed by slices.
-    pub slices: bool,
+    /// Slices among which an overlapping blob is dealt; 0 without.
+    pub slices: u32,
 }
 
 impl Form {
     /// Returns `text`, a further change that a user must make where blobs are composed by slices,
     /// and nothing elsewhere.
     fn remedy_of_slices(self, text: &str) -> &str {
-        if self.slices { text } else { "" }
+        if self.slices > 0 { text } else { "" }
     }
 
     /// Returns the most blocks whose splats a tile may take all of, if its loops may have
     /// `iterations`.
     fn most_blocks(self, iterations: u32) -> u32 {
         let without_subgroup = if self.is_one_subgroup { 0 } else { ITERATIONS_OF_COUNT };
-        let (of_shares, of_slices) = match self.slices {
+        let (of_shares, of_slices) = match self.slices > 0 {
             true => (ITERATIONS_OF_SHARES, ITERATIONS_OF_SLICE * MAX_SLICES),
             false => (0, 0),
         };

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::frame::FrameReference;
 use super::local_scene;
 use super::pixels::{Pixels, Tile};
-use crate::model::overlap::slice_length;
+use crate::model::overlap::{n_parts, slice_length};
 use crate::model::scene::{LightingMode, Overlap, Scene};
 use crate::model::surface::Surface;
 use crate::model::terrain::Terrain;
@@ -33,6 +33,7 @@ pub fn view(scene: &Scene, frame: &FrameReference) -> View {
         edge: scene.draw.edge(),
         smallest: scene.draw.smallest.bound(),
         slice,
+        n_parts: n_parts(scene.draw.slice),
         shift: DVec2::ZERO,
     }
 }

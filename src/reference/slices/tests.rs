@@ -61,6 +61,10 @@ fn a_blob_is_dealt_by_its_share_of_a_gaussian() {
     // All of the opaque blob shows, but for what is before it. Behind it nothing does. In its
     // own slice the share of the thin one is that of the mixture, next to nothing.
     assert!((seen[0] / tau - before - own / 40.0).abs() < 1e-4, "{seen:?}");
+    // Dealt among two slices, all that is before 5 is in the one from 4 to 5.
+    let view = View { n_parts: 2, ..VIEW };
+    let seen = drawn(&view, &[at(5.0, 1.0, tau), at(4.5, 1e-3, 40.0)], OpaquePixel::EMPTY);
+    assert!((seen[0] / tau - 0.5 / 40.0).abs() < 1e-4, "{seen:?}");
 }
 
 #[test]

@@ -27,6 +27,7 @@ fn view(n: u32) -> View {
         edge: Edge::at(9.0),
         smallest: 0.0,
         slice: 0.0,
+        n_parts: 4,
         shift: glam::DVec2::ZERO,
     }
 }

@@ -18,7 +18,7 @@ fn camera(tan_x: f32, tan_y: f32) -> CameraRecord {
     }
 }
 
-const THIN: Form = Form { is_one_subgroup: true, slices: false };
+const THIN: Form = Form { is_one_subgroup: true, slices: 0 };
 
 fn view<'a>(camera: &'a CameraRecord, extents: &'a [Extent]) -> BlobView<'a> {
     BlobView {
@@ -118,9 +118,9 @@ fn loops_with_slices_end_before_a_device_ends_them() {
     // The most turns that a tile takes for all splats of a round and the slices among them.
     for (form, of_splat, of_slice) in [
         (THIN, 1, 0),
-        (Form { slices: true, ..THIN }, 2, 2),
-        (Form { is_one_subgroup: false, slices: false }, 2, 0),
-        (Form { is_one_subgroup: false, slices: true }, 3, 2),
+        (Form { slices: 4, ..THIN }, 2, 2),
+        (Form { is_one_subgroup: false, slices: 0 }, 2, 0),
+        (Form { is_one_subgroup: false, slices: 4 }, 3, 2),
     ] {
         for iterations in [10_000, 65_535, 10_000_000] {
             let n = form.most_blocks(iterations);
@@ -128,5 +128,5 @@ fn loops_with_slices_end_before_a_device_ends_them() {
             assert!(turns <= iterations && turns + of_splat * BLOCK > iterations, "{form:?} {n}");
         }
     }
-    assert_eq!(Form { slices: true, ..THIN }.most_blocks(1000), 1);
+    assert_eq!(Form { slices: 4, ..THIN }.most_blocks(1000), 1);
 }

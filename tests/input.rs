@@ -248,7 +248,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
                 "precision": "f32",
                 "sun_radius_deg": 0.27,
                 "octaves": 8, "octave_light": 0.5, "octave_depth": 0.7, "octave_phase": 0.5,
-                "diffusion_cycles": 2, "bounces": 0, "slopes": true,
+                "diffusion_cycles": 2, "bounces": 0, "bounce_cells": 2, "slopes": true,
                 "budget_ms": 0.0, "budget_error": 0.0,
             },
             "draw": { "path": "tiles", "impostors": "off", "impostor_error": 0.5, "cutoff": "auto",

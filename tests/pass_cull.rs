@@ -69,6 +69,7 @@ impl Scene {
             edge: Edge::at(3.0),
             smallest: 0.0,
             slice: 0.0,
+            n_parts: 4,
             shift: glam::DVec2::ZERO,
         };
         let group = DrawnRecord { shift: 0, end: u32::MAX, kappa_scale: 1.0, last_weight: 1.0 };

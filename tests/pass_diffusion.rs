@@ -21,6 +21,7 @@ fn every_facet_has_the_light_of_the_twin() {
     for name in ["coloured", "droplets", "flat", "boxes", "opaque", "floors"] {
         media::check(&gpu, name, "diffusion");
         media::check(&gpu, name, "bounces");
+        media::check(&gpu, name, "merged");
     }
 }
 
@@ -127,6 +128,18 @@ fn wrong_shaders_are_found() {
             "scatter.comp",
             "relative -= dot(relative, toward)",
             "relative -= 0.0",
+        ),
+        ("coloured", "merged", "diffusion_merge.comp", "loss_of(even.w) * field", "field"),
+        ("flat", "merged", "diffusion_merge.comp", "even.w * arrived_at", "arrived_at"),
+        ("opaque", "merged", "diffusion_merge.comp", "share / sigma", "1.0 / max(all, 1e-30)"),
+        ("boxes", "merged", "diffusion_merge.comp", "min(first + int(push.edge)", "min(first + 2"),
+        ("boxes", "merged", "diffusion_spread.comp", "+ 0.5) / float", ") / float"),
+        (
+            "coloured",
+            "merged",
+            "diffusion_spread.comp",
+            "field[4 * c + k].rgb +=",
+            "field[4 * c].rgb +=",
         ),
         ("droplets", "bounces", "facets_groups.comp", "color, sigma)", "color, scale)"),
         ("floors", "diffusion", "include/patches.glsl", "part[u] =", "part[v] ="),

@@ -102,6 +102,15 @@ record! {
     }
 }
 
+impl GridRecord {
+    /// Returns the grid of cells that are `edge` times as wide, as [`GridSpec::merged`] does.
+    pub fn merged(&self, edge: u32) -> GridRecord {
+        let n_cells = self.n_cells.map(|n| n.div_ceil(edge));
+        let (cell, inv_cell) = (self.cell * edge as f32, self.inv_cell / edge as f32);
+        GridRecord { n_cells, cell, inv_cell, ..*self }
+    }
+}
+
 impl From<&GridSpec> for GridRecord {
     fn from(grid: &GridSpec) -> Self {
         GridRecord {

@@ -54,6 +54,13 @@ impl GridSpec {
         GridSpec { n_cells, cell, aspect, low }
     }
 
+    /// Returns the grid of cells that are `edge` times as wide, from the same corner. The last ones
+    /// may reach beyond the box.
+    pub fn merged(&self, edge: u32) -> GridSpec {
+        let n_cells = self.n_cells.map(|n| n.div_ceil(edge));
+        GridSpec { n_cells, cell: self.cell * f64::from(edge), ..*self }
+    }
+
     /// Returns the number of cells.
     pub fn n_total(&self) -> u64 {
         u64::from(self.n_cells.x) * u64::from(self.n_cells.y) * u64::from(self.n_cells.z)

@@ -73,6 +73,8 @@ pub struct DiffusionSettings {
     pub cycles: u32,
     /// Bounces between the cells that follow.
     pub bounces: u32,
+    /// Edge of the cells that bounces lead between, in cells of the grid.
+    pub bounce_cells: u32,
     /// The light changes linearly inside of each blob.
     pub slopes: bool,
 }
@@ -188,6 +190,9 @@ pub const MAX_CYCLES: u32 = 32;
 /// Greatest number of bounces between cells: with the correction of each, many more than light
 /// needs.
 pub const MAX_BOUNCES: u32 = 64;
+
+/// Greatest edge of the cells that bounces lead between, in cells of the grid.
+pub const MAX_BOUNCE_CELLS: u32 = 8;
 
 /// Greatest number of divisions of an emitter: it is 2¹⁶ times smaller then.
 pub const MAX_PAIR_LEVELS: u32 = 16;

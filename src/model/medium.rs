@@ -236,7 +236,12 @@ mod tests {
         },
         sun_radius: 0.005,
         octaves: ONCE,
-        diffusion: crate::model::scene::DiffusionSettings { cycles: 1, bounces: 0, slopes: false },
+        diffusion: crate::model::scene::DiffusionSettings {
+            cycles: 1,
+            bounces: 0,
+            bounce_cells: 1,
+            slopes: false,
+        },
         budget: crate::model::scene::LightBudget { ms: None, error: None },
     };
 

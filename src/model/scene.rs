@@ -13,8 +13,8 @@ use super::film::Film;
 use super::grid::GridSpec;
 use super::light::Light;
 pub use super::lighting::{
-    DiffusionSettings, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCES, MAX_CYCLES,
-    MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs, RUNGS, Rung,
+    DiffusionSettings, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCE_CELLS, MAX_BOUNCES,
+    MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs, RUNGS, Rung,
 };
 use super::material::Material;
 use super::named::named;

@@ -7,17 +7,23 @@
 //! 2e-6 of φ.
 
 mod bounces;
+mod cells;
+mod merged;
 mod push;
+mod room;
 mod solids;
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
-use crate::layout::diffusion::{DiffusionParams, LEVELS_ROOM, LevelStep, N_PATCHES, levels};
+use crate::layout::diffusion::{DiffusionParams, LevelStep, levels};
 use crate::layout::frame::GridRecord;
 
 use bounces::Bounces;
 pub use bounces::{BouncePush, SeenPush};
+use cells::Cells;
+pub use merged::{MergePush, SpreadPush};
 pub use push::{CoarsestPush, FluxPush, PairPush, SourcesPush, SweepPush, SystemPush};
+pub use room::Room;
 use solids::Solids;
 pub use solids::{FacesPush, PatchesPush, SolidsPush, SolidsWork};
 
@@ -65,39 +71,6 @@ pub struct DiffusionWork {
     pub solids: SolidsWork,
 }
 
-/// Room for the grids of the solver.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Room {
-    /// Cells of all levels.
-    pub n_cells: u64,
-    /// Sets of equations: 1 where channels share them, else 3.
-    pub n_sets: u32,
-    /// The fluence of suns and lamps is wanted in every cell.
-    pub has_slopes: bool,
-    /// Facets of surfaces and ground.
-    pub n_solid_facets: u64,
-    /// Bounces follow diffusion.
-    pub has_bounces: bool,
-}
-
-impl Room {
-    /// Returns the room for a grid of at most `n_cells`.
-    pub fn new(
-        n_cells: u64,
-        n_sets: u32,
-        (has_slopes, has_bounces): (bool, bool),
-        n_solid_facets: u64,
-    ) -> Room {
-        let n_cells = LEVELS_ROOM * n_cells;
-        Room { n_cells, n_sets, has_slopes, n_solid_facets, has_bounces }
-    }
-
-    /// Returns the number of patches through which light passes to and from surfaces and ground.
-    pub fn n_patches(&self) -> u64 {
-        if self.n_solid_facets > 0 { u64::from(N_PATCHES) } else { 0 }
-    }
-}
-
 buffers! {
     /// Scratch of the pass.
     pub struct Scratch(room: Room) {
@@ -119,11 +92,7 @@ buffers! {
 
 /// Lists the sizes of all scratch buffers.
 pub fn specs(room: Room) -> Vec<BufferSpec> {
-    let bounces = match room.has_bounces {
-        true => bounces::Scratch::specs(room.n_cells / LEVELS_ROOM),
-        false => vec![],
-    };
-    [Scratch::specs(room), bounces].concat()
+    [Scratch::specs(room), Bounces::specs(room)].concat()
 }
 
 /// The pipelines and scratch buffers of the pass.
@@ -155,14 +124,22 @@ impl Diffusion {
             ("N_SETS", room.n_sets),
             ("SLOPES", u32::from(room.has_slopes)),
             ("SOLIDS", u32::from(has_solids)),
-            ("BOUNCES", u32::from(room.has_bounces)),
         ];
         let kernel = |name: &str, fields: &_| {
             Kernel::with_macros(device, compiler, name, fields, &[], &macros)
         };
+        let has_bounces = room.bounce_cells > 0;
+        let with_bounces = [&macros[..], &[("BOUNCES", u32::from(has_bounces))]].concat();
         Ok(Diffusion {
             solids: has_solids.then(|| Solids::new(device, compiler)).transpose()?,
-            sources: kernel("diffusion.sources", SourcesPush::FIELDS)?,
+            sources: Kernel::with_macros(
+                device,
+                compiler,
+                "diffusion.sources",
+                SourcesPush::FIELDS,
+                &[],
+                &with_bounces,
+            )?,
             system: kernel("diffusion.system", SystemPush::FIELDS)?,
             coarsen: kernel("diffusion.coarsen", PairPush::FIELDS)?,
             sweep: kernel("diffusion.sweep", SweepPush::FIELDS)?,
@@ -177,15 +154,7 @@ impl Diffusion {
             coarsest: kernel("diffusion.coarsest", CoarsestPush::FIELDS)?,
             restrict: kernel("diffusion.restrict", PairPush::FIELDS)?,
             flux: kernel("diffusion.flux", FluxPush::FIELDS)?,
-            bounces: match room.has_bounces {
-                true => Some(Bounces::new(
-                    device,
-                    compiler,
-                    room.n_cells / LEVELS_ROOM,
-                    (room.n_sets, has_solids),
-                )?),
-                false => None,
-            },
+            bounces: has_bounces.then(|| Bounces::new(device, compiler, room)).transpose()?,
             scratch: Scratch::new(device, room)?,
             room,
         })
@@ -203,7 +172,7 @@ impl Diffusion {
         of: &DiffusionParams,
         work: &DiffusionWork,
     ) -> Result<()> {
-        let (steps, n_all) = levels(grid);
+        let (_, n_all) = levels(grid);
         if u64::from(n_all) > self.room.n_cells {
             return Err(Error::limit(format!(
                 "diffusion on {n_all} cells of all levels, where there is room for {}",
@@ -212,8 +181,7 @@ impl Diffusion {
         }
         let DiffusionBuffers { lights, regions, density, facets, depths, field, patches } =
             *buffers;
-        let Scratch { operators, phi, next_phi, source, solids, faces } = &self.scratch;
-        let n_cells = steps[0].level.n_total();
+        let Scratch { solids, faces, .. } = &self.scratch;
         if let Some(kernels) = &self.solids {
             let given = [facets, lights, depths, regions];
             kernels.record_faces(rec, given, [solids, faces], grid, &work.solids)?;
@@ -230,60 +198,27 @@ impl Diffusion {
             max_steps: work.max_steps,
             densest: of.densest,
         };
+        let cells = Cells { grid: *grid, density, field, of: *of };
+        let all = [lights, regions, density, field];
         match &self.bounces {
             None => {
-                let buffers = [lights, regions, density, field];
-                rec.dispatch(&self.sources, &buffers, &push, n_cells)?;
+                rec.dispatch(&self.sources, &all, &push, cells.n_total())?;
+                self.record_light(rec, lights, &cells, work)?;
             }
             Some(bounces) => {
-                let buffers = [lights, regions, density, field, &bounces.scratch.arrived];
-                rec.dispatch(&self.sources, &buffers, &push, n_cells)?;
-            }
-        }
-        let system_push = SystemPush {
-            grid: *grid,
-            absorbed: of.absorbed,
-            inverse_chord: of.inverse_chord,
-            kept: of.kept,
-            n_lights: work.n_lights,
-            n_all,
-            densest: of.densest,
-        };
-        let system = [lights, density, field, operators, phi, source, faces];
-        let n_buffers = 6 + usize::from(self.solids.is_some());
-        rec.dispatch(&self.system, &system[..n_buffers], &system_push, n_cells)?;
-        for pair in steps.windows(2) {
-            let push = pair_push(pair, n_all);
-            rec.dispatch(&self.coarsen, &[operators], &push, pair[1].level.n_total())?;
-        }
-        for i in 0..work.n_cycles {
-            self.record_cycle(rec, &steps, n_all, i == 0)?;
-        }
-        let push_of_flux = FluxPush {
-            grid: *grid,
-            kept: of.kept,
-            inverse_chord: of.inverse_chord,
-            even: of.even,
-            densest: of.densest,
-            forward: of.forward,
-        };
-        let flux = [density, next_phi, field];
-        match &self.bounces {
-            None => rec.dispatch(&self.flux, &flux, &push_of_flux, n_cells)?,
-            Some(bounces) => {
-                let bounces::Scratch { arrived, sent, change } = &bounces.scratch;
-                let all = [density, next_phi, field, arrived, sent];
-                rec.dispatch(&self.flux, &all, &push_of_flux, n_cells)?;
-                for _ in 0..work.n_bounces {
-                    bounces.record_gather(rec, [lights, field, faces], grid, of, work.n_lights)?;
-                    // No light comes in at the box: the bounce has it.
-                    let push = SystemPush { n_lights: 0, ..system_push };
-                    let system = [lights, density, change, operators, phi, source];
-                    rec.dispatch(&bounces.system, &system, &push, n_cells)?;
-                    for i in 0..work.n_cycles {
-                        self.record_cycle(rec, &steps, n_all, i == 0)?;
+                let arrived = bounces.arrived();
+                let all = [lights, regions, density, field, arrived];
+                rec.dispatch(&self.sources, &all, &push, cells.n_total())?;
+                match &bounces.merged {
+                    None => self.record_bounces(rec, (lights, arrived), &cells, None, work)?,
+                    Some(merged) => {
+                        let few = merged.record_merge(rec, &cells, arrived)?;
+                        let merged::Scratch { arrived, before, .. } = &merged.scratch;
+                        let given = (lights, arrived);
+                        self.record_bounces(rec, given, &few, Some(before), work)?;
+                        self.record_light(rec, lights, &cells, work)?;
+                        merged.record_spread(rec, &cells)?;
                     }
-                    bounces.record_correction(rec, flux, &push_of_flux)?;
                 }
             }
         }
@@ -291,6 +226,74 @@ impl Diffusion {
             Some(kernels) => kernels.record_patches(rec, [field, patches], grid),
             None => Ok(()),
         }
+    }
+
+    /// Writes φ and F of cells whose sources are known.
+    fn record_light(
+        &self,
+        rec: &mut Recorder<'_>,
+        lights: &Buffer,
+        cells: &Cells<'_>,
+        work: &DiffusionWork,
+    ) -> Result<()> {
+        self.record_fluence(rec, lights, cells, work)?;
+        let buffers = [cells.density, &self.scratch.next_phi, cells.field];
+        rec.dispatch(&self.flux, &buffers, &cells.flux_push(), cells.n_total())
+    }
+
+    /// Writes φ and F of cells whose sources are known after all bounces between them. Without
+    /// bounces they are copied to `before`.
+    fn record_bounces(
+        &self,
+        rec: &mut Recorder<'_>,
+        (lights, arrived): (&Buffer, &Buffer),
+        cells: &Cells<'_>,
+        before: Option<&Buffer>,
+        work: &DiffusionWork,
+    ) -> Result<()> {
+        let Some(bounces) = &self.bounces else { return Ok(()) };
+        let Scratch { operators, phi, next_phi, source, faces, .. } = &self.scratch;
+        let Cells { density, field, .. } = *cells;
+        self.record_fluence(rec, lights, cells, work)?;
+        bounces.record_flux(rec, cells, [next_phi, arrived])?;
+        if let Some(before) = before {
+            rec.copy(field, before);
+        }
+        let (steps, n_all) = levels(&cells.grid);
+        for _ in 0..work.n_bounces {
+            bounces.record_gather(rec, cells, [lights, faces], work.n_lights)?;
+            // No light comes in at the box: the bounce has it.
+            let push = cells.system_push(0);
+            let system = [lights, density, bounces.change(), operators, phi, source];
+            rec.dispatch(&bounces.system, &system, &push, cells.n_total())?;
+            self.record_cycle(rec, &steps, n_all, true)?;
+            bounces.record_correction(rec, cells, [next_phi, arrived])?;
+        }
+        Ok(())
+    }
+
+    /// Solves for φ of cells whose sources are known.
+    fn record_fluence(
+        &self,
+        rec: &mut Recorder<'_>,
+        lights: &Buffer,
+        cells: &Cells<'_>,
+        work: &DiffusionWork,
+    ) -> Result<()> {
+        let Scratch { operators, phi, source, faces, .. } = &self.scratch;
+        let (steps, n_all) = levels(&cells.grid);
+        let system = [lights, cells.density, cells.field, operators, phi, source, faces];
+        let n_buffers = 6 + usize::from(self.solids.is_some());
+        let push = cells.system_push(work.n_lights);
+        rec.dispatch(&self.system, &system[..n_buffers], &push, cells.n_total())?;
+        for pair in steps.windows(2) {
+            let push = pair_push(pair, n_all);
+            rec.dispatch(&self.coarsen, &[operators], &push, pair[1].level.n_total())?;
+        }
+        for i in 0..work.n_cycles {
+            self.record_cycle(rec, &steps, n_all, i == 0)?;
+        }
+        Ok(())
     }
 
     /// Two sweeps on every level on the way down, and two on the way up. The first sweep from φ = 0

@@ -259,6 +259,8 @@ fn gathered(scene: &Scene, [x, y, z]: [f64; 3]) -> f64 {
     if !has_bounces(scene) {
         return 0.0;
     }
-    let bounces = f64::from(scene.lighting.diffusion.bounces);
+    let of = scene.lighting.diffusion;
+    let (bounces, edge) = (f64::from(of.bounces), f64::from(of.bounce_cells));
+    let [x, y, z] = [x, y, z].map(|n| (n / edge).ceil());
     24.0 * bounces * x * y * z * x.min(y).min(z) / 2.0
 }

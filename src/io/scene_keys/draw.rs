@@ -57,7 +57,8 @@ keys! { DRAW: fn draw(s) -> Draw { Draw;
     /// slices, of which each particle has its own share, on the path "tiles"; or, on that path,
     /// whichever is faster at the first frame within `error` of the slices.
     overlap: choice("thin", &Overlap::NAMES);
-    /// Thickness of a slice, in mean σ of the particles.
+    /// Thickness of a slice, in mean σ of the particles. Thicker slices are faster: a particle is
+    /// dealt among four of them, from 1.75 on among three, and from 2.75 on among two.
     slice: number(SLICE, Bounds::Within(0.1, 10.0)), "σ";
     /// Whether particles that show in no pixel are left out before the sort. No pixel changes.
     cull: choice("on", &Cull::NAMES);

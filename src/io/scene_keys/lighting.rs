@@ -8,8 +8,8 @@ use crate::io::document::section::Section;
 use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, min_step};
 use crate::model::scene::{
-    DiffusionSettings, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCES, MAX_CYCLES,
-    MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs,
+    DiffusionSettings, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCE_CELLS, MAX_BOUNCES,
+    MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs,
 };
 use crate::model::sums::{Precision, Summation, Sums};
 
@@ -74,6 +74,9 @@ keys! { DIFFUSION: fn diffusion(s) -> DiffusionSettings { DiffusionSettings;
     /// Number of bounces of mode "diffusion": times that cells gather light from all others, after
     /// diffusion.
     bounces: integer(0, 0, MAX_BOUNCES);
+    /// Edge of the cells that bounces lead between, in cells of the grid. A bounce between cells of
+    /// twice the edge takes a sixteenth of the work.
+    bounce_cells: integer(2, 1, MAX_BOUNCE_CELLS);
     /// Whether the light of mode "diffusion" changes inside of each blob, as it does in the clouds
     /// around it.
     slopes: flag(true);

@@ -1,8 +1,11 @@
 //! Bounces: light on straight ways between cells, scattered again where it arrives.
 
+use super::Room;
+use super::cells::Cells;
+use super::merged::{self, Merged};
 use super::push::{FluxPush, SystemPush};
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
+use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
 use crate::layout::diffusion::DiffusionParams;
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
@@ -54,9 +57,7 @@ record! {
 buffers! {
     /// Light that cells send out, four `[f32; 4]` by cell: evenly, beside the extinction, and three
     /// times the flux along each axis.
-    pub struct Scratch(n_cells: u64) {
-        /// That of suns and lamps.
-        arrived: Buffer => [[f32; 4]; 4], n_cells, "diffusion.arrived", Texels;
+    struct Scratch(n_cells: u64) {
         /// All of it.
         sent: Buffer => [[f32; 4]; 4], n_cells, "diffusion.sent", Texels;
         /// Q0 and q of what a bounce has changed.
@@ -64,31 +65,51 @@ buffers! {
     }
 }
 
+buffers! {
+    /// The same by cell of the grid.
+    struct Arrived(n_cells: u64) {
+        /// That of suns and lamps.
+        arrived: Buffer => [[f32; 4]; 4], n_cells, "diffusion.arrived", Texels;
+    }
+}
+
 /// The kernels, and their scratch.
 pub(super) struct Bounces {
+    flux: Kernel,
     bounce: Kernel,
     /// The equations of a change.
     pub system: Kernel,
     correct: Kernel,
     seen: Kernel,
-    pub scratch: Scratch,
+    arrived: Arrived,
+    scratch: Scratch,
+    /// The cells that bounces lead between, where they are not those of the grid.
+    pub merged: Option<Merged>,
     has_solids: bool,
 }
 
 impl Bounces {
-    /// Creates the kernels, and scratch for `n_cells`.
-    pub fn new(
-        device: &Device,
-        compiler: &Compiler,
-        n_cells: u64,
-        (n_sets, has_solids): (u32, bool),
-    ) -> Result<Bounces> {
-        let solids = [("N_SETS", n_sets), ("SOLIDS", u32::from(has_solids))];
+    /// Lists the sizes of all scratch buffers; none without bounces.
+    pub fn specs(room: Room) -> Vec<BufferSpec> {
+        let (n, few) = (room.n_grid_cells(), room.n_bounce_cells());
+        match room.bounce_cells {
+            0 => vec![],
+            1 => [Arrived::specs(n), Scratch::specs(n)].concat(),
+            _ => [Arrived::specs(n), Scratch::specs(few), merged::Scratch::specs(few)].concat(),
+        }
+    }
+
+    /// Creates the kernels and the scratch.
+    pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Bounces> {
+        let has_solids = room.n_solid_facets > 0;
+        let solids = [("N_SETS", room.n_sets), ("SOLIDS", u32::from(has_solids))];
         let kernel = |name: &str, fields: &_, macros: &[(&str, u32)]| {
             Kernel::with_macros(device, compiler, name, fields, &[], macros)
         };
-        let alone = [("N_SETS", n_sets), ("SOLIDS", 0)];
+        let alone = [("N_SETS", room.n_sets), ("SOLIDS", 0)];
+        let is_merged = room.bounce_cells > 1;
         Ok(Bounces {
+            flux: kernel("diffusion.flux", FluxPush::FIELDS, &[("BOUNCES", 1)])?,
             bounce: kernel("diffusion.bounce", BouncePush::FIELDS, &solids)?,
             system: kernel("diffusion.system", SystemPush::FIELDS, &alone)?,
             correct: kernel(
@@ -97,24 +118,46 @@ impl Bounces {
                 &[("BOUNCES", 1), ("CORRECTS", 1)],
             )?,
             seen: kernel("diffusion.seen", SeenPush::FIELDS, &solids)?,
-            scratch: Scratch::new(device, n_cells)?,
+            arrived: Arrived::new(device, room.n_grid_cells())?,
+            scratch: Scratch::new(device, room.n_bounce_cells())?,
+            merged: is_merged.then(|| Merged::new(device, compiler, room)).transpose()?,
             has_solids,
         })
     }
 
-    /// Replaces φ and F of `field` by those of what cells gather, and writes their change.
+    /// Returns what suns and lamps make each cell of the grid send out.
+    pub fn arrived(&self) -> &Buffer {
+        &self.arrived.arrived
+    }
+
+    /// Returns Q0 and q of what a bounce has changed.
+    pub fn change(&self) -> &Buffer {
+        &self.scratch.change
+    }
+
+    /// Writes φ and F, and what each cell sends out.
+    pub fn record_flux(
+        &self,
+        rec: &mut Recorder<'_>,
+        cells: &Cells<'_>,
+        [phi, arrived]: [&Buffer; 2],
+    ) -> Result<()> {
+        let all = [cells.density, phi, cells.field, arrived, &self.scratch.sent];
+        rec.dispatch(&self.flux, &all, &cells.flux_push(), cells.n_total())
+    }
+
+    /// Replaces φ and F of the cells by those of what they gather, and writes their change.
     pub fn record_gather(
         &self,
         rec: &mut Recorder<'_>,
-        [lights, field, faces]: [&Buffer; 3],
-        grid: &GridRecord,
-        of: &DiffusionParams,
+        cells: &Cells<'_>,
+        [lights, faces]: [&Buffer; 2],
         n_lights: u32,
     ) -> Result<()> {
-        let Scratch { sent, change, .. } = &self.scratch;
-        let times = |a: [f32; 3], b: f32| a.map(|a| a * b);
+        let Scratch { sent, change } = &self.scratch;
+        let (of, times) = (&cells.of, |a: [f32; 3], b: f32| a.map(|a| a * b));
         let push = BouncePush {
-            grid: *grid,
+            grid: cells.grid,
             weakened: of.weakened,
             n_lights,
             even: of.scattered(),
@@ -123,21 +166,21 @@ impl Bounces {
             kept: of.kept,
             ..BouncePush::default()
         };
-        let all = [lights, sent, field, change, faces];
+        let all = [lights, sent, cells.field, change, faces];
         let n_buffers = 4 + usize::from(self.has_solids);
-        rec.dispatch(&self.bounce, &all[..n_buffers], &push, grid.n_cells.iter().product())
+        rec.dispatch(&self.bounce, &all[..n_buffers], &push, cells.n_total())
     }
 
     /// Adds what diffusion makes of the change.
     pub fn record_correction(
         &self,
         rec: &mut Recorder<'_>,
-        [density, phi, field]: [&Buffer; 3],
-        push: &FluxPush,
+        cells: &Cells<'_>,
+        [phi, arrived]: [&Buffer; 2],
     ) -> Result<()> {
-        let Scratch { arrived, sent, change } = &self.scratch;
-        let buffers = [density, phi, field, arrived, sent, change];
-        rec.dispatch(&self.correct, &buffers, push, push.grid.n_cells.iter().product())
+        let Scratch { sent, change } = &self.scratch;
+        let buffers = [cells.density, phi, cells.field, arrived, sent, change];
+        rec.dispatch(&self.correct, &buffers, &cells.flux_push(), cells.n_total())
     }
 
     /// Writes the radiance that each cell scatters toward the eye.
@@ -158,7 +201,7 @@ impl Bounces {
             straight: of.straight,
             eye,
         };
-        let all = [lights, field, &self.scratch.arrived, seen, faces];
+        let all = [lights, field, self.arrived(), seen, faces];
         let n_buffers = 4 + usize::from(self.has_solids);
         rec.dispatch(&self.seen, &all[..n_buffers], &push, grid.n_cells.iter().product())
     }

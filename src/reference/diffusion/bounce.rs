@@ -25,13 +25,15 @@ pub(super) fn directions() -> [DVec3; 24] {
     })
 }
 
+/// Cycles for the change by a bounce: the next bounce finds what is left.
+const CYCLES_OF_CHANGE: u32 = 1;
+
 /// The cells that bounces lead between.
 pub(super) struct Bounces<'a> {
     pub of: &'a DiffusionMedium,
     pub grid: &'a GridSpec,
     /// Extinction by cell.
     pub cells: &'a [f64],
-    pub n_cycles: u32,
 }
 
 impl Bounces<'_> {
@@ -43,8 +45,19 @@ impl Bounces<'_> {
         sources.of_suns.iter().map(of).collect()
     }
 
+    /// Returns the light after `n` bounces of `light`.
+    pub fn after(
+        &self,
+        n: u32,
+        ways: &Ways<'_>,
+        arrived: &[Moments],
+        light: Vec<Moments>,
+    ) -> Vec<Moments> {
+        (0..n).fold(light, |light, _| self.next(ways, arrived, &light))
+    }
+
     /// Returns the light after one more bounce of `light`, and what diffusion makes of the change.
-    pub fn next(&self, ways: &Ways<'_>, arrived: &[Moments], light: &[Moments]) -> Vec<Moments> {
+    fn next(&self, ways: &Ways<'_>, arrived: &[Moments], light: &[Moments]) -> Vec<Moments> {
         let MeanMedium { albedo, g, straight: f } = self.of.mean;
         let ([even, forward], weakened) = (self.of.mean.scattered(), self.of.mean.weakened());
         let sent = |c: usize, toward: DVec3| {
@@ -84,7 +97,7 @@ impl Bounces<'_> {
             direct: vec![],
         };
         let system = System::new(self.of, self.grid, self.cells, &sources, &[], None);
-        let phi = Multigrid::new(system, self.grid.edges()).solve(self.n_cycles);
+        let phi = Multigrid::new(system, self.grid.edges()).solve(CYCLES_OF_CHANGE);
         let more = flux_of(self.of, self.grid, self.cells, &sources, &phi);
         let all = found.iter().zip(more);
         all.map(|(a, b)| std::array::from_fn(|k| a[k] + b[k])).collect()

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::bounce::Bounces;
 use super::faces::FaceLight;
+use super::merged::Merged;
 use super::moments::{corners, flux_of};
 use super::multigrid::Multigrid;
 use super::seen::SeenCells;
@@ -37,39 +38,51 @@ impl DiffuseLight {
         of_solids: Option<&FaceLight>,
         n_cycles: u32,
     ) -> DiffuseLight {
-        DiffuseLight::with_bounces(of, obstacles, lights, of_solids, (n_cycles, 0), DVec3::ZERO).0
+        DiffuseLight::with_bounces(of, obstacles, lights, of_solids, (n_cycles, 0, 1), DVec3::ZERO)
+            .0
     }
 
     /// Computes the light after a number of bounces, and with any the light of the cells toward
-    /// `eye`.
+    /// `eye`. Bounces lead between cells that are `edge` cells wide.
     pub fn with_bounces(
         of: &DiffusionMedium,
         obstacles: &Obstacles<'_>,
         lights: &[Light],
         of_solids: Option<&FaceLight>,
-        (n_cycles, n_bounces): (u32, u32),
+        (n_cycles, n_bounces, edge): (u32, u32, u32),
         eye: DVec3,
     ) -> (DiffuseLight, Option<SeenCells>) {
         let grid = obstacles.spec;
         let counted: Vec<f64> = obstacles.cells.iter().map(|c| c.min(of.densest)).collect();
         let cells = &counted[..];
         let sources = Sources::new(of, obstacles, lights, of_solids.is_some());
-        let system = System::new(of, grid, cells, &sources, lights, of_solids);
-        let phi = Multigrid::new(system, grid.edges()).solve(n_cycles);
-        let mut light = DiffuseLight::of_fluence(of, grid, cells, &sources, &phi);
+        let solved = |of, grid: &GridSpec, cells: &[f64], sources: &Sources| {
+            let system = System::new(of, grid, cells, sources, lights, of_solids);
+            let phi = Multigrid::new(system, grid.edges()).solve(n_cycles);
+            flux_of(of, grid, cells, sources, &phi)
+        };
+        let mut light = solved(of, grid, cells, &sources);
+        let direct = sources.direct.clone();
         if n_bounces == 0 {
-            return (light, None);
+            return (DiffuseLight { spec: *grid, cells: light, direct }, None);
         }
         let weakened = of.mean.weakened();
-        let all = cells.iter().map(|sigma| weakened * *sigma).collect();
-        let ways = Ways::new(grid, all, lights, of_solids);
-        let bounces = Bounces { of, grid, cells, n_cycles };
+        let depths = |cells: &[f64]| cells.iter().map(|sigma| weakened * *sigma).collect();
+        let ways = Ways::new(grid, depths(cells), lights, of_solids);
+        let bounces = Bounces { of, grid, cells };
         let arrived = bounces.arrived(&sources);
-        for _ in 0..n_bounces {
-            light.cells = bounces.next(&ways, &arrived, &light.cells);
+        if edge == 1 {
+            light = bounces.after(n_bounces, &ways, &arrived, light);
+        } else {
+            let few = Merged::new(of, (grid, cells), &sources, &arrived, edge);
+            let before = solved(&few.of, &few.grid, &few.cells, &few.sources);
+            let ways = Ways::new(&few.grid, depths(&few.cells), lights, of_solids);
+            let bounces = Bounces { of: &few.of, grid: &few.grid, cells: &few.cells };
+            let after = bounces.after(n_bounces, &ways, &few.arrived, before.clone());
+            few.spread(grid, &mut light, [&before, &after]);
         }
-        let seen = SeenCells::new(of, (grid, cells), &light.cells, (&arrived, &ways), eye);
-        (light, Some(seen))
+        let seen = SeenCells::new(of, (grid, cells), &light, (&arrived, &ways), eye);
+        (DiffuseLight { spec: *grid, cells: light, direct }, Some(seen))
     }
 
     /// Returns φ with the flux F = q − D∇φ; at the faces of the box by one-sided differences.

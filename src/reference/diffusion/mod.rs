@@ -11,7 +11,8 @@
 //!
 //! - [`FaceLight`], [`BoxLight`]: what surfaces and ground send to the cells, and cells to them.
 //!
-//! - Bounces: light on straight ways between cells; [`SeenCells`]: what cells show of it.
+//! - Bounces: light on straight ways between cells, or merged ones; [`SeenCells`]: what cells show
+//!   of it.
 //!
 //! - [`DiffuseLight`]: all of them for a frame, and what a blob scatters of it.
 
@@ -20,6 +21,7 @@ mod box_light;
 mod direct_solve;
 mod faces;
 mod field;
+mod merged;
 mod moments;
 mod multigrid;
 mod seen;

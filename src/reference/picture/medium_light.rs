@@ -51,9 +51,9 @@ impl MediumLight {
         let lift = scene.longest_facet_edge();
         let of_solids =
             (!facets.is_empty()).then(|| FaceLight::new(grid, &facets, &radiosity, lights, lift));
-        let DiffusionSettings { cycles, bounces, .. } = scene.lighting.diffusion;
+        let DiffusionSettings { cycles, bounces, bounce_cells, .. } = scene.lighting.diffusion;
         let of_solids = of_solids.as_ref();
-        let n = (cycles, bounces);
+        let n = (cycles, bounces, bounce_cells);
         let (cells, seen) =
             DiffuseLight::with_bounces(&medium, obstacles, lights, of_solids, n, eye);
         let depths = obstacles.depths(&receivers, lights);

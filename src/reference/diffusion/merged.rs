@@ -1,0 +1,98 @@
+//! Merged cells, between which bounces lead.
+
+use glam::DVec3;
+
+use super::moments::corners;
+use super::sources::{DiffusionMedium, Moments, Sources};
+use crate::model::grid::GridSpec;
+
+/// Means over the volume of a merged cell.
+#[derive(Clone, Default)]
+struct Sums {
+    extinction: f64,
+    /// Q0.
+    scattered: DVec3,
+    /// q/D along each axis.
+    momentum: [DVec3; 3],
+    /// Extinction times what is sent out.
+    sent: Moments,
+}
+
+/// Returns the merged cell that cell `c` is in.
+fn place_in(grid: &GridSpec, few: &GridSpec, c: usize, edge: usize) -> usize {
+    let (n, m) = (grid.n_cells.as_usizevec3(), few.n_cells.as_usizevec3());
+    let (x, y, z) = (c % n.x / edge, c / n.x % n.y / edge, c / (n.x * n.y) / edge);
+    x + m.x * (y + m.y * z)
+}
+
+/// Cells of a grid, merged.
+pub(super) struct Merged {
+    /// The merged cells.
+    pub grid: GridSpec,
+    /// The medium, with the densest of these cells.
+    pub of: DiffusionMedium,
+    /// Extinction by cell.
+    pub cells: Vec<f64>,
+    /// Q0 and q.
+    pub sources: Sources,
+    /// What suns and lamps make each cell send out, over s σ and times 4π.
+    pub arrived: Vec<Moments>,
+}
+
+impl Merged {
+    /// Merges cells `edge` by `edge` by `edge`. Their extinction is `cells`.
+    pub fn new(
+        of: &DiffusionMedium,
+        (grid, cells): (&GridSpec, &[f64]),
+        sources: &Sources,
+        arrived: &[Moments],
+        edge: u32,
+    ) -> Merged {
+        let few = grid.merged(edge);
+        let of_few = DiffusionMedium { densest: of.densest / f64::from(edge), ..*of };
+        let mut sums = vec![Sums::default(); few.n_total() as usize];
+        let share = 1.0 / f64::from(edge.pow(3));
+        for (c, sigma) in cells.iter().enumerate() {
+            let sum = &mut sums[place_in(grid, &few, c, edge as usize)];
+            sum.extinction += share * sigma;
+            sum.scattered += share * sources.scattered[c];
+            for axis in 0..3 {
+                sum.momentum[axis] += share * sources.carried[c][axis] / of.reach(*sigma);
+            }
+            for (sent, value) in sum.sent.iter_mut().zip(arrived[c]) {
+                *sent += share * *sigma * value;
+            }
+        }
+        let counted = |sum: &Sums| sum.extinction.min(of_few.densest);
+        // What a cell sends out stays, also where less of its extinction counts.
+        let sent = |sum: &Sums| {
+            let sigma = counted(sum);
+            sum.sent.map(|v| if sigma > 0.0 { v / sigma } else { DVec3::ZERO })
+        };
+        let carried = |sum: &Sums| sum.momentum.map(|q| of_few.reach(sum.extinction) * q);
+        Merged {
+            grid: few,
+            of: of_few,
+            cells: sums.iter().map(counted).collect(),
+            sources: Sources {
+                scattered: sums.iter().map(|sum| sum.scattered).collect(),
+                carried: sums.iter().map(carried).collect(),
+                of_suns: vec![],
+                direct: vec![],
+            },
+            arrived: sums.iter().map(sent).collect(),
+        }
+    }
+
+    /// Adds the rise from `before` to `after` in the merged cells to the light of the cells of
+    /// `grid`: trilinear between the merged cells' centres.
+    pub fn spread(&self, grid: &GridSpec, light: &mut [Moments], [before, after]: [&[Moments]; 2]) {
+        for (c, light) in light.iter_mut().enumerate() {
+            for (from, weight) in corners(&self.grid, grid.center(c)) {
+                for (k, light) in light.iter_mut().enumerate() {
+                    *light += weight * (after[from][k] - before[from][k]);
+                }
+            }
+        }
+    }
+}

@@ -210,7 +210,7 @@ mod tests {
             format!(
                 "lighting.mode = \"auto\" took \"similarity\" ({cells} cells) (lighting.budget_ms \
                  4): a frame with \"similarity\" ({cells} cells) takes 1.23 ms {first}, \
-                 \"diffusion\" ({fifth_cells} cells, 1 bounce) takes 5.00 ms {fifth}"
+                 \"diffusion\" ({fifth_cells} cells, 2 bounces) takes 5.00 ms {fifth}"
             )
         );
     }

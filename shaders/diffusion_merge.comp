@@ -57,7 +57,7 @@ void main() {
             }
         }
         float share = 1.0 / float(push.edge * push.edge * push.edge);
-        // What a cell sends out stays, also where less of its extinction counts.
+        // A merged cell sends out all that its cells do, also where less extinction counts.
         float sigma = min(share * all, push.densest), weight = sigma > 0.0 ? share / sigma : 0.0;
         merged_density[i] = sigma;
         [[unroll]] for (int k = 0; k < 4; ++k) {

@@ -118,6 +118,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn merged_cells_of_a_record_are_those_of_its_grid() {
+        let (n_cells, low) = (UVec3::new(24, 17, 13), DVec3::new(-1.0, 2.0, 0.5));
+        let spec = GridSpec { n_cells, cell: 0.25, aspect: 0.5, low };
+        for edge in [1, 2, 3, 8] {
+            let merged = spec.merged(edge);
+            assert!(merged.high().cmpge(spec.high()).all());
+            let (found, expected) = (GridRecord::from(&spec).merged(edge), (&merged).into());
+            let GridRecord { n_cells, cell, aspect, low, .. } = expected;
+            assert_eq!((found.n_cells, found.cell, found.aspect), (n_cells, cell, aspect));
+            assert!(found.low == low && (found.inv_cell * cell - 1.0).abs() < 2.0 * f32::EPSILON);
+        }
+        assert_eq!(spec.merged(2).n_cells, UVec3::new(12, 9, 7));
+    }
+
+    #[test]
     fn levels_follow_one_another_and_have_room() {
         for (n, aspect) in
             [([32, 20, 14], 1.0), ([3, 3, 300], 1.0), ([5, 5, 5], 0.1), ([1; 3], 1.0)]

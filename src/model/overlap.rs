@@ -20,7 +20,8 @@ named! {
 pub const SLICE: f64 = 1.25;
 
 /// Returns the number of slices that a blob is dealt among. Thicker slices hold it in fewer, which
-/// cost less: with those that are left out, the error is the same within a tenth in study-cloud.
+/// cost less. Four in place of these have 1.01 (2.2 σ, three) and 0.96 (3 σ, two) of the error
+/// against the volume in study-cloud, and 1.00 and 0.74 in study-both.
 pub fn n_parts(slice: f64) -> u32 {
     match slice {
         s if s < 1.75 => 4,
@@ -75,6 +76,12 @@ mod tests {
             mass_max: 1.0,
             gust_reach: 0.0,
         }
+    }
+
+    #[test]
+    fn thicker_slices_hold_a_blob_in_fewer() {
+        let slices = [0.1, SLICE, 1.74, 1.75, 2.74, 2.75, 10.0];
+        assert_eq!(slices.map(n_parts), [4, 4, 4, 3, 3, 2, 2]);
     }
 
     #[test]

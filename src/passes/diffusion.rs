@@ -199,27 +199,22 @@ impl Diffusion {
             densest: of.densest,
         };
         let cells = Cells { grid: *grid, density, field, of: *of };
-        let all = [lights, regions, density, field];
-        match &self.bounces {
-            None => {
-                rec.dispatch(&self.sources, &all, &push, cells.n_total())?;
-                self.record_light(rec, lights, &cells, work)?;
+        let arrived = self.bounces.as_ref().map(Bounces::arrived);
+        let all: Vec<&Buffer> =
+            [lights, regions, density, field].into_iter().chain(arrived).collect();
+        rec.dispatch(&self.sources, &all, &push, cells.n_total())?;
+        let merged = self.bounces.as_ref().and_then(|bounces| bounces.merged.as_ref());
+        match (arrived, merged) {
+            (None, _) => self.record_light(rec, lights, &cells, work)?,
+            (Some(arrived), None) => {
+                self.record_bounces(rec, (lights, arrived), &cells, None, work)?;
             }
-            Some(bounces) => {
-                let arrived = bounces.arrived();
-                let all = [lights, regions, density, field, arrived];
-                rec.dispatch(&self.sources, &all, &push, cells.n_total())?;
-                match &bounces.merged {
-                    None => self.record_bounces(rec, (lights, arrived), &cells, None, work)?,
-                    Some(merged) => {
-                        let few = merged.record_merge(rec, &cells, arrived)?;
-                        let merged::Scratch { arrived, before, .. } = &merged.scratch;
-                        let given = (lights, arrived);
-                        self.record_bounces(rec, given, &few, Some(before), work)?;
-                        self.record_light(rec, lights, &cells, work)?;
-                        merged.record_spread(rec, &cells)?;
-                    }
-                }
+            (Some(arrived), Some(merged)) => {
+                let few = merged.record_merge(rec, &cells, arrived)?;
+                let merged::Scratch { arrived, before, .. } = &merged.scratch;
+                self.record_bounces(rec, (lights, arrived), &few, Some(before), work)?;
+                self.record_light(rec, lights, &cells, work)?;
+                merged.record_spread(rec, &cells)?;
             }
         }
         match &self.solids {
@@ -241,8 +236,8 @@ impl Diffusion {
         rec.dispatch(&self.flux, &buffers, &cells.flux_push(), cells.n_total())
     }
 
-    /// Writes φ and F of cells whose sources are known after all bounces between them. Without
-    /// bounces they are copied to `before`.
+    /// Writes φ and F of cells whose sources are known, after all bounces between them. Those before
+    /// the first bounce are copied to `before`.
     fn record_bounces(
         &self,
         rec: &mut Recorder<'_>,
@@ -266,6 +261,7 @@ impl Diffusion {
             let push = cells.system_push(0);
             let system = [lights, density, bounces.change(), operators, phi, source];
             rec.dispatch(&bounces.system, &system, &push, cells.n_total())?;
+            // One cycle: the next bounce finds what is left.
             self.record_cycle(rec, &steps, n_all, true)?;
             bounces.record_correction(rec, cells, [next_phi, arrived])?;
         }

@@ -61,8 +61,8 @@ struct Ray<'a> {
     sprites: &'a Sprites<'a>,
     /// Unit direction.
     direction: DVec3,
-    /// Those of the first and the last pixel that share light of cells with this one, and the
-    /// place between them.
+    /// Unit directions of the first and the last pixel between which the light of cells is linear,
+    /// and the pixel's place between them, 0 to 1.
     ends: [DVec3; 2],
     place: f64,
     /// Distance of the opaque pixel, and its bound.

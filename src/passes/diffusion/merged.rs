@@ -47,7 +47,7 @@ buffers! {
         field: Buffer => [[f32; 4]; 4], n_cells, "diffusion.merged_field", Texels;
         /// φ and F before the bounces.
         before: Buffer => [[f32; 4]; 4], n_cells, "diffusion.merged_before", Texels;
-        /// What suns and lamps make them send out, beside the extinction.
+        /// Light that suns and lamps make each cell send out, beside its extinction.
         arrived: Buffer => [[f32; 4]; 4], n_cells, "diffusion.merged_arrived", Texels;
     }
 }

@@ -35,7 +35,7 @@ pub(super) struct Merged {
     pub cells: Vec<f64>,
     /// Q0 and q.
     pub sources: Sources,
-    /// What suns and lamps make each cell send out, over s σ and times 4π.
+    /// Light that suns and lamps make each cell send out, over s σ and times 4π.
     pub arrived: Vec<Moments>,
 }
 
@@ -64,7 +64,7 @@ impl Merged {
             }
         }
         let counted = |sum: &Sums| sum.extinction.min(of_few.densest);
-        // What a cell sends out stays, also where less of its extinction counts.
+        // A merged cell sends out all that its cells do, also where less extinction counts.
         let sent = |sum: &Sums| {
             let sigma = counted(sum);
             sum.sent.map(|v| if sigma > 0.0 { v / sigma } else { DVec3::ZERO })

@@ -236,8 +236,8 @@ impl Diffusion {
         rec.dispatch(&self.flux, &buffers, &cells.flux_push(), cells.n_total())
     }
 
-    /// Writes φ and F of cells whose sources are known, after all bounces between them. Those before
-    /// the first bounce are copied to `before`.
+    /// Writes φ and F of cells whose sources are known, after all bounces between them. Those
+    /// before the first bounce are copied to `before`.
     fn record_bounces(
         &self,
         rec: &mut Recorder<'_>,

@@ -74,8 +74,8 @@ keys! { DIFFUSION: fn diffusion(s) -> DiffusionSettings { DiffusionSettings;
     /// Number of bounces of mode "diffusion": times that cells gather light from all others, after
     /// diffusion.
     bounces: integer(0, 0, MAX_BOUNCES);
-    /// Edge of the cells that bounces lead between, in cells of the grid. With twice the edge, light
-    /// takes a sixteenth of the steps from cell to cell.
+    /// Edge of the cells that bounces lead between, in cells of the grid. With twice the edge,
+    /// light takes a sixteenth of the steps from cell to cell.
     bounce_cells: integer(2, 1, MAX_BOUNCE_CELLS);
     /// Whether the light of mode "diffusion" changes inside of each blob, as it does in the clouds
     /// around it.

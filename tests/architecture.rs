@@ -71,6 +71,37 @@ fn sources(root: &Path) -> Vec<Source> {
     paths.iter().filter(is_rust).map(read).collect()
 }
 
+/// Files of the folder of a test program that neither its `main.rs` nor its `mod.rs` declares. Cargo
+/// would not compile them.
+fn undeclared(folder: &Path) -> Vec<PathBuf> {
+    let text = |name: &str| fs::read_to_string(folder.join(name)).unwrap_or_default();
+    let declared = text("main.rs") + &text("mod.rs");
+    let is_forgotten = |path: &PathBuf| {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        path.extension().is_some_and(|extension| extension == "rs")
+            && !["main", "mod"].contains(&name.as_ref())
+            && !declared.contains(&format!("mod {name};"))
+    };
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.filter(is_forgotten).collect()
+}
+
+#[test]
+fn every_test_is_compiled() {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let folders = fs::read_dir(tests).unwrap().map(|entry| entry.unwrap().path());
+    let programs: Vec<PathBuf> =
+        folders.filter(|folder| folder.join("main.rs").is_file()).collect();
+    let forgotten: Vec<PathBuf> = programs.iter().flat_map(|folder| undeclared(folder)).collect();
+    assert!(programs.len() >= 10 && forgotten.is_empty(), "{forgotten:?}");
+
+    let dir = tempfile::tempdir().expect("a folder");
+    for (name, text) in [("main.rs", "mod a;"), ("a.rs", ""), ("b.rs", ""), ("c.txt", "")] {
+        fs::write(dir.path().join(name), text).expect("a file");
+    }
+    assert_eq!(undeclared(dir.path()), [dir.path().join("b.rs")]);
+}
+
 #[test]
 fn the_diagram_shows_the_imports_between_rooms() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -237,7 +268,8 @@ fn check_rooms(root: &Path, complaints: &mut Vec<String>) {
             [path.file_stem(), folder].contains(&Some(room.as_ref()))
         };
         need(references.iter().any(is_reference), format!("src/reference/{room}.rs"));
-        need(root.join(format!("tests/pass_{room}.rs")).is_file(), format!("tests/pass_{room}.rs"));
+        let test = format!("tests/passes/{room}.rs");
+        need(root.join(&test).is_file(), test);
         let is_shader = |name: &String| {
             name.split_once('.')
                 .is_some_and(|(stem, kind)| stem.starts_with(&room) && SHADER_KINDS.contains(&kind))

@@ -80,8 +80,8 @@ fn render(dir: &TempDir, name: &str, more: &[&str]) {
     assert!(output.status.success(), "{more:?}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Error of lighting and drawing in f32, as in tests/render_reference.rs. The ground's edge, where
-/// a pixel may belong to either side, is out of view.
+/// Error of lighting and drawing in f32, as in tests/commands/render_reference.rs. The ground's
+/// edge, where a pixel may belong to either side, is out of view.
 const RMSE_OF_F32: f64 = 1e-5;
 
 #[test]

@@ -2,7 +2,7 @@
 //!
 //! In: a disc's parameters and the time. Out: its particles relative to their group's center, with
 //! σ and κ at their age. Law: model.md §2, in closed form of (seed, slot, time).
-//! Source: C §2.3. Error: tests/pass_live.rs derives the bound on position, σ and κ from the
+//! Source: C §2.3. Error: tests/passes/live.rs derives the bound on position, σ and κ from the
 //! rounding of each operation; generations and births are integers, equal to those in f64.
 
 use crate::error::Result;

@@ -40,8 +40,8 @@ fn correct_tree_has_no_complaints() {
         ("src/reference/sort.rs", "use crate::model::{boxes, camera as eye};"),
         ("src/reference/sprites/mod.rs", ""),
         ("src/cli/bench.rs", "fn f() { let e = crate::timing::records::cpu(); e.unwrap_or(1); }"),
-        ("tests/pass_sort.rs", ""),
-        ("tests/pass_sprites.rs", ""),
+        ("tests/passes/sort.rs", ""),
+        ("tests/passes/sprites.rs", ""),
         ("shaders/sort_scatter.comp", ""),
         ("shaders/sprites.vert", ""),
     ]);
@@ -107,7 +107,7 @@ fn every_violation_is_reported() {
         if path == "src/passes/sort.rs" {
             files.extend([
                 ("src/reference/sort.rs", ""),
-                ("tests/pass_sort.rs", ""),
+                ("tests/passes/sort.rs", ""),
                 ("shaders/sort.comp", ""),
             ]);
         }
@@ -150,7 +150,7 @@ fn incomplete_pass_is_reported() {
     let complaints = complaints_of(&[("src/passes/mod.rs", ""), ("src/passes/grid.rs", "")]);
     assert_eq!(complaints.len(), 3, "{complaints:?}");
     for (complaint, what) in
-        complaints.iter().zip(["src/reference/grid.rs", "tests/pass_grid.rs", "shaders/grid"])
+        complaints.iter().zip(["src/reference/grid.rs", "tests/passes/grid.rs", "shaders/grid"])
     {
         assert!(complaint.contains(what), "{complaint}");
     }

@@ -11,7 +11,7 @@ use super::harness::{Cluster, Farm, alone, content, path_text, succeed, text};
 #[test]
 fn on_slurm_240_frames_are_the_frames_of_one_machine() {
     let cluster = Cluster::up();
-    let farm = Farm::planned(&["--frames", "240", "--shard-frames", "10", "--size", "64x48"]);
+    let farm = Farm::planned(&["--frames", "240", "--shard-frames", "30", "--size", "64x48"]);
     let (_, merge) = farm.submit(&cluster, &[]);
     farm.wait_for_job(&cluster, &merge);
     let merged = content(&farm.merged());
@@ -22,7 +22,7 @@ fn on_slurm_240_frames_are_the_frames_of_one_machine() {
     let nodes: BTreeSet<&str> =
         attempts.iter().map(|a| a["node"].as_str().expect("a name")).collect();
     assert_eq!(nodes.len(), 4, "{nodes:?}");
-    assert_eq!(farm.status(&cluster)["n_done"], 24);
+    assert_eq!(farm.status(&cluster)["n_done"], 8);
 
     // Nothing is left to submit.
     let output = cluster.nimbus(&["farm", "submit", "slurm", "--plan", farm.path()]);

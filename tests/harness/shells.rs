@@ -27,7 +27,7 @@ pub const REGIONS: [u32; 4] = [3, 3, 1, 1];
 pub const N_PER_CLOUD: u32 = 1500;
 /// The clouds' facets follow those of the surfaces.
 pub const N_SURFACE_FACETS: usize = 5;
-/// Relative error of the shader's 1 − e^−t, as checked by tests/functions.rs.
+/// Relative error of the shader's 1 − e^−t, as checked by tests/passes/functions.rs.
 const ONE_MINUS_EXP_ERROR: f64 = 3.5e-7;
 /// Relative error of length(v) of three squares: half of 3 + 2 roundings under the root; and the
 /// root, which Vulkan derives from inversesqrt (2 ulp = 4 u) and a division (5 u).

@@ -1,0 +1,232 @@
+//! diffusion against its f64 twin: every facet's light on the device is that of the twin, wrong
+//! shaders are found, and what stands still is not computed again.
+
+use std::sync::Arc;
+
+use crate::harness::Gpu;
+use crate::media;
+use crate::media::scene;
+use glam::DVec3;
+use nimbus::frame::plan::{Pass, Plan};
+use nimbus::frame::{Game, Renderer};
+use nimbus::io::scene_file;
+use nimbus::model::scene::Scene;
+
+#[test]
+fn every_facet_has_the_light_of_the_twin() {
+    let gpu = Gpu::new();
+    for name in ["coloured", "droplets", "flat", "boxes", "opaque", "floors"] {
+        media::check(&gpu, name, "diffusion");
+        media::check(&gpu, name, "bounces");
+        media::check(&gpu, name, "merged");
+    }
+}
+
+#[test]
+fn bounces_have_the_same_light_without_slopes() {
+    let gpu = Gpu::new();
+    for name in ["boxes", "floors"] {
+        let scene = scene(name, "bounces", &["lighting.slopes=false"]);
+        let (found, truth) =
+            (media::on_device(&gpu, &gpu.compiler, &scene), media::by_twin(&scene));
+        assert!(found.slopes.is_empty());
+        let off = media::apart(&found.radiance, &truth.radiance);
+        assert!(off < media::bound(&scene), "{name}: {off:e}");
+    }
+}
+
+#[test]
+fn wrong_shaders_are_found() {
+    let wrong = [
+        ("coloured", "diffusion", "diffusion_sources.comp", "z -= e", "z += e"),
+        ("boxes", "diffusion", "diffusion_sources.comp", "SLOPES + BOUNCES != 0 || sigma", "sigma"),
+        ("coloured", "diffusion", "diffusion_sources.comp", "1.0 / 3.0", "0.0, 1.0, 0.0"),
+        ("boxes", "diffusion", "scatter.comp", "0.5 * edges[axis]", "0.55 * edges[axis]"),
+        ("coloured", "diffusion", "scatter.comp", "? 2.0 * first", "? first"),
+        ("flat", "diffusion", "scatter.comp", "(all * edges)", "(all * edges.x)"),
+        (
+            "coloured",
+            "diffusion",
+            "diffusion_sources.comp",
+            "is_clear(p, light",
+            "true || is_clear(p, light",
+        ),
+        ("coloured", "diffusion", "diffusion_system.comp", "next[2][set]", "next[1][set]"),
+        ("flat", "diffusion", "diffusion_system.comp", "axis == 1 ? 0.0", "axis == 0 ? 0.0"),
+        ("floors", "diffusion", "diffusion_solids.comp", "share_of(light", "0.99 * share_of(light"),
+        ("coloured", "diffusion", "diffusion_solids.comp", "push.backward * tau", "tau"),
+        ("floors", "diffusion", "diffusion_faces.comp", "sent - all", "sent"),
+        ("floors", "diffusion", "diffusion_faces.comp", "offset.y > 0.0", "offset.y < 0.0"),
+        ("floors", "diffusion", "diffusion_faces.comp", "place.xyz - at", "place.xyz - to.center"),
+        ("floors", "diffusion", "diffusion_faces.comp", "n = 32u", "n = 16u"),
+        ("floors", "diffusion", "include/faces.glsl", "(axis + 2u) % 3u", "(axis + 1u) % 3u"),
+        (
+            "floors",
+            "diffusion",
+            "diffusion_system.comp",
+            "max(j, vec3(0.0)) - half",
+            "j - 0.0 * half",
+        ),
+        (
+            "floors",
+            "diffusion",
+            "diffusion_sources.comp",
+            "fallen += light",
+            "fallen += 0.0 * light",
+        ),
+        ("floors", "diffusion", "diffusion_patches.comp", "c.share *", "0.125 *"),
+        ("coloured", "diffusion", "diffusion_sources.comp", "0.5 * whole", "0.6 * whole"),
+        ("coloured", "diffusion", "diffusion_sources.comp", "(1.0 - absorbed) /", "0.9 /"),
+        ("coloured", "diffusion", "diffusion_sources.comp", "of.share * e", "e"),
+        ("opaque", "diffusion", "diffusion_sources.comp", "min(place * own,", "(place * own +"),
+        ("opaque", "diffusion", "diffusion_sources.comp", "min(whole, push", "(whole + push"),
+        (
+            "opaque",
+            "bounces",
+            "diffusion_system.comp",
+            "min(FLOAT(density, c), push.densest)",
+            "FLOAT(density, c)",
+        ),
+        (
+            "opaque",
+            "bounces",
+            "diffusion_flux.comp",
+            "min(FLOAT(density, c), push.densest)",
+            "FLOAT(density, c)",
+        ),
+        ("coloured", "bounces", "diffusion_sources.comp", "along * z", "along * x"),
+        ("coloured", "bounces", "diffusion_flux.comp", "push.even * fluence", "fluence"),
+        ("coloured", "bounces", "diffusion_flux.comp", "push.forward * flux", "flux"),
+        ("flat", "bounces", "diffusion_sources.comp", "SLOPES + BOUNCES != 0 || sigma", "sigma"),
+        ("coloured", "bounces", "diffusion_bounce.comp", "0.908248290463863", "0.9"),
+        ("coloured", "bounces", "diffusion_bounce.comp", "y += l * w.y", "y -= l * w.y"),
+        ("flat", "bounces", "diffusion_bounce.comp", "reach * push.forward;", "push.forward;"),
+        (
+            "coloured",
+            "bounces",
+            "diffusion_flux.comp",
+            "fluence += field",
+            "fluence += 0.9 * field",
+        ),
+        ("coloured", "bounces", "diffusion_flux.comp", "flux += uint", "flux += 0.9 * uint"),
+        ("coloured", "bounces", "diffusion_seen.comp", "0.5 * dot(bend", "dot(bend"),
+        ("coloured", "bounces", "diffusion_seen.comp", "of_suns * mix(1.0", "of_suns * mix(0.9"),
+        ("coloured", "bounces", "diffusion_seen.comp", "(1.0 - push.weakened) *", "0.9 *"),
+        ("flat", "bounces", "include/ways.glsl", "face = 0.5 * across", "face = across"),
+        ("coloured", "bounces", "include/ways.glsl", "w.y < 0.0 ? 1.0", "w.y > 0.0 ? 1.0"),
+        ("floors", "bounces", "include/ways.glsl", "turn[axis] > 0 ? 1u", "turn[axis] < 0 ? 1u"),
+        ("flat", "bounces", "scatter.comp", "passed *= on", "passed *= 1.0"),
+        ("coloured", "bounces", "scatter.comp", "APART = 1.2", "APART = 1.3"),
+        ("boxes", "bounces", "scatter.comp", "(k & 2) == 0", "(k & 1) == 0"),
+        ("coloured", "bounces", "scatter.comp", "law.depth * push", "push"),
+        (
+            "boxes",
+            "bounces",
+            "scatter.comp",
+            "relative -= dot(relative, toward)",
+            "relative -= 0.0",
+        ),
+        ("coloured", "merged", "diffusion_merge.comp", "loss_of(even.w) * field", "field"),
+        ("flat", "merged", "diffusion_merge.comp", "even.w * arrived_at", "arrived_at"),
+        ("opaque", "merged", "diffusion_merge.comp", "share / sigma", "1.0 / max(all, 1e-30)"),
+        ("boxes", "merged", "diffusion_merge.comp", "min(first + int(push.edge)", "min(first + 2"),
+        ("boxes", "merged", "diffusion_spread.comp", "+ 0.5) / float", ") / float"),
+        (
+            "coloured",
+            "merged",
+            "diffusion_spread.comp",
+            "field[4 * c + k].rgb +=",
+            "field[4 * c].rgb +=",
+        ),
+        ("droplets", "bounces", "facets_groups.comp", "color, sigma)", "color, scale)"),
+        ("floors", "diffusion", "include/patches.glsl", "part[u] =", "part[v] ="),
+        ("floors", "diffusion", "scatter.comp", "0.25 * field_at(c)", "0.5 * field_at(c)"),
+        ("floors", "diffusion", "scatter.comp", "min(distance(p, nearest) / edge, 1.0)", "1.0"),
+        ("floors", "diffusion", "scatter.comp", "- 3.0 * along", "- along"),
+        (
+            "floors",
+            "diffusion",
+            "scatter.comp",
+            "define WITHOUT_SKY SOLIDS",
+            "define WITHOUT_SKY 0",
+        ),
+        (
+            "boxes",
+            "diffusion",
+            "diffusion_system.comp",
+            "sink += through;\n                vec3 j = of_sky(axis == 1 ? 0.0",
+            "vec3 j = of_sky(axis == 1 ? 0.0",
+        ),
+        ("boxes", "diffusion", "diffusion_system.comp", "push.absorbed", "push.absorbed * 0.0"),
+        (
+            "flat",
+            "diffusion",
+            "diffusion_coarsen.comp",
+            "equal(ivec3(x, y, z) - first, halved)",
+            "bvec3(true)",
+        ),
+        (
+            "boxes",
+            "diffusion",
+            "diffusion_restrict.comp",
+            "source[index_of(push.fine, from)].rgb + flows",
+            "flows",
+        ),
+        ("boxes", "diffusion", "diffusion_coarsest.comp", "% 2u == 0u", "% 2u == 2u"),
+        ("boxes", "diffusion", "include/equations.glsl", "if (at[axis] > 0)", "if (at[axis] > 1)"),
+        ("boxes", "diffusion", "diffusion_sweep.comp", "(at) >> halved()", "(at)"),
+        ("boxes", "diffusion", "include/diffusion.glsl", "SHORT_STEP = 0.6", "SHORT_STEP = 0.5"),
+        (
+            "boxes",
+            "diffusion",
+            "diffusion_flux.comp",
+            ".rgb - reach * slope",
+            ".rgb + reach * slope",
+        ),
+        ("boxes", "diffusion", "scatter.comp", "w.y * field_at(c + 2)", "w.y * field_at(c + 3)"),
+    ];
+    media::check_found(&Gpu::new(), &wrong);
+}
+
+fn plan_of(renderer: &mut Renderer, game: &mut Game, i_frame: u32) -> Plan {
+    renderer.step(game.step(i_frame).expect("a packet")).expect("a frame").plan
+}
+
+#[test]
+fn what_stands_still_is_not_computed_again() {
+    let gpu = Gpu::new();
+    let runs = |scene: &Scene| {
+        let scene = Arc::new(scene.clone());
+        let mut renderer =
+            Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+        let mut game = Game::new(scene, None);
+        let plans = [0, 1].map(|i| plan_of(&mut renderer, &mut game, i));
+        let passes = [Pass::Grid, Pass::Facets, Pass::Transmit, Pass::Diffusion, Pass::Scatter];
+        plans.map(|plan| passes.map(|pass| plan.runs(pass)))
+    };
+    assert_eq!(runs(&scene("boxes", "diffusion", &[])), [[true; 5], [false; 5]]);
+    // The phase function depends on the eye, and the diffuse light does not.
+    let mut flown = scene("boxes", "diffusion", &[]);
+    flown.camera = scene_with_path().camera;
+    assert_eq!(runs(&flown), [[true; 5], [false, false, false, false, true]]);
+    // An edit of the material marches nothing.
+    let mut edited = scene("boxes", "diffusion", &[]);
+    let mut key = edited.materials[0].keys[0];
+    key.time_s = 1.0;
+    key.brdf.kd = DVec3::splat(0.5);
+    edited.materials[0].keys.push(key);
+    assert_eq!(runs(&edited), [[true; 5], [false, false, false, true, true]]);
+    let reflecting = runs(&scene("boxes", "first", &[]));
+    assert_eq!(reflecting, [[true, true, true, false, false], [false; 5]]);
+}
+
+/// A scene whose camera moves.
+fn scene_with_path() -> Scene {
+    let dir = tempfile::tempdir().expect("a folder");
+    let text = "[camera]\npath = [{ time_s = 0, position = [0, 0, 5], target = [0, 0, 0] }, \
+        { time_s = 1, position = [1, 0, 5], target = [0, 0, 0] }]\n[[light]]\nkind = 'sky'\n\
+        irradiance = [1, 1, 1]\n";
+    let file = dir.path().join("scene.toml");
+    std::fs::write(&file, text).expect("room");
+    scene_file::load(&file, &[], None).unwrap_or_else(|e| panic!("{e}")).scene
+}

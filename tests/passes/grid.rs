@@ -1,0 +1,350 @@
+//! The pass grid against its f64 reference: every cell within a bound derived from its own
+//! deposits.
+
+use glam::{DVec3, UVec3, Vec3};
+
+use crate::harness::{Gpu, assert_within_and_say, check_within};
+use nimbus::gpu::Compiler;
+use nimbus::layout::frame::GridRecord;
+use nimbus::layout::particle::{ParticleRecord, PlacedRecord};
+use nimbus::model::boxes::{BoxLaw, Form};
+use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
+use nimbus::passes::grid::Grid;
+use nimbus::reference::Blob;
+use nimbus::reference::generate::{generate_box, uniforms};
+use nimbus::reference::grid::{axis_weights, deposit};
+use nimbus::reference::rounding::{DIVISION_ERROR, U_F32, erf_bound};
+
+const U: f64 = U_F32;
+const LAW: BoxLaw = BoxLaw { radius_scale: 0.6, ..BoxLaw::new(Form::Centred) };
+
+/// The input of the pass, and the f64 numbers that its f32 records stand for.
+struct Scene {
+    spec: GridSpec,
+    record: GridRecord,
+    blobs: Vec<Blob>,
+    heaviest: f64,
+}
+
+impl Scene {
+    fn new(spec: &GridSpec, blobs: &[Blob]) -> Scene {
+        let record = GridRecord::from(spec);
+        let low = Vec3::from_array(record.low).as_dvec3();
+        let (cell, aspect) = (f64::from(record.cell), f64::from(record.aspect));
+        let spec = GridSpec { n_cells: spec.n_cells, cell, aspect, low };
+        let f32 = |b: &Blob| Blob {
+            position: b.position.as_vec3().as_dvec3(),
+            aspect: f64::from(b.aspect as f32),
+            sigma: f64::from(b.sigma as f32),
+            kappa: f64::from(b.kappa as f32),
+        };
+        let blobs: Vec<Blob> = blobs.iter().map(f32).collect();
+        let heaviest = blobs.iter().map(Blob::mass).fold(0.0, f64::max);
+        Scene { spec, record, blobs, heaviest }
+    }
+
+    fn fitted(blobs: &[Blob], n: u32) -> Scene {
+        let reach = |b: &Blob| DEPOSIT_CUT_SIGMA * b.sigma * b.axes();
+        let low = blobs.iter().map(|b| b.position - reach(b)).reduce(DVec3::min).unwrap();
+        let high = blobs.iter().map(|b| b.position + reach(b)).reduce(DVec3::max).unwrap();
+        let aspect = blobs.iter().map(|b| b.aspect).sum::<f64>() / blobs.len() as f64;
+        Scene::new(&GridSpec::fit(low, high, n, aspect), blobs)
+    }
+
+    fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> Vec<f64> {
+        let n_cells = self.spec.n_total() as usize;
+        let pass = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
+        let placed = |b: &Blob| PlacedRecord {
+            position: b.position.as_vec3().to_array(),
+            sigma: b.sigma as f32,
+        };
+        let particle = |b: &Blob| ParticleRecord {
+            kappa: b.kappa as f32,
+            aspect: b.aspect as f32,
+            ..ParticleRecord::default()
+        };
+        let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
+        let particles = gpu.upload(&self.blobs.iter().map(particle).collect::<Vec<_>>());
+        let density = gpu.buffer::<f32>(n_cells);
+        let n = self.blobs.len() as u32;
+        gpu.run(|rec| {
+            pass.record(rec, [&placed, &particles, &density], &self.record, n, self.heaviest)
+        });
+        gpu.download::<f32>(&density, n_cells).into_iter().map(f64::from).collect()
+    }
+
+    /// Bound of every cell's density.
+    fn bounds(&self) -> Vec<f64> {
+        let n = self.spec.n_cells.as_usizevec3();
+        let mut bounds = vec![0.0; n.x * n.y * n.z];
+        let volume = self.spec.cell_volume();
+        let quantum = self.heaviest / 2f64.powi(31) / volume;
+        for blob in self.blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0) {
+            let axis = |k: usize| self.axis(blob, k, n[k]);
+            let (x, y, z) = (axis(0), axis(1), axis(2));
+            let density = blob.mass() / volume;
+            for &(k, wz, ez) in &z {
+                for &(j, wy, ey) in &y {
+                    for &(i, wx, ex) in &x {
+                        let (exact, most) = (wx * wy * wz, (wx + ex) * (wy + ey) * (wz + ez));
+                        // Half a quantum, where there is a deposit at all.
+                        let rounded = if most > 0.0 { 0.5 * quantum } else { 0.0 };
+                        bounds[i + n.x * (j + n.y * k)] +=
+                            density * (most * (1.0 + ROUNDINGS * U) - exact) + rounded;
+                    }
+                }
+            }
+        }
+        bounds
+    }
+
+    /// (cell, weight, its bound) of the cells that a blob can meet along an axis.
+    fn axis(&self, blob: &Blob, k: usize, n: usize) -> Vec<(usize, f64, f64)> {
+        let (p, sigma) = (blob.position[k], (blob.sigma * blob.axes())[k]);
+        let (low, cell) = (self.spec.low[k], self.spec.edges()[k]);
+        let (first, weights) = axis_weights(p, sigma, low, cell, n);
+        let x = p - low;
+        let face = |i: usize| (cell * i as f64 - x) / sigma;
+        // A face in σ: i·cell and x are rounded, their difference, and the quotient errs by a
+        // division's error. Of ellipsoids σ and the cell are products themselves.
+        let of_shape = if blob.aspect != 1.0 || self.spec.aspect != 1.0 { 1.0 } else { 0.0 };
+        let face_error = |i: usize| {
+            let at = cell * i as f64;
+            (U * ((1.0 + of_shape) * at.abs() + x.abs() + (at - x).abs()) / sigma
+                + (DIVISION_ERROR + of_shape) * U * face(i).abs())
+                * (1.0 + 8.0 * U)
+        };
+        // The ends of the range: x, 3σ, their sum, 1/h and the product are rounded once each. A
+        // cell left out or let in lies that near to the cut, where the density is φ(3).
+        let range_error =
+            (5.0 + 3.0 * of_shape) * U * (x.abs() + DEPOSIT_CUT_SIGMA * sigma) / sigma;
+        let weight = |i: usize| {
+            if (first..first + weights.len()).contains(&i) { weights[i - first] } else { 0.0 }
+        };
+        let beyond = |v: f64, e: f64| v.abs() - e >= DEPOSIT_CUT_SIGMA;
+        let of = |i: usize| {
+            let (a, b) = (face(i), face(i + 1));
+            let (ea, eb) = (face_error(i), face_error(i + 1));
+            if beyond(a, ea) && beyond(b, eb) && a.signum() == b.signum() {
+                // Both faces are cut to the same number: erf − erf is 0.
+                return (i, weight(i), 0.0);
+            }
+            let e = SHARE * (erf_error(a, ea) + erf_error(b, eb))
+                + 3.0 * U * weight(i)
+                + PHI_3 * range_error;
+            (i, weight(i), e * (1.0 + 4.0 * U))
+        };
+        let last = (first + weights.len()).min(n - 1);
+        (first.saturating_sub(1)..=last).map(of).collect()
+    }
+}
+
+/// ½/erf(3/√2): what a weight makes of the difference of two erf.
+const SHARE: f64 = 0.5 / 0.997_300_203_936_739_8;
+/// The normal density at 3σ over erf(3/√2).
+const PHI_3: f64 = 4.44e-3;
+/// Roundings of a deposit that are relative: the mass 6 (5 products, a constant), quanta a mass 2,
+/// the product with the share and the share's two 3, adding ½ before the cut to whole quanta 1; and
+/// of the sum: two words to f32, their sum, the density of a quantum (one more for the cells'
+/// shape) and its product 6.
+const ROUNDINGS: f64 = 18.0;
+
+/// Error of erf(c/√2), c the face `a` cut to ±3 that is itself off by `e`.
+fn erf_error(a: f64, e: f64) -> f64 {
+    let cut = a.clamp(-DEPOSIT_CUT_SIGMA, DEPOSIT_CUT_SIGMA);
+    let e = if a.abs() - e >= DEPOSIT_CUT_SIGMA { 0.0 } else { e };
+    let t = cut.abs() * std::f64::consts::FRAC_1_SQRT_2;
+    // The constant's and the product's rounding.
+    let e = e * std::f64::consts::FRAC_1_SQRT_2 + 2.0 * U * t;
+    let slope = std::f64::consts::FRAC_2_SQRT_PI * (-(t - e).max(0.0).powi(2)).exp();
+    slope * e + erf_bound((t - e).max(0.0)).max(erf_bound(t + e))
+}
+
+/// Blobs from a hundredth of a cell to a fifth of the scene, of masses over nine orders of
+/// magnitude.
+fn scattered(n: u32) -> Vec<Blob> {
+    let blob = |i: u32| {
+        let ([a, b, c, d], [e, ..]) = (uniforms(0x64123, 0, i, 0), uniforms(0x64123, 1, i, 0));
+        let position = DVec3::new(20.0 * a - 8.0, 12.0 * b, 9.0 * c - 40.0);
+        Blob {
+            aspect: 1.0,
+            position,
+            sigma: 0.004 * 500f64.powf(d),
+            kappa: 10f64.powf(3.0 * e - 2.0),
+        }
+    };
+    (0..n).map(blob).collect()
+}
+
+/// The same, from a fiftieth to five times as high as wide.
+fn ellipsoids(n: u32) -> Vec<Blob> {
+    let shaped = |(b, i): (Blob, u32)| Blob {
+        aspect: 0.02 * 250f64.powf(uniforms(0x64124, 0, i, 0)[0]),
+        ..b
+    };
+    scattered(n).into_iter().zip(0..).map(shaped).collect()
+}
+
+fn paper() -> Vec<Blob> {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cubes-554.dat");
+    let boxes = nimbus::io::box_file::read(&path).unwrap();
+    let of_box = |(b, i): (&nimbus::model::boxes::CloudBox, u32)| {
+        let center = b.center;
+        generate_box(b, i, 1, &LAW)
+            .into_iter()
+            .map(move |g| Blob {
+                aspect: g.aspect,
+                position: center + g.position,
+                sigma: g.sigma,
+                kappa: g.kappa,
+            })
+            .collect::<Vec<_>>()
+    };
+    boxes.iter().zip(0..).flat_map(of_box).collect()
+}
+
+/// Small blobs whose cut ends within rounding of a cell's face, on either side of it: where
+/// rounding makes the share of the cell beyond negative, it must not become 2³² quanta.
+fn at_the_cut() -> Vec<Blob> {
+    let blob = |i: u32| {
+        let [a, b, ..] = uniforms(0xc07, 0, i, 0);
+        let sigma = 0.02 + 0.1 * a;
+        // Cells of 1 from 0 on: the face at 5 lies 3σ(1 ± 1e-6) away.
+        let x = 5.0 - 3.0 * sigma * (1.0 + 2e-6 * (b - 0.5));
+        Blob { aspect: 1.0, position: DVec3::new(x, 4.5, 3.5), sigma, kappa: 1.0 / sigma.powi(3) }
+    };
+    (0..4000).map(blob).collect()
+}
+
+fn compiler() -> Compiler {
+    Compiler::new(nimbus::passes::sources(), Compiler::default_cache()).unwrap()
+}
+
+fn scenes() -> Vec<(&'static str, Scene)> {
+    let at = |x: f64, sigma, kappa| Blob { aspect: 1.0, position: DVec3::splat(x), sigma, kappa };
+    let cells = GridSpec { aspect: 1.0, n_cells: UVec3::splat(9), cell: 1.0, low: DVec3::ZERO };
+    vec![
+        ("scattered", Scene::fitted(&scattered(3000), 48)),
+        ("ellipsoids", Scene::fitted(&ellipsoids(3000), 48)),
+        ("the paper's 554", Scene::fitted(&paper(), 64)),
+        ("at the cut", Scene::new(&cells, &at_the_cut())),
+        ("a speck", Scene::new(&cells, &[at(4.5, 1e-4, 3.0)])),
+        (
+            "no size, no extinction",
+            Scene::new(&cells, &[at(4.2, 0.0, 3.0), at(4.2, 0.5, 0.0), at(4.4, 0.5, 1.0)]),
+        ),
+        (
+            "cut by the border and outside",
+            Scene::new(&cells, &[at(0.2, 0.9, 1.0), at(-20.0, 1.0, 1.0), at(8.9, 0.3, 2.0)]),
+        ),
+        ("one cell", Scene::new(&GridSpec { n_cells: UVec3::ONE, ..cells }, &[at(0.4, 0.05, 1.0)])),
+    ]
+}
+
+#[test]
+fn every_cell_is_within_its_bound() {
+    let mut gpu = Gpu::new();
+    for (name, scene) in scenes() {
+        let values = scene.run(&mut gpu, &compiler());
+        let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());
+        assert_within_and_say(name, &values, &truths, &bounds);
+        let relative = |i: usize| if truths[i] > 0.0 { bounds[i] / truths[i] } else { 0.0 };
+        let greatest = (0..truths.len()).max_by(|a, b| truths[*a].total_cmp(&truths[*b])).unwrap();
+        println!("{name}: relative bound of the densest cell {:e}", relative(greatest));
+        // Weights are some tenth and their bounds 2.5e-6: a bound that said nothing would show
+        // here.
+        assert!(relative(greatest) < 1e-3);
+    }
+}
+
+#[test]
+fn mass_is_kept() {
+    let mut gpu = Gpu::new();
+    for blobs in [scattered(3000), ellipsoids(3000), paper()] {
+        let scene = Scene::fitted(&blobs, 64);
+        let volume = scene.spec.cell_volume();
+        let values = scene.run(&mut gpu, &compiler());
+        let (found, expected) =
+            (values.iter().sum::<f64>() * volume, scene.blobs.iter().map(Blob::mass).sum::<f64>());
+        let bound = scene.bounds().iter().sum::<f64>() * volume;
+        println!("mass {found} of {expected}, relative error {:e}", found / expected - 1.0);
+        // Every cell's bound at once, and f64's own: the weights of one axis cannot err all to one
+        // side, but may.
+        assert!((found - expected).abs() <= bound + 1e-12 * expected);
+        assert!(bound < 1e-3 * expected);
+    }
+}
+
+#[test]
+fn sums_do_not_depend_on_the_order_nor_on_the_run() {
+    let mut gpu = Gpu::new();
+    let scene = Scene::fitted(&scattered(3000), 48);
+    let values = scene.run(&mut gpu, &compiler());
+    assert_eq!(scene.run(&mut gpu, &compiler()), values);
+    // 1009 is coprime to 3000: a permutation.
+    let blobs = (0..3000).map(|i| scene.blobs[(1009 * i + 17) % 3000]).collect();
+    assert_eq!(Scene { blobs, ..scene }.run(&mut gpu, &compiler()), values);
+}
+
+#[test]
+fn two_words_hold_what_overflows_one() {
+    // A hundred times the heaviest particle in one cell: 100·2³¹ quanta.
+    let mut gpu = Gpu::new();
+    let cells = GridSpec { aspect: 1.0, n_cells: UVec3::splat(3), cell: 1.0, low: DVec3::ZERO };
+    let scene = Scene::new(
+        &cells,
+        &[Blob { aspect: 1.0, position: DVec3::splat(1.5), sigma: 0.1, kappa: 2.0 }; 100],
+    );
+    let values = scene.run(&mut gpu, &compiler());
+    let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());
+    assert_within_and_say("overflow", &values, &truths, &bounds);
+    for (file, from, to) in [
+        ("grid_resolve.comp", "float(sums[c].y) * 4294967296.0 + ", ""),
+        ("grid_deposit.comp", "before + quanta < before", "before + quanta < quanta - 2147483648u"),
+    ] {
+        let values = scene.run(&mut gpu, &Gpu::wrong_compiler(file, from, to));
+        assert!(check_within("wrong", &values, &truths, &bounds).is_err(), "{to} was not noticed");
+    }
+}
+
+#[test]
+fn a_wrong_shader_is_noticed() {
+    let mut gpu = Gpu::new();
+    let scene = Scene::fitted(&scattered(500), 32);
+    let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());
+    let mutations = [
+        ("grid_deposit.comp", "0.9973002039367398", "0.9974"),
+        ("grid_deposit.comp", "15.7496099457224", "15.75"),
+        ("grid_deposit.comp", "const float CUT_SIGMA = 3.0", "const float CUT_SIGMA = 2.9"),
+        ("grid_deposit.comp", "float(i + 1)", "(float(i) + 0.99)"),
+        ("grid_deposit.comp", "first + x + row * y", "first + y + row * x"),
+    ];
+    for (file, from, to) in mutations {
+        let values = scene.run(&mut gpu, &Gpu::wrong_compiler(file, from, to));
+        assert!(check_within("wrong", &values, &truths, &bounds).is_err(), "{to} was not noticed");
+    }
+}
+
+#[test]
+fn a_grid_without_room_is_refused() {
+    let mut gpu = Gpu::new();
+    let scene = Scene::fitted(&scattered(10), 24);
+    let n_cells = scene.spec.n_total();
+    let pass = Grid::new(&gpu.device, &compiler(), n_cells - 1).unwrap();
+    let (placed, particles) = (gpu.buffer::<PlacedRecord>(10), gpu.buffer::<ParticleRecord>(10));
+    let density = gpu.buffer::<f32>(n_cells as usize);
+    let mut what = String::new();
+    gpu.run(|rec| {
+        let refused =
+            pass.record(rec, [&placed, &particles, &density], &scene.record, 10, scene.heaviest);
+        what = refused.expect_err("no room").to_string();
+        Ok(())
+    });
+    assert_eq!(
+        what,
+        format!(
+            "limit: a density grid of {n_cells} cells, where there is room for {}",
+            n_cells - 1
+        )
+    );
+}

@@ -122,10 +122,12 @@ fn shrink(mut args: Vec<String>) -> Vec<String> {
     if is_named("stress") {
         args.push("functions/division".to_owned());
     }
+    let is_large = |arg: &str| ["study-both", "cubes-554"].iter().any(|name| arg.contains(name));
+    if is_named("ledger") && args.iter().any(|arg| is_large(arg)) {
+        args.retain(|arg| !is_large(arg) && arg != "--plain");
+        args.extend(["scenes/hello.toml", "--plain"].map(str::to_owned));
+    }
     for arg in &mut args {
-        if is_named("ledger") && ["study-both", "cubes-554"].iter().any(|name| arg.contains(name)) {
-            "scenes/hello.toml".clone_into(arg);
-        }
         // Sizes of a sweep over particles.
         for many in ["500,1000,2000,5000,10000,20000,50000", "500,5000,50000"] {
             *arg = arg.replace(many, "500,600,700");
@@ -253,6 +255,8 @@ fn a_command_is_made_small_wherever_its_options_stand() {
     assert_eq!(shrink(args("render a.toml")), args("render --size 64x48 a.toml"));
     assert_eq!(shrink(args("render a.toml --size 9x9")), args("render a.toml --size 64x48"));
     assert_eq!(shrink(args("devices --json")), args("devices --json"));
+    let ledger = shrink(args("ledger scenes/study-both.toml --out a"));
+    assert!(ledger.ends_with(&args("--out a scenes/hello.toml --plain")), "{ledger:?}");
     let sweep = shrink(args("bench a.toml --sweep size=8x8,9x9"));
     assert!(!sweep.contains(&"--size".to_owned()) && sweep.contains(&"--warmup".to_owned()));
 }

@@ -32,8 +32,6 @@ const SHORT: [&str; 11] = [
 const SMALL: [&str; 2] = ["--size", "96x72"];
 /// Without the rounding of half floats small errors show.
 const SINGLE: [&str; 2] = ["--set", "film.format='rgba32f'"];
-/// The floor of scenes/ground.toml in a sixteenth of its facets, whose light in f64 takes a while.
-const COARSE: &str = "surface.0.subdivide=[12,12]";
 
 fn bench(args: &[&str]) -> (Output, Option<Value>) {
     let output = run(&[&["bench"], args, &SHORT].concat());
@@ -51,15 +49,12 @@ fn right_pictures_of_all_kinds_pass() {
         .iter()
         .map(|path| vec![path.display().to_string(), SMALL[0].into(), SMALL[1].into()])
         .collect();
-    for args in all.iter_mut().filter(|args| args[0].ends_with("ground.toml")) {
-        args.extend(["--set", COARSE].map(str::to_owned));
-    }
     for (scene, settings) in [
         ("cubes-554", &["draw.path='sprites'", "draw.chunks=8"][..]),
         ("cubes-554", &["draw.resolution=0.5"]),
         ("cumulus", &["draw.resolution=0.25"]),
         ("flyby", &["draw.impostors='on'"]),
-        ("ground", &["film.format='rgba8'", "lighting.gather='tree'", COARSE]),
+        ("ground", &["film.format='rgba8'", "lighting.gather='tree'"]),
         ("supercell", &["draw.smallest=1.0", "draw.threshold=1e-3"]),
         ("study-both", &["lighting.mode='none'"]),
         ("study-both", &["lighting.mode='diffusion'", "draw.overlap='slices'"]),

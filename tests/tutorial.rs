@@ -111,7 +111,7 @@ fn the_pages_name_the_size_of_the_diff() {
 fn the_example_builds_passes_its_test_and_draws() {
     let _lock = lock();
     let copied = patched_copy();
-    // Those that name every pass, shader or key, and its own.
+    // These tests name every pass, shader or key. The pass's own test follows.
     const TESTS: [&str; 3] = ["architecture", "layout", "scene_keys"];
     let tests = cargo(&copied, &TESTS.map(|name| ["--test", name]).concat());
     assert_eq!(tests.matches("test result: ok").count(), TESTS.len(), "{tests}");

@@ -1,11 +1,11 @@
 //! The program as a user runs it: what it prints, what it writes, and its exit codes.
 
 mod bench;
+use std::path::Path;
+use std::process::Stdio;
 
 use crate::signals;
 use nimbus::frame::plan::Pass;
-use std::path::Path;
-use std::process::Stdio;
 
 use assert_cmd::Command;
 use serde_json::Value;

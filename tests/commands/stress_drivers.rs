@@ -1,10 +1,10 @@
 //! The stress suite on a second driver, and on lavapipe with other widths of vectors, which are
 //! other sizes of subgroups.
 
-use crate::program;
-use crate::swiftshader;
 use std::process::Command;
 
+use crate::program;
+use crate::swiftshader;
 use serde_json::Value;
 
 /// Runs cases of the suite on a device whose name has `device`, and asserts that all of them pass.

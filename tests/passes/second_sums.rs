@@ -1,6 +1,8 @@
 //! second as its sums may be formed: plain, compensated, pairwise, in f32 and f64, each within its
 //! own bound, from every pair and from a tree.
 
+use std::path::Path;
+
 use crate::gathers::{Truths, reference, truths, values};
 use crate::harness::{Gpu, assert_within_and_say, check_within};
 use crate::rooms::{Frame, HEAD, Plate, frame, plates_text};
@@ -11,7 +13,6 @@ use nimbus::io::scene_file;
 use nimbus::model::scene::{Gather, Scene};
 use nimbus::model::sums::{Precision, Sums};
 use nimbus::reference::rounding::sum_error;
-use std::path::Path;
 
 const SUN: &str =
     "[[light]]\nkind = 'directional'\ndirection = [0.0, -1.0, 0.0]\nirradiance = [3.0, 3.0, 3.0]\n";

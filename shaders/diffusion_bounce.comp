@@ -73,7 +73,7 @@ void main() {
         ivec3 at = place_of(level, i);
         vec3 phi = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
         for (uint k = 0; k < N_DIRECTIONS; ++k) {
-            vec3 w = direction(k), l = radiance_along(level, at, w);
+            vec3 w = direction(k), l = radiance_along(level, at, w, w.y < 0.0 ? 1.0 : 0.0);
             phi += l;
             x += l * w.x;
             y += l * w.y;

@@ -13,11 +13,13 @@
 layout(push_constant) uniform Push {
     Level fine;
     Level merged;
+    // Cells by which the first merged one reaches beyond the grid.
+    uvec3 before;
+    // Edge of a merged cell, in cells.
+    uint edge;
     // 1 - albedo g
     vec3 kept;
     float inverse_chord;
-    // Edge of a merged cell, in cells.
-    uint edge;
     // Extinction beyond which a merged cell counts as no denser.
     float densest;
 } push;
@@ -37,8 +39,9 @@ vec3 loss_of(float sigma) { return 3.0 * sigma * push.kept + push.inverse_chord;
 void main() {
     uvec3 n = push.merged.n_cells;
     FOR_EACH(i, n.x * n.y * n.z) {
-        ivec3 first = place_of(push.merged, i) * int(push.edge);
-        ivec3 end = min(first + int(push.edge), ivec3(push.fine.n_cells));
+        ivec3 low = place_of(push.merged, i) * int(push.edge) - ivec3(push.before);
+        ivec3 first = max(low, ivec3(0));
+        ivec3 end = min(low + int(push.edge), ivec3(push.fine.n_cells));
         float all = 0.0;
         vec3 sources[4] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)), sent[4] = sources;
         for (int z = first.z; z < end.z; ++z) {

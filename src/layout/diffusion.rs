@@ -124,12 +124,17 @@ mod tests {
         for edge in [1, 2, 3, 8] {
             let merged = spec.merged(edge);
             assert!(merged.high().cmpge(spec.high()).all());
+            assert!(merged.low.cmple(spec.low).all());
             let (found, expected) = (GridRecord::from(&spec).merged(edge), (&merged).into());
             let GridRecord { n_cells, cell, aspect, low, .. } = expected;
             assert_eq!((found.n_cells, found.cell, found.aspect), (n_cells, cell, aspect));
             assert!(found.low == low && (found.inv_cell * cell - 1.0).abs() < 2.0 * f32::EPSILON);
         }
+        // In the middle of 13 cells, after 6 of them, a merged one begins.
         assert_eq!(spec.merged(2).n_cells, UVec3::new(12, 9, 7));
+        let three = spec.merged(3);
+        assert_eq!(three.n_cells, UVec3::new(8, 6, 5));
+        assert_eq!((three.low - spec.low) / spec.edges(), DVec3::new(0.0, -1.0, 0.0));
     }
 
     #[test]

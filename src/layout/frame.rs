@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::layout::record;
 use crate::model::camera::{Camera, Pose};
 use crate::model::film::Film;
-use crate::model::grid::GridSpec;
+use crate::model::grid::{GridSpec, cells_before};
 use crate::model::light::{Light, MIN_PENUMBRA, UP};
 
 /// The kind of a directional [`LightRecord`]. The shaders' `LIGHT_*` have the same values.
@@ -105,9 +105,17 @@ record! {
 impl GridRecord {
     /// Returns the grid of cells that are `edge` times as wide, as [`GridSpec::merged`] does.
     pub fn merged(&self, edge: u32) -> GridRecord {
-        let n_cells = self.n_cells.map(|n| n.div_ceil(edge));
+        let before = self.cells_before(edge);
+        let of = |k: usize| (self.n_cells[k] + before[k]).div_ceil(edge);
+        let edges = [self.cell, self.cell * self.aspect, self.cell];
+        let low = |k: usize| self.low[k] - edges[k] * before[k] as f32;
         let (cell, inv_cell) = (self.cell * edge as f32, self.inv_cell / edge as f32);
-        GridRecord { n_cells, cell, inv_cell, ..*self }
+        GridRecord { n_cells: [0, 1, 2].map(of), low: [0, 1, 2].map(low), cell, inv_cell, ..*self }
+    }
+
+    /// Returns how many cells the first of those of [`GridRecord::merged`] reaches beyond the box.
+    pub fn cells_before(&self, edge: u32) -> [u32; 3] {
+        self.n_cells.map(|n| cells_before(n, edge))
     }
 }
 

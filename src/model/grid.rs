@@ -39,7 +39,8 @@ pub struct GridSpec {
 
 impl GridSpec {
     /// Returns the grid that covers `low`..`high`. Its cells are `aspect` times as high as wide,
-    /// and its longest axis has `n` of them, margin included.
+    /// and its longest axis has `n` of them, margin included. The numbers along the others are even
+    /// or odd as `n` is.
     pub fn fit(low: DVec3, high: DVec3, n: u32, aspect: f64) -> GridSpec {
         // Bounds without extent still need a cell; there is no other length to take than 1 unit.
         let shape = DVec3::new(1.0, aspect, 1.0);
@@ -48,17 +49,24 @@ impl GridSpec {
         let longest = if longest > 0.0 { longest } else { 1.0 };
         let inner = n.clamp(2 * MARGIN_CELLS + 1, MAX_CELLS) - 2 * MARGIN_CELLS;
         let cell = longest / f64::from(inner);
-        let cells = (extent / cell - 1e-9).ceil().as_uvec3().clamp(UVec3::ONE, UVec3::splat(inner));
+        // Layers come and go in pairs, one at each end, so that the others stay where they are
+        // while the bounds move.
+        let odd = inner % 2;
+        let pairs = (0.5 * (extent / cell - f64::from(odd)) - 1e-9).ceil().max(DVec3::ZERO);
+        let cells = 2 * pairs.as_uvec3() + UVec3::splat(odd);
+        let cells = cells.clamp(UVec3::splat(2 - odd), UVec3::splat(inner));
         let n_cells = cells + UVec3::splat(2 * MARGIN_CELLS);
         let low = 0.5 * (low + high) - 0.5 * cell * shape * n_cells.as_dvec3();
         GridSpec { n_cells, cell, aspect, low }
     }
 
-    /// Returns the grid of cells that are `edge` times as wide, from the same corner. The last ones
-    /// may reach beyond the box.
+    /// Returns the grid of cells that are `edge` times as wide. The outermost ones may reach beyond
+    /// the box.
     pub fn merged(&self, edge: u32) -> GridSpec {
-        let n_cells = self.n_cells.map(|n| n.div_ceil(edge));
-        GridSpec { n_cells, cell: self.cell * f64::from(edge), ..*self }
+        let before = self.n_cells.map(|n| cells_before(n, edge));
+        let n_cells = (self.n_cells + before).map(|n| n.div_ceil(edge));
+        let low = self.low - self.edges() * before.as_dvec3();
+        GridSpec { n_cells, cell: self.cell * f64::from(edge), low, ..*self }
     }
 
     /// Returns the number of cells.
@@ -97,6 +105,13 @@ impl GridSpec {
     pub fn cells_along(&self, d: DVec3) -> f64 {
         (d / self.edges()).length()
     }
+}
+
+/// Returns how many cells the first merged one reaches beyond the box, of `n` along an axis that are
+/// merged by `edge`. A merged cell begins in the middle of the box, so that it stays when layers of
+/// cells come and go at both ends.
+pub fn cells_before(n: u32, edge: u32) -> u32 {
+    (edge - n / 2 % edge) % edge
 }
 
 /// Number of patches along each edge of the box's faces, through which light passes between the
@@ -147,12 +162,30 @@ mod tests {
     fn the_grid_covers_its_bounds_with_the_margin() {
         let (low, high) = (DVec3::new(-3.0, 0.0, 1.0), DVec3::new(5.0, 2.0, 1.5));
         let grid = GridSpec::fit(low, high, 64, 1.0);
-        assert_eq!(grid.n_cells, UVec3::new(64, 19, 8));
+        assert_eq!(grid.n_cells, UVec3::new(64, 20, 8));
         let margin = f64::from(MARGIN_CELLS) * grid.cell - 1e-9;
         assert!(
             (low - grid.low).min_element() >= margin
                 && (grid.high() - high).min_element() >= margin
         );
+    }
+
+    #[test]
+    fn cells_stay_where_they_are_when_others_come() {
+        for n in [24, 25] {
+            let fit = |y: f64| GridSpec::fit(DVec3::new(-3.0, -y, 0.0), DVec3::splat(5.0), n, 1.0);
+            let mut before = fit(0.0);
+            for i in 1..100 {
+                let now = fit(0.03 * f64::from(i));
+                let moved = (now.low - before.low) / now.cell;
+                // The bounds' middle moves by half of what they grow; with them the grid.
+                let with_bounds = -0.015 / now.cell;
+                let layers = (now.n_cells.y - before.n_cells.y) / 2;
+                assert_eq!(now.n_cells.y, before.n_cells.y + 2 * layers);
+                assert!((moved.y - with_bounds + f64::from(layers)).abs() < 1e-9, "{moved}");
+                before = now;
+            }
+        }
     }
 
     #[test]

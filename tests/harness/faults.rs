@@ -234,7 +234,7 @@ pub const FAULTS: &[Fault] = &[
     (
         "a bounce has no light of the sky",
         "include/ways.glsl",
-        "vec3 outside = of_sky(w.y < 0.0 ? 1.0 : 0.0);",
+        "vec3 outside = of_sky(above);",
         "vec3 outside = vec3(0.0);",
         "scattering/furnace",
     ),

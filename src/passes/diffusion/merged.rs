@@ -15,12 +15,14 @@ record! {
         fine: LevelRecord,
         /// The merged ones.
         merged: LevelRecord,
+        /// Cells by which the first merged one reaches beyond the grid.
+        before: [u32; 3],
+        /// Edge of a merged cell, in cells.
+        edge: u32,
         /// 1 − ϖg.
         kept: [f32; 3],
         /// c, 1/length.
         inverse_chord: f32,
-        /// Edge of a merged cell, in cells.
-        edge: u32,
         /// Extinction beyond which a merged cell counts as no denser, 1/length.
         densest: f32,
     }
@@ -33,6 +35,8 @@ record! {
         fine: LevelRecord,
         /// The merged ones.
         merged: LevelRecord,
+        /// Cells by which the first merged one reaches beyond the grid.
+        before: [u32; 3],
         /// Edge of a merged cell, in cells.
         edge: u32,
     }
@@ -99,9 +103,10 @@ impl Merged {
         let push = MergePush {
             fine: level(&cells.grid),
             merged: level(&grid),
+            before: cells.grid.cells_before(self.edge),
+            edge: self.edge,
             kept: of.kept,
             inverse_chord: of.inverse_chord,
-            edge: self.edge,
             densest: of.densest,
         };
         let all = [cells.field, arrived, density, field, merged];
@@ -111,10 +116,12 @@ impl Merged {
 
     /// Adds what bounces have changed to φ and F of the cells.
     pub fn record_spread(&self, rec: &mut Recorder<'_>, cells: &Cells<'_>) -> Result<()> {
-        let Scratch { field, before, .. } = &self.scratch;
+        let Scratch { field, .. } = &self.scratch;
         let merged = level(&cells.grid.merged(self.edge));
-        let push = SpreadPush { fine: level(&cells.grid), merged, edge: self.edge };
-        rec.dispatch(&self.spread, &[field, before, cells.field], &push, cells.n_total())
+        let (fine, before) = (level(&cells.grid), cells.grid.cells_before(self.edge));
+        let push = SpreadPush { fine, merged, before, edge: self.edge };
+        let all = [field, &self.scratch.before, cells.field];
+        rec.dispatch(&self.spread, &all, &push, cells.n_total())
     }
 }
 

@@ -65,7 +65,13 @@ impl Skies {
 
     /// Returns π times the radiance from a direction whose vertical part is `y`.
     pub fn along(&self, y: f64) -> DVec3 {
-        self.all + if y > 0.0 { self.above } else { DVec3::ZERO }
+        self.of_share(if y > 0.0 { 1.0 } else { 0.0 })
+    }
+
+    /// Returns π times the mean radiance from directions of which `above` come from above the
+    /// horizon.
+    pub fn of_share(&self, above: f64) -> DVec3 {
+        self.all + above * self.above
     }
 }
 

@@ -19,9 +19,9 @@ struct Sums {
 }
 
 /// Returns the merged cell that cell `c` is in.
-fn place_in(grid: &GridSpec, few: &GridSpec, c: usize, edge: usize) -> usize {
-    let (n, m) = (grid.n_cells.as_usizevec3(), few.n_cells.as_usizevec3());
-    let (x, y, z) = (c % n.x / edge, c / n.x % n.y / edge, c / (n.x * n.y) / edge);
+fn place_in(grid: &GridSpec, few: &GridSpec, c: usize) -> usize {
+    let m = few.n_cells.as_usizevec3();
+    let [x, y, z] = ((grid.center(c) - few.low) / few.edges()).to_array().map(|at| at as usize);
     x + m.x * (y + m.y * z)
 }
 
@@ -53,7 +53,7 @@ impl Merged {
         let mut sums = vec![Sums::default(); few.n_total() as usize];
         let share = 1.0 / f64::from(edge.pow(3));
         for (c, sigma) in cells.iter().enumerate() {
-            let sum = &mut sums[place_in(grid, &few, c, edge as usize)];
+            let sum = &mut sums[place_in(grid, &few, c)];
             sum.extinction += share * sigma;
             sum.scattered += share * sources.scattered[c];
             for axis in 0..3 {

@@ -66,8 +66,10 @@ impl SeenCells {
             diffuse.max(DVec3::ZERO) + suns[0] * (1.0 - directed + directed * peak)
         };
         let cells = parallel_map(extinction.len(), |c| {
-            let w = (eye - grid.center(c)).try_normalize().unwrap_or(UP);
-            let behind = ways.radiance(c, -w, |k| sent(k, w));
+            let to_eye = eye - grid.center(c);
+            let w = to_eye.try_normalize().unwrap_or(UP);
+            let above = (0.5 - to_eye.y / grid.edges().y).clamp(0.0, 1.0);
+            let behind = ways.radiance(c, (-w, above), |k| sent(k, w));
             let all = weakened * sent(c, w) + (DVec3::ONE - weakened) * behind;
             (all / (4.0 * PI), extinction[c])
         });

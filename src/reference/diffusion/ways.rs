@@ -27,8 +27,14 @@ impl<'a> Ways<'a> {
     }
 
     /// Returns 4π times the radiance that comes to the middle of cell `c` from the direction
-    /// `toward`, where cells send out `sent` along the way, times 4π.
-    pub fn radiance(&self, c: usize, toward: DVec3, sent: impl Fn(usize) -> DVec3) -> DVec3 {
+    /// `toward`, where cells send out `sent` along the way, times 4π. The share `above` of it comes
+    /// from above the horizon.
+    pub fn radiance(
+        &self,
+        c: usize,
+        (toward, above): (DVec3, f64),
+        sent: impl Fn(usize) -> DVec3,
+    ) -> DVec3 {
         let (n, edges) = (self.grid.n_cells.as_usizevec3(), self.grid.edges());
         let mut at = [c % n.x, c / n.x % n.y, c / (n.x * n.y)];
         let across = [0, 1, 2].map(|k| edges[k] / toward[k].abs().max(1e-6));
@@ -47,7 +53,7 @@ impl<'a> Ways<'a> {
             if at[k] == [0, n[k] - 1][side] {
                 let part = (DVec3::from(at.map(|i| i as f64)) + 0.5) / n.as_dvec3();
                 let of_solids = self.of_solids.map_or(DVec3::ZERO, |f| f.at(k, side, part));
-                return sum + 4.0 * passed * (of_solids + self.skies.along(toward.y));
+                return sum + 4.0 * passed * (of_solids + self.skies.of_share(above));
             }
             let stride = [1, n.x, n.x * n.y][k];
             (at[k], c) = match side {

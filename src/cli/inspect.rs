@@ -1,5 +1,7 @@
 //! `nimbus inspect SCENE`.
 
+use std::path::Path;
+
 use super::args::{BasisArg, InspectArgs};
 use super::output::{self, header, or_dash};
 use super::progress::spinner;
@@ -7,7 +9,10 @@ use super::scene::{check_time, device_choice, load, print_notes, print_sizes};
 use crate::error::{Error, Result};
 use crate::frame::Stage;
 use crate::inspect::{air, basis, stages as inspect};
+use crate::io::claim::Claim;
 use crate::io::console::say;
+use crate::io::ply;
+use crate::model::cloud::Particle;
 use crate::model::scene::Scene;
 use crate::reference::picture::check_memory;
 
@@ -30,11 +35,15 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         return output::text(&output::rows(&[air::row(&scene)], args.json)?);
     }
     check_rows(args, &scene)?;
+    let _claim = claim(args)?;
     check_time(&scene, scene.time.at(args.frame.unwrap_or(0)))?;
     let waiting = spinner("inspecting", args.options.quiet);
     // The text is complete before any of it is printed.
     if args.reference {
         let scene = &*scene.lit();
+        if let Some(path) = &args.output {
+            return write(path, &inspect::list_reference(scene, i_frame)?, args);
+        }
         let text = match (args.particles, args.facets) {
             (true, _) => output::rows(&inspect::particles_reference(scene, i_frame)?, args.json),
             (_, true) => facets(args, scene, inspect::facets_reference(scene, i_frame)?),
@@ -47,6 +56,10 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         return output::text(&text);
     }
     let mut stage = Stage::new(scene, &device_choice(&args.options), !args.options.no_skip)?;
+    if let Some(path) = &args.output {
+        write(path, &inspect::list(&mut stage, i_frame)?, args)?;
+        return stage.close();
+    }
     let text = match (args.particles, args.facets, args.plan) {
         (true, _, _) => output::rows(&inspect::particles(&mut stage, i_frame)?, args.json),
         (_, true, _) => {
@@ -79,6 +92,22 @@ fn check_rows(args: &InspectArgs, scene: &Scene) -> Result<()> {
     let n_particles = if args.particles || args.reference { scene.n_particles() } else { 0 };
     let n_facets = if args.facets { scene.n_facets() } else { 0 };
     check_memory(0, 1, n_particles.max(n_facets))
+}
+
+/// Claims the place of a PLY file, before anything is drawn.
+fn claim(args: &InspectArgs) -> Result<Option<Claim>> {
+    let Some(path) = &args.output else { return Ok(None) };
+    if !ply::is_named(path) {
+        let name = path.display();
+        return Err(Error::usage(format!("-o {name}: expected a name that ends in .ply")));
+    }
+    output::claim_file(path, args.force)
+}
+
+fn write(path: &Path, particles: &[Particle], args: &InspectArgs) -> Result<()> {
+    ply::write(path, particles)?;
+    output::wrote(path, &format!("{} particles", particles.len()), args.options.quiet);
+    Ok(())
 }
 
 /// Returns the rows of facets, or their means over each surface.

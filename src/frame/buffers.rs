@@ -165,7 +165,7 @@ pub(super) fn diffusion_room(scene: &Scene) -> Option<Room> {
         grey(m.scattering.albedo.unwrap_or_default()) && m.keys.iter().all(|k| grey(k.brdf.kd))
     };
     let has_colors = |c: &Cloud| match &c.source {
-        CloudSource::Particles(list) => list.iter().any(|p| !grey(p.color)),
+        CloudSource::Particles(list) => !list.summary().is_grey,
         _ => false,
     };
     let plain = |c: &Cloud| is_grey(&scene.materials[c.i_material]) && !has_colors(c);

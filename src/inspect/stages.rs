@@ -6,11 +6,13 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::frame::Stage;
 use crate::frame::plan::Pass;
-use crate::model::cloud::{CloudSource, Group, SIGMA_PER_RADIUS};
+use crate::layout::particle::{ParticleRecord, PlacedRecord};
+use crate::model::cloud::{CloudSource, Group, Particle, SIGMA_PER_RADIUS};
 use crate::model::frame_state::FrameState;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::terrain::Terrain;
 use crate::passes::generate::FOLDED;
+use crate::reference::Blob;
 use crate::reference::generate::Generated;
 use crate::reference::picture::{FrameReference, colors};
 
@@ -148,6 +150,40 @@ pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
         particle_row(i, cloud_of(&groups, i), position, sigma, kappa, color)
     });
     Ok(rows.collect())
+}
+
+/// Returns the particles of a frame from the device, in scene coordinates.
+///
+/// # Errors
+/// Fails if drawing the frame fails.
+pub fn list(stage: &mut Stage, i_frame: u32) -> Result<Vec<Particle>> {
+    let origin = draw(stage, i_frame)?.light_origin;
+    let placed = stage.renderer.placed(&stage.device)?;
+    let records = stage.renderer.generate_now(&stage.device)?.0;
+    let of = |(p, r): (&PlacedRecord, &ParticleRecord)| Particle {
+        position: Vec3::from(p.position).as_dvec3() + origin,
+        sigma: f64::from(p.sigma),
+        aspect: f64::from(r.aspect),
+        kappa: f64::from(r.kappa),
+        color: Vec3::from(r.color).as_dvec3(),
+    };
+    Ok(placed.iter().zip(&records).map(of).collect())
+}
+
+/// Returns the same from the reference.
+///
+/// # Errors
+/// Fails if the scene has no such reference.
+pub fn list_reference(scene: &Scene, i_frame: u32) -> Result<Vec<Particle>> {
+    let truth = FrameReference::unlit(scene, scene.time.at(i_frame))?;
+    let of = |(b, color): (&Blob, DVec3)| Particle {
+        position: b.position + truth.state.light_origin,
+        sigma: b.sigma,
+        aspect: b.aspect,
+        kappa: b.kappa,
+        color,
+    };
+    Ok(truth.blobs.iter().zip(colors(scene)).map(of).collect())
 }
 
 /// Returns the particles of a frame from the reference.

@@ -81,7 +81,7 @@ fn decode(bytes: Vec<u8>, path: &Path) -> Result<String> {
 }
 
 /// Returns the message of an error without its number, which tells a user nothing.
-fn plain(e: &std::io::Error, path: &Path) -> String {
+pub(super) fn plain(e: &std::io::Error, path: &Path) -> String {
     match e.kind() {
         ErrorKind::NotFound => missing(path),
         _ => e.to_string(),

@@ -10,6 +10,7 @@ use super::growth::Growth;
 use super::gust::Gust;
 use super::named::named;
 pub use super::particle::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
+pub use super::particle_list::ParticleList;
 use super::texture::Texture;
 
 /// A cloud of a scene.
@@ -62,7 +63,7 @@ pub enum CloudSource {
         law: BoxLaw,
     },
     /// A list of blobs as given.
-    Particles(Vec<Particle>),
+    Particles(ParticleList),
     /// Particles that are born on a disc, live for some time and are replaced.
     Disc(Disc),
     /// Particles that an animation places at every time.
@@ -89,10 +90,7 @@ impl Cloud {
                 let sum: DVec3 = boxes.iter().map(|b| b.center * f64::from(b.n_particles)).sum();
                 if n > 0.0 { sum / n } else { DVec3::ZERO }
             }
-            CloudSource::Particles(list) if list.is_empty() => DVec3::ZERO,
-            CloudSource::Particles(list) => {
-                list.iter().map(|p| p.position).sum::<DVec3>() / list.len() as f64
-            }
+            CloudSource::Particles(list) => list.summary().center,
             CloudSource::Disc(disc) => disc.center(self.wind),
             CloudSource::Animated(m) => 0.5 * (m.low + m.high),
         }
@@ -193,31 +191,18 @@ pub fn box_kappa(b: &CloudBox, law: &BoxLaw) -> f64 {
     if sigma > 0.0 { law.optical_depth / (SQRT_TAU * sigma) } else { 0.0 }
 }
 
-fn list_group(list: &[Particle], at_rest: Group) -> Group {
-    let low = list.iter().map(|p| p.position).reduce(DVec3::min).unwrap_or(DVec3::ZERO);
-    let high = list.iter().map(|p| p.position).reduce(DVec3::max).unwrap_or(DVec3::ZERO);
-    let sum = |power: i32| -> f64 { list.iter().map(|p| p.sigma.powi(power)).sum() };
+fn list_group(list: &ParticleList, at_rest: Group) -> Group {
+    let of = list.summary();
     Group {
-        sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
-        sigma_y_max: list.iter().map(|p| p.sigma * p.aspect).fold(0.0, f64::max),
-        sigma_mean: sum(1) / list.len().max(1) as f64,
-        sigma_by_area: if sum(2) > 0.0 { sum(3) / sum(2) } else { 0.0 },
-        aspects: aspects(list),
-        kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
-        mass_max: list.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).fold(0.0, f64::max),
-        ..at_rest.between(low, high)
+        sigma_max: of.sigma_max,
+        sigma_y_max: of.sigma_y_max,
+        sigma_mean: of.sigma_mean,
+        sigma_by_area: of.sigma_by_area,
+        aspects: of.aspects,
+        kappa_max: of.kappa_max,
+        mass_max: of.mass_max,
+        ..at_rest.between(of.low, of.high)
     }
-}
-
-/// Returns the least, mean and greatest aspect.
-fn aspects(list: &[Particle]) -> [f64; 3] {
-    if list.is_empty() {
-        return [1.0; 3];
-    }
-    let all = || list.iter().map(|p| p.aspect);
-    let [least, greatest] = [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)];
-    // If all aspects are equal, so is their mean, whatever their sum rounds to.
-    [least, (all().sum::<f64>() / list.len() as f64).clamp(least, greatest), greatest]
 }
 
 /// Returns a group whose bounds hold over the particles' whole life, so that they stand still.
@@ -305,7 +290,8 @@ mod tests {
             color: DVec3::ONE,
         };
         // Mean position 2, bounds from 0 to 5.
-        let source = CloudSource::Particles(vec![blob(0.0, 1.0), blob(1.0, 0.5), blob(5.0, 0.75)]);
+        let source =
+            CloudSource::Particles(vec![blob(0.0, 1.0), blob(1.0, 0.5), blob(5.0, 0.75)].into());
         let (gust, growth) = (Gust::CALM, Growth { to: 3.0, time_s: 1.0 });
         let cloud = Cloud {
             facing: crate::model::cloud::Facing::Outward,
@@ -341,7 +327,7 @@ mod tests {
             kappa,
             color: DVec3::ONE,
         };
-        let source = CloudSource::Particles(vec![blob(1.0, 2.0), blob(1e-3, 1e9)]);
+        let source = CloudSource::Particles(vec![blob(1.0, 2.0), blob(1e-3, 1e9)].into());
         let (gust, growth) = (Gust::CALM, Growth::NONE);
         let cloud = Cloud {
             facing: crate::model::cloud::Facing::Outward,

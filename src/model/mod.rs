@@ -32,6 +32,7 @@ mod named;
 pub mod overlap;
 pub mod pairings;
 mod particle;
+pub mod particle_list;
 pub mod phase;
 pub mod philox;
 pub mod resolution;

@@ -12,7 +12,7 @@ pub const MIN_ASPECT: f64 = 1e-3;
 pub const SQRT_TAU: f64 = 2.506_628_274_631_000_5;
 
 /// A Gaussian blob of extinction, relative to its cloud's position.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Particle {
     /// Centre, scene units.
     pub position: DVec3,

@@ -139,9 +139,9 @@ mod tests {
             kappa: 1.0,
             color: DVec3::ONE,
         };
-        let cloud = |list, y, wind| Cloud {
+        let cloud = |list: Vec<Particle>, y, wind| Cloud {
             facing: crate::model::cloud::Facing::Outward,
-            source: CloudSource::Particles(list),
+            source: CloudSource::Particles(list.into()),
             position: DVec3::Y * y,
             wind,
             gust: Gust::CALM,
@@ -191,7 +191,9 @@ mod tests {
         };
         let cloud = Cloud {
             facing: crate::model::cloud::Facing::Outward,
-            source: CloudSource::Particles(vec![particle(0.0), particle(0.0), particle(6.0)]),
+            source: CloudSource::Particles(
+                vec![particle(0.0), particle(0.0), particle(6.0)].into(),
+            ),
             position: DVec3::Y,
             wind: DVec3::Z,
             gust: Gust::CALM,

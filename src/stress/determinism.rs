@@ -109,7 +109,7 @@ fn full_scene(path: &str) -> Result<Scene> {
     let boxes = vec![centred_box(150, [2.0, 1.0, 2.0], 0.8), centred_box(80, [1.0, 2.0, 1.0], 0.5)];
     let mut scene = box_scene(&text, boxes)?;
     scene.clouds[0].gust = Gust { amplitude: 0.2, length: 2.0, period_s: 3.0, n_waves: 8 };
-    let mut list = cloud_of(CloudSource::Particles(blob_cluster(60)));
+    let mut list = cloud_of(CloudSource::Particles(blob_cluster(60).into()));
     list.wind = DVec3::new(0.3, 0.0, -0.1);
     scene.clouds.push(list);
     Ok(scene)

@@ -90,7 +90,7 @@ fn scene(
     let lighting = "grid = 32\ndiffusion_cycles = 24";
     let mut scene = surface_scene(lighting, lights, material, [])?;
     scene.lighting.mode = mode;
-    scene.clouds.push(cloud_of(CloudSource::Particles(particles)));
+    scene.clouds.push(cloud_of(CloudSource::Particles(particles.into())));
     Ok(scene)
 }
 

@@ -101,7 +101,7 @@ pub fn box_scene(text: &str, boxes: Vec<CloudBox>) -> Result<Scene> {
 /// Fails if the text is no scene.
 pub fn blob_scene(text: &str, draw: &str, particles: Vec<Particle>) -> Result<Scene> {
     let mut scene = parse_scene(&format!("{text}[draw]\n{draw}\n"))?;
-    scene.clouds.push(cloud_of(CloudSource::Particles(particles)));
+    scene.clouds.push(cloud_of(CloudSource::Particles(particles.into())));
     Ok(scene)
 }
 

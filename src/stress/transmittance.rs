@@ -82,7 +82,7 @@ fn floor_under(lighting: &str, lights: &str, particles: Vec<Particle>) -> Result
     let lighting = format!("grid = 48\n{lighting}");
     let mut scene = surface_scene(&lighting, lights, GREY, [floor])?;
     scene.lighting.mode = LightingMode::First;
-    scene.clouds.push(cloud_of(CloudSource::Particles(particles)));
+    scene.clouds.push(cloud_of(CloudSource::Particles(particles.into())));
     Ok(scene)
 }
 

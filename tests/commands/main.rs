@@ -30,6 +30,7 @@ mod jobs;
 mod kept_paths;
 mod lowered_limits;
 mod plots;
+mod ply;
 #[path = "../harness/program.rs"]
 mod program;
 mod records;

@@ -12,7 +12,7 @@ use nimbus::error::{Error, Place, Result};
 use nimbus::frame::Game;
 use nimbus::io::scene_file::{LoadedScene, parse_beside};
 use nimbus::io::weather::{netcdf, wrf};
-use nimbus::io::{box_file, particle_file};
+use nimbus::io::{box_file, particle_file, ply};
 use nimbus::model::weather::particles::Layout;
 use nimbus::report::pages::page;
 use nimbus::report::pages::source::{Results, Source};
@@ -117,6 +117,25 @@ pub fn particle_list(bytes: &[u8]) -> std::result::Result<(), String> {
         lines.last().is_none_or(|last| *last <= text.split('\n').count()),
         "a line of the file"
     );
+    Ok(())
+}
+
+/// Checks the parser of PLY files: what is written is read again.
+pub fn ply(bytes: &[u8]) -> std::result::Result<(), String> {
+    let found = ply::parse(bytes, Path::new("p.ply")).map_err(|e| clean(&e, &[]))?;
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("p.ply");
+    ply::write(&path, &found.particles).expect("room");
+    let written = std::fs::read(&path).expect("what was written");
+    let again = ply::parse(&written, Path::new("p.ply")).expect("what was written");
+    assert_eq!(again.particles.len(), found.particles.len());
+    for (a, b) in again.particles.iter().zip(&found.particles) {
+        assert!((a.aspect / b.aspect - 1.0).abs() < 1e-12, "{a:?} {b:?}");
+        assert_eq!(
+            (a.position, a.sigma, a.kappa, a.color),
+            (b.position, b.sigma, b.kappa, b.color)
+        );
+    }
     Ok(())
 }
 

@@ -12,9 +12,10 @@ use std::time::Duration;
 
 use crate::readers;
 use nimbus::error::Error;
+use nimbus::io::mapped_file::MappedFile;
 use nimbus::io::text_file::{DATA_LIMIT, read_text};
 use nimbus::io::weather::wrf;
-use nimbus::io::{box_file, particle_file, scene_file};
+use nimbus::io::{box_file, particle_file, ply, scene_file};
 use nimbus::report::pages::source;
 use nimbus::studies::error::files::read_earlier;
 
@@ -101,6 +102,11 @@ fn particle_lists() {
 }
 
 #[test]
+fn ply_files() {
+    assert_as_listed("ply", readers::ply);
+}
+
+#[test]
 fn results() {
     assert_as_listed("results", readers::results);
 }
@@ -116,7 +122,7 @@ fn every_file_is_read_or_refused_with_one_message() {
     let dir = tempfile::tempdir().expect("a folder");
     let no_text: Vec<Vec<u8>> =
         vec![vec![0xff, 0xfe, 0], vec![0; 4096], b"\xed\xa0\x80".to_vec(), vec![0xc3]];
-    let found = ["scene_file", "box_file", "particle_list", "results", "weather"]
+    let found = ["scene_file", "box_file", "particle_list", "ply", "results", "weather"]
         .map(inputs)
         .into_iter()
         .flatten();
@@ -127,6 +133,7 @@ fn every_file_is_read_or_refused_with_one_message() {
             "scene.toml",
             "b.dat",
             "p.csv",
+            "p.ply",
             "run.json",
             "frames.csv",
             "study.json",
@@ -154,6 +161,10 @@ fn read_all(folder: &Path) -> Vec<Error> {
         box_file::read(&path("b.dat")).err(),
         read_text(&path("p.csv"), DATA_LIMIT, particle_file::FIRST)
             .and_then(|text| particle_file::parse(&text, Path::new("p.csv")))
+            .err(),
+        MappedFile::open(&path("p.ply"))
+            .map_err(|e| Error::io(&path("p.ply"), e))
+            .and_then(|file| ply::read(&file, Path::new("p.ply")))
             .err(),
         read_earlier(folder).err(),
         wrf::open(&path("w.nc")).err(),

@@ -39,7 +39,8 @@ fn at_rest(scene: &Scene, time_s: f64) -> Scene {
     let mut scene = scene.clone();
     for cloud in &mut scene.clouds {
         if let CloudSource::Animated(moving) = &cloud.source {
-            cloud.source = CloudSource::Particles(moving.animation.at(time_s).unwrap().to_vec());
+            cloud.source =
+                CloudSource::Particles(moving.animation.at(time_s).unwrap().to_vec().into());
         }
     }
     scene

@@ -19,6 +19,12 @@ pub struct InspectArgs {
     /// Every particle, in the scene's coordinates
     #[arg(long)]
     pub particles: bool,
+    /// With --particles: write them to a PLY file (binary, f64), which scenes can read
+    #[arg(short, long, value_name = "FILE.ply", requires = "particles", conflicts_with = "json")]
+    pub output: Option<PathBuf>,
+    /// With --output: replace an existing file
+    #[arg(long, requires = "output")]
+    pub force: bool,
     /// Every lighting facet: place, normal, area, irradiance, radiance
     #[arg(long)]
     pub facets: bool,

@@ -38,7 +38,7 @@ fn of_boxes(counts: &[u32]) -> Cloud {
 fn of_list(n: usize) -> Cloud {
     let p =
         Particle { position: DVec3::ZERO, sigma: 1.0, aspect: 1.0, kappa: 1.0, color: DVec3::ONE };
-    cloud(CloudSource::Particles(vec![p; n]))
+    cloud(CloudSource::Particles(vec![p; n].into()))
 }
 
 fn groups(clouds: &[Cloud]) -> Vec<Group> {

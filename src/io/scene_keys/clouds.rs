@@ -19,9 +19,10 @@ use super::weather::{WEATHER, ground_of, read_settings};
 use crate::error::{Error, Result};
 use crate::io::bounds::{AMOUNT, COORDINATE, GREATEST, is_carried_place, shortest};
 use crate::io::document::section::Section;
+use crate::io::mapped_file::MappedFile;
 use crate::io::near_file::MISSING;
 use crate::io::weather::{blobs, moving};
-use crate::io::{box_file, particle_file};
+use crate::io::{box_file, particle_file, ply};
 use crate::model::air::Air;
 use crate::model::boxes::{BoxLaw, Form};
 use crate::model::cloud::{Cloud, CloudSource, Facing};
@@ -118,7 +119,7 @@ keys! {
 
 keys! {
     /// File that the cloud is made from, relative to the scene's folder: a box file (P Table 1), a
-    /// particle list (CSV), or WRF output (NetCDF).
+    /// particle list (CSV or PLY), or WRF output (NetCDF).
     FILE: fn file(s) -> String = "file": required_text();
 }
 
@@ -260,13 +261,36 @@ fn read_boxes(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
 }
 
 fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
-    let (text, path) = read_named(s, reading, particle_file::FIRST)?;
-    let (particles, lines) = particle_file::parse(&text, &path)?;
-    reading.found.lines = lines;
+    enum Opened {
+        Text(String),
+        Ply(MappedFile),
+    }
+    let files = reading.around.files;
+    let open = |path: &Path| match ply::is_named(path) {
+        true => files.mapped(path).map(Opened::Ply),
+        false => files.text(path, particle_file::FIRST).map(Opened::Text),
+    };
+    let (opened, path) = open_file(s, reading.around.folder, open)?;
+    let particles = match opened {
+        Opened::Text(text) => {
+            reading.found.digests.push(Sha256::digest(&text).into());
+            let (particles, lines) = particle_file::parse(&text, &path)?;
+            reading.found.lines = lines;
+            particles
+        }
+        Opened::Ply(file) => {
+            let ply::Read { particles, notes } = ply::read(&file, &path)?;
+            let cloud = reading.i_cloud;
+            let found = &mut *reading.found;
+            found.digests.push(ply::digest(&particles));
+            found.notes.extend(notes.into_iter().map(|note| format!("cloud {cloud}: {note}")));
+            particles
+        }
+    };
     if particles.is_empty() {
         reading.note_empty(&path, "it has a header and no particles");
     }
-    Ok(CloudSource::Particles(particles))
+    Ok(CloudSource::Particles(particles.into()))
 }
 
 fn read_weather(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
@@ -291,5 +315,5 @@ fn read_weather(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
     }
     let particles = blobs::particles(&file, &settings, seed)?;
     found.digests.push(blobs::digest(&particles));
-    Ok(CloudSource::Particles(particles))
+    Ok(CloudSource::Particles(particles.into()))
 }

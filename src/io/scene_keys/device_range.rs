@@ -2,8 +2,9 @@
 //! places, widths, extinctions and masses of its blobs.
 
 use crate::io::bounds::{Bounds, GREATEST, LEAST, rounded, shortest};
-use crate::model::cloud::{Cloud, CloudSource, Group, SIGMA_PER_RADIUS, mass};
+use crate::model::cloud::{Cloud, CloudSource, Group, SIGMA_PER_RADIUS};
 use crate::model::disc::Disc;
+use crate::model::particle_list::Summary;
 
 /// Upper limit of κ σ and of the mass κ (2π)^{3/2} σ³, and so of κ σ², which lies between them. κ
 /// and σ of 1e15 give κ σ = 1e30; f32 ends at 3.4e38.
@@ -30,7 +31,7 @@ const DEPTH: Limit =
     Limit { name: "κ σ", greatest: GREATEST_PRODUCT, of: |g| g.kappa_max * g.sigma_widest() };
 
 /// Returns the first quantity of a cloud's particles, not yet grown, that f32 does not carry.
-/// `lines` are the lines of the particles in their file.
+/// `lines` are the lines of the particles in their file, if it is text.
 pub fn out_of_range(cloud: &Cloud, lines: &[usize]) -> Option<String> {
     let groups = cloud.groups(0, 0);
     match &cloud.source {
@@ -55,11 +56,13 @@ pub fn out_of_range(cloud: &Cloud, lines: &[usize]) -> Option<String> {
         // The reader of weather files has checked that the numbers are those of air.
         CloudSource::Animated(_) => None,
         CloudSource::Particles(list) => {
-            let masses = list.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect);
-            let (i, heaviest) = masses.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-            let what = at_most(GREATEST_PRODUCT, heaviest)?;
-            let line = lines.get(i).map_or("?".to_owned(), usize::to_string);
-            Some(format!("line {line}: {}: {what}", MASS.name))
+            let Summary { mass_max, i_heaviest: i, .. } = *list.summary();
+            let what = at_most(GREATEST_PRODUCT, mass_max)?;
+            let place = match lines.get(i) {
+                Some(line) => format!("line {line}"),
+                None => format!("particle {i} (from 0)"),
+            };
+            Some(format!("{place}: {}: {what}", MASS.name))
         }
     }
 }

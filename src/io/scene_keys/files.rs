@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::{Error, Result};
-use crate::io::text_file::{DATA_LIMIT, read_text};
+use crate::io::mapped_file::MappedFile;
+use crate::io::text_file::{DATA_LIMIT, plain, read_text};
 use crate::io::weather::wrf::{self, WeatherFile};
 
 /// Source of the files that a scene names.
@@ -14,6 +15,14 @@ pub trait Files {
     /// # Errors
     /// When the file cannot be read or is no text.
     fn text(&self, path: &Path, first: &str) -> Result<String>;
+
+    /// Maps a file into memory.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or the source has text alone.
+    fn mapped(&self, path: &Path) -> Result<MappedFile> {
+        Err(Error::io(path, "binary files are read from the disk alone"))
+    }
 
     /// Opens a weather file.
     ///
@@ -36,6 +45,10 @@ pub struct OnDisk;
 impl Files for OnDisk {
     fn text(&self, path: &Path, first: &str) -> Result<String> {
         read_text(path, DATA_LIMIT, first)
+    }
+
+    fn mapped(&self, path: &Path) -> Result<MappedFile> {
+        MappedFile::open(path).map_err(|e| Error::io(path, plain(&e, path)))
     }
 
     fn weather(&self, path: &Path) -> Result<WeatherFile> {
@@ -69,6 +82,11 @@ impl Files for Listed {
     fn text(&self, path: &Path, first: &str) -> Result<String> {
         self.add(path);
         OnDisk.text(path, first)
+    }
+
+    fn mapped(&self, path: &Path) -> Result<MappedFile> {
+        self.add(path);
+        OnDisk.mapped(path)
     }
 
     fn weather(&self, path: &Path) -> Result<WeatherFile> {

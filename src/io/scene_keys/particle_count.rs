@@ -56,7 +56,7 @@ mod tests {
 
     use super::*;
     use crate::model::boxes::{BoxLaw, Form};
-    use crate::model::cloud::Facing;
+    use crate::model::cloud::{Facing, ParticleList};
     use crate::model::growth::Growth;
     use crate::model::gust::Gust;
     use crate::model::texture::Texture;
@@ -93,7 +93,7 @@ mod tests {
     fn particles_are_dealt_by_the_largest_remainder() {
         let mut clouds = [
             cloud(&[3, 0, 4]),
-            Cloud { source: CloudSource::Particles(vec![]), ..cloud(&[]) },
+            Cloud { source: CloudSource::Particles(ParticleList::default()), ..cloud(&[]) },
             cloud(&[3]),
         ];
         // 5 · (3, 0, 4, 3)/10 is 1.5, 0, 2, 1.5: one is left, and the first of the two has it.

@@ -80,7 +80,7 @@ fn with_clouds((text, list, one_box, is_stirred): Made) -> Scene {
     let mut scene = parse(text, path, &[], None).expect("a scene").scene;
     let stirred = Gust { amplitude: 0.2, length: 2.0, period_s: 3.0, n_waves: 4 };
     let gust = if is_stirred { stirred } else { Gust::CALM };
-    scene.clouds.push(cloud_of(CloudSource::Particles(list), gust));
+    scene.clouds.push(cloud_of(CloudSource::Particles(list.into()), gust));
     if let Some(one_box) = one_box {
         let law = BoxLaw { optical_depth: 1.3, ..BoxLaw::new(Form::Centred) };
         let source = CloudSource::Boxes { boxes: vec![one_box], law };

@@ -1,0 +1,246 @@
+//! The rows of an element of a PLY file, binary or as text.
+
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+
+use super::header::{Element, Format, Header, Scalar};
+use crate::error::{Error, Place, Result};
+use crate::io::document::suggest::shown;
+
+/// The fewest rows of a part: less is not worth a thread.
+const LEAST_PART: usize = 1 << 14;
+
+/// What a row becomes.
+pub type Made<T> = std::result::Result<T, Fault>;
+
+/// What is wrong with a row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fault {
+    /// Number of the property.
+    pub i: usize,
+    /// What was expected, and what was found.
+    pub what: String,
+}
+
+/// What is made of rows.
+pub trait OfRow<T> {
+    /// Returns what is made of the row whose properties `value` returns by their numbers.
+    fn made(&self, value: impl Fn(usize) -> f64) -> Made<T>;
+}
+
+/// The rows of an element.
+pub struct Rows<'a> {
+    element: &'a Element,
+    format: Format,
+    /// From the first row on. Of a binary file, these rows alone.
+    bytes: &'a [u8],
+    /// Lines before the first row.
+    n_lines: usize,
+    path: &'a Path,
+}
+
+impl<'a> Rows<'a> {
+    /// Returns the rows of element `i` of a file.
+    ///
+    /// # Errors
+    /// When the file ends before them, or a list stands before or in them.
+    pub fn new(header: &'a Header, bytes: &'a [u8], i: usize, path: &'a Path) -> Result<Rows<'a>> {
+        let element = &header.elements[i];
+        let of_list =
+            |e: &Element| e.properties.iter().find(|p| p.scalar.is_none()).map(|p| p.line);
+        if let Some(line) = of_list(element) {
+            let what = format!("expected numbers in `{}`, found a list", shown(&element.name));
+            return Err(Error::scene(Place::line(path, line, 1), what));
+        }
+        let (format, mut n_lines) = (header.format, header.n_lines);
+        let mut rest = &bytes[header.n_bytes..];
+        for before in &header.elements[..i] {
+            if format == Format::Ascii {
+                for _ in 0..before.n {
+                    let Some(end) = rest.iter().position(|b| *b == b'\n') else { break };
+                    rest = &rest[end + 1..];
+                    n_lines += 1;
+                }
+                continue;
+            }
+            let Some(row) = before.row_bytes() else {
+                let [before, own] = [&before.name, &element.name].map(|name| shown(name));
+                let what = format!("expected `{own}` before `{before}`, whose rows are lists");
+                return Err(Error::scene(Place::line(path, element.line, 1), what));
+            };
+            let n_bytes = usize::try_from(before.n).ok().and_then(|n| n.checked_mul(row));
+            rest = n_bytes.and_then(|n| rest.get(n..)).unwrap_or_default();
+        }
+        if format != Format::Ascii {
+            let row = element.row_bytes().unwrap_or_default();
+            let n_bytes = usize::try_from(element.n).ok().and_then(|n| n.checked_mul(row));
+            let Some(rows) = n_bytes.and_then(|n| rest.get(..n)) else {
+                return Err(Error::scene(
+                    Place::file(path),
+                    format!(
+                        "the file is cut: expected {} rows of {row} bytes in `{}`, found {} bytes",
+                        element.n,
+                        shown(&element.name),
+                        rest.len()
+                    ),
+                ));
+            };
+            rest = rows;
+        }
+        Ok(Rows { element, format, bytes: rest, n_lines, path })
+    }
+
+    /// Returns what `of` makes of every row, in order. Binary rows are read on all threads.
+    ///
+    /// # Errors
+    /// The fault of the first wrong row, with its place.
+    pub fn map<T: Clone + Send>(&self, blank: T, of: &(impl OfRow<T> + Sync)) -> Result<Vec<T>> {
+        if self.format == Format::Ascii {
+            return self.map_lines(of);
+        }
+        let n = self.element.n as usize;
+        let row_bytes = self.element.row_bytes().unwrap_or_default();
+        let mut offset = 0;
+        let columns: Vec<(usize, Scalar)> = self
+            .element
+            .properties
+            .iter()
+            .filter_map(|p| {
+                let scalar = p.scalar?;
+                offset += scalar.n_bytes();
+                Some((offset - scalar.n_bytes(), scalar))
+            })
+            .collect();
+        let is_big = self.format == Format::Big;
+        let of_part = |first: usize, part: &mut [T]| {
+            for (k, to) in part.iter_mut().enumerate() {
+                let row = &self.bytes[(first + k) * row_bytes..];
+                let value = |i: usize| {
+                    let (offset, scalar) = columns[i];
+                    number(&row[offset..], scalar, is_big)
+                };
+                *to = of.made(value).map_err(|fault| (first + k, fault))?;
+            }
+            Ok(())
+        };
+        let mut made = vec![blank; n];
+        match in_parts(&mut made, of_part) {
+            Some((row, fault)) => Err(self.fault_of_row(row, &fault)),
+            None => Ok(made),
+        }
+    }
+
+    fn fault_of_row(&self, row: usize, fault: &Fault) -> Error {
+        let (element, name) = (&self.element.name, &self.element.properties[fault.i].name);
+        let what = format!("{} {row} (from 0): `{}`: {}", shown(element), shown(name), fault.what);
+        Error::scene(Place::file(self.path), what)
+    }
+
+    fn map_lines<T>(&self, of: &impl OfRow<T>) -> Result<Vec<T>> {
+        let (name, n) = (shown(&self.element.name), self.element.n);
+        let n_properties = self.element.properties.len();
+        let mut made = Vec::new();
+        let mut values = Vec::with_capacity(n_properties);
+        let mut lines = self.bytes.split(|b| *b == b'\n').zip(self.n_lines + 1..);
+        while (made.len() as u64) < n {
+            let Some((bytes, line)) = lines.next() else {
+                let found = made.len();
+                let what = format!("the file is cut: expected {n} rows in `{name}`, found {found}");
+                return Err(Error::scene(Place::file(self.path), what));
+            };
+            let fault = |column: usize, what: String| {
+                Err(Error::scene(Place::line(self.path, line, column), what))
+            };
+            let Ok(text) = std::str::from_utf8(bytes) else {
+                return fault(1, "expected numbers, found no text".to_owned());
+            };
+            if text.trim().is_empty() {
+                continue;
+            }
+            let column = |word: &str| text[..offset_in(text, word)].chars().count() + 1;
+            values.clear();
+            for word in text.split_whitespace().take(n_properties) {
+                match word.parse::<f64>() {
+                    Ok(value) => values.push(value),
+                    Err(_) => {
+                        let what = format!("expected a number, found `{}`", shown(word));
+                        return fault(column(word), what);
+                    }
+                }
+            }
+            let found = text.split_whitespace().count();
+            if found != n_properties {
+                let what =
+                    format!("expected {n_properties} numbers as in the header, found {found}");
+                return fault(text.trim_end().chars().count() + 1, what);
+            }
+            match of.made(|i| values[i]) {
+                Ok(one) => made.push(one),
+                Err(wrong) => {
+                    let word = text.split_whitespace().nth(wrong.i).unwrap_or_default();
+                    let name = shown(&self.element.properties[wrong.i].name);
+                    return fault(column(word), format!("`{name}`: {}", wrong.what));
+                }
+            }
+        }
+        Ok(made)
+    }
+}
+
+/// Calls `work` with parts of `all` and the number of the first of each, on all threads; on the
+/// caller's where no others can be started. Returns the failure of the first row.
+fn in_parts<T: Send, E: Send>(
+    all: &mut [T],
+    work: impl Fn(usize, &mut [T]) -> std::result::Result<(), (usize, E)> + Sync,
+) -> Option<(usize, E)> {
+    let n_threads = thread::available_parallelism().map_or(1, usize::from);
+    let size = all.len().div_ceil(4 * n_threads).max(LEAST_PART);
+    let parts = Mutex::new(all.chunks_mut(size).enumerate());
+    let failed = Mutex::new(None);
+    let next = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let take = || {
+        while let Some((i, part)) = next() {
+            let Err((row, error)) = work(i * size, part) else { continue };
+            let mut failed = failed.lock().unwrap_or_else(PoisonError::into_inner);
+            if failed.as_ref().is_none_or(|(first, _)| row < *first) {
+                *failed = Some((row, error));
+            }
+        }
+    };
+    thread::scope(|scope| {
+        for _ in 1..n_threads {
+            // Without another thread this one does all.
+            let _ = thread::Builder::new().spawn_scoped(scope, take);
+        }
+        take();
+    });
+    failed.into_inner().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Returns where `part`, which is a part of `text`, begins in it.
+fn offset_in(text: &str, part: &str) -> usize {
+    (part.as_ptr() as usize).saturating_sub(text.as_ptr() as usize).min(text.len())
+}
+
+/// Returns the number at the start of `bytes`.
+fn number(bytes: &[u8], scalar: Scalar, is_big: bool) -> f64 {
+    fn first<const N: usize>(bytes: &[u8], is_big: bool) -> [u8; N] {
+        let mut found = [0; N];
+        found.copy_from_slice(&bytes[..N]);
+        if is_big {
+            found.reverse();
+        }
+        found
+    }
+    match scalar {
+        Scalar::I8 => f64::from(i8::from_le_bytes(first(bytes, is_big))),
+        Scalar::U8 => f64::from(bytes[0]),
+        Scalar::I16 => f64::from(i16::from_le_bytes(first(bytes, is_big))),
+        Scalar::U16 => f64::from(u16::from_le_bytes(first(bytes, is_big))),
+        Scalar::I32 => f64::from(i32::from_le_bytes(first(bytes, is_big))),
+        Scalar::U32 => f64::from(u32::from_le_bytes(first(bytes, is_big))),
+        Scalar::F32 => f64::from(f32::from_le_bytes(first(bytes, is_big))),
+        Scalar::F64 => f64::from_le_bytes(first(bytes, is_big)),
+    }
+}

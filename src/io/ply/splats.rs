@@ -1,0 +1,268 @@
+//! What the properties of a row mean: a particle of a list, or a splat of 3D Gaussian splatting
+//! (Kerbl et al. 2023).
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::header::Element;
+use super::rows::{Fault, Made, OfRow};
+use crate::io::bounds::{AMOUNT, DIVISOR, GREATEST, LEAST, rounded, wrong_coordinate, wrong_size};
+use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, SQRT_TAU};
+
+/// Greatest opacity of a splat, as in the rasterizer of Kerbl et al.: no splat hides all behind it.
+const MOST_OPACITY: f64 = 0.99;
+/// Y₀₀ = ½/√π: the harmonic of degree 0, by which f_dc counts.
+const HARMONIC: f64 = 0.282_094_791_773_878_14;
+/// p of Thomsen's formula for the mean area of an ellipsoid.
+const THOMSEN: f64 = 1.6075;
+
+/// Three properties, by their numbers.
+type Three = [usize; 3];
+
+enum Size {
+    /// σ or a multiple of it, and σ along y.
+    Sigma(usize, f64, Option<usize>),
+    /// Logarithms of σ along three axes, and their rotation.
+    Scales(Three, Option<[usize; 4]>),
+}
+
+enum Density {
+    Kappa(usize),
+    /// The logit of the opacity.
+    Opacity(usize),
+}
+
+enum Color {
+    White,
+    /// Linear, divided by what integers count as 1.
+    Linear(Three, f64),
+    /// Coefficients of harmonics of degree 0.
+    Harmonics(Three),
+}
+
+/// The properties of which particles are made.
+pub struct Columns {
+    position: Three,
+    size: Size,
+    density: Density,
+    color: Color,
+    /// Properties that belong to harmonics of higher degrees.
+    n_harmonics: usize,
+    /// Ellipsoids that lie askew.
+    askew: AtomicU64,
+}
+
+impl Columns {
+    /// Finds the properties of an element. A failure says which one is missing.
+    pub fn find(element: &Element) -> Result<Columns, String> {
+        let find = |name: &str| element.properties.iter().position(|p| p.name == name);
+        let three = |names: [&str; 3]| {
+            let [a, b, c] = names.map(find);
+            Some([a?, b?, c?])
+        };
+        let Some(position) = three(["x", "y", "z"]) else {
+            return Err("expected properties `x`, `y`, `z`".to_owned());
+        };
+        let scales = three(["scale_0", "scale_1", "scale_2"]);
+        let sizes = (find("sigma"), find("radius"), scales);
+        let size = match sizes {
+            (Some(i), None, None) => Size::Sigma(i, 1.0, find("sigma_y")),
+            (None, Some(i), None) => Size::Sigma(i, SIGMA_PER_RADIUS, find("sigma_y")),
+            (None, None, Some(scales)) => {
+                let [w, x, y, z] = ["rot_0", "rot_1", "rot_2", "rot_3"].map(find);
+                let rotation = match (w, x, y, z) {
+                    (Some(w), Some(x), Some(y), Some(z)) => Some([w, x, y, z]),
+                    (None, None, None, None) => None,
+                    _ => return Err("expected all of `rot_0` to `rot_3`, or none".to_owned()),
+                };
+                Size::Scales(scales, rotation)
+            }
+            (None, None, None) => {
+                return Err("expected a property `sigma`, `radius` (3 sigma), or `scale_0`, \
+                            `scale_1`, `scale_2` (logarithms of sigma)"
+                    .to_owned());
+            }
+            _ => return Err("expected one of `sigma`, `radius` and `scale_0`".to_owned()),
+        };
+        let density = match (find("kappa"), find("opacity")) {
+            (Some(i), None) => Density::Kappa(i),
+            (None, Some(i)) => Density::Opacity(i),
+            (None, None) => {
+                return Err("expected a property `kappa`, or `opacity` (its logit)".to_owned());
+            }
+            _ => return Err("expected `kappa` or `opacity`, found both".to_owned()),
+        };
+        let linear = three(["r", "g", "b"]).or_else(|| three(["red", "green", "blue"]));
+        let color = match (linear, three(["f_dc_0", "f_dc_1", "f_dc_2"])) {
+            (Some(of), _) => {
+                let full = of.map(|i| element.properties[i].scalar.and_then(|s| s.full()));
+                Color::Linear(of, full[0].unwrap_or(1.0))
+            }
+            (None, Some(of)) => Color::Harmonics(of),
+            (None, None) => Color::White,
+        };
+        let is_harmonic = |name: &str| name.starts_with("f_rest_");
+        let n_harmonics = match color {
+            Color::Harmonics(_) => {
+                element.properties.iter().filter(|p| is_harmonic(&p.name)).count()
+            }
+            _ => 0,
+        };
+        Ok(Columns { position, size, density, color, n_harmonics, askew: AtomicU64::new(0) })
+    }
+
+    /// Returns notes for the user about the `n` particles that were made.
+    pub fn notes(&self, n: usize) -> Vec<String> {
+        let mut notes = vec![];
+        let askew = self.askew.load(Ordering::Relaxed);
+        if askew > 0 {
+            notes.push(format!(
+                "{askew} of {n} ellipsoids lie askew; each is drawn upright, with its mass, its \
+                 height and its mean width"
+            ));
+        }
+        if self.n_harmonics > 0 {
+            notes.push(format!(
+                "colours do not change with the view: f_rest_0 to f_rest_{} are left out",
+                self.n_harmonics - 1
+            ));
+        }
+        notes
+    }
+
+    /// Returns σ along x and z, and the aspect, of the upright ellipsoid that stands for one: of
+    /// the same height and mean width.
+    fn upright(&self, scales: DVec3, rotation: DQuat) -> (f64, f64) {
+        if scales.x == scales.z && (rotation == DQuat::IDENTITY || scales.x == scales.y) {
+            return (scales.x, aspect_of(scales.y, scales.x));
+        }
+        // Covariance: the sum of σ² r rᵀ over the turned axes r.
+        let (mut own, mut across) = (DVec3::ZERO, DVec3::ZERO);
+        let axes = DMat3::from_quat(rotation);
+        for (axis, sigma) in [axes.x_axis, axes.y_axis, axes.z_axis].iter().zip(scales.to_array()) {
+            let r = sigma * *axis;
+            own += r * r;
+            across += r * DVec3::new(r.y, r.z, r.x);
+        }
+        let wide = 0.5 * (own.x + own.z);
+        // What the upright one has not, and all that there is.
+        let lost = 2.0 * (own.x - wide).powi(2) + 2.0 * across.length_squared();
+        if lost > 1e-12 * (own.length_squared() + 2.0 * across.length_squared()) {
+            self.askew.fetch_add(1, Ordering::Relaxed);
+        }
+        (wide.sqrt(), aspect_of(own.y.sqrt(), wide.sqrt()))
+    }
+}
+
+impl OfRow<Particle> for Columns {
+    fn made(&self, value: impl Fn(usize) -> f64) -> Made<Particle> {
+        let checked = |i: usize, v: f64, expected: Option<String>| match expected {
+            None => Ok(v),
+            Some(of) => Err(Fault { i, what: format!("expected {of}, found `{}`", value(i)) }),
+        };
+        let finite = |i: usize| {
+            let v = value(i);
+            checked(i, v, (!v.is_finite()).then(|| "a finite number".to_owned()))
+        };
+        let size = |i: usize, v: f64, least: f64| {
+            let wrong = if v.is_finite() { wrong_size(v, least) } else { Some(AMOUNT.to_string()) };
+            checked(i, v, wrong)
+        };
+        let coordinate = |i: usize| finite(i).and_then(|v| checked(i, v, wrong_coordinate(v)));
+        let [x, y, z] = self.position.map(coordinate);
+        let position = DVec3::new(x?, y?, z?);
+        // κ of an upright ellipsoid is `share` of that of the one that it stands for.
+        let (sigma, aspect, logs, share) = match self.size {
+            Size::Sigma(i, factor, high) => {
+                let sigma = size(i, factor * value(i), LEAST)?;
+                let aspect = match high {
+                    Some(j) if sigma > 0.0 => {
+                        let aspect = finite(j)? / sigma;
+                        checked(j, aspect, wrong_aspect(aspect, sigma))?
+                    }
+                    _ => 1.0,
+                };
+                let high = libm::log(sigma * aspect);
+                let wide = libm::log(sigma);
+                (sigma, aspect, [wide, high, wide], 1.0)
+            }
+            Size::Scales(of, rotation) => {
+                let [a, b, c] = of.map(|i| {
+                    let sigma = libm::exp(finite(i)?);
+                    let wrong = sigma < LEAST && sigma != 0.0 || sigma > GREATEST;
+                    let expected = || format!("a logarithm of 0 or of {DIVISOR}");
+                    checked(i, sigma, wrong.then(expected))
+                });
+                let scales = DVec3::new(a?, b?, c?);
+                let rotation = match rotation {
+                    None => DQuat::IDENTITY,
+                    Some(of) => {
+                        let [w, x, y, z] = of.map(finite);
+                        let of_length = DQuat::from_xyzw(x?, y?, z?, w?);
+                        let found = of_length.length();
+                        let wrong = !(found.is_finite() && found > 1e-30);
+                        checked(
+                            of[0],
+                            0.0,
+                            wrong.then(|| "a rotation other than zero".to_owned()),
+                        )?;
+                        of_length / found
+                    }
+                };
+                let (sigma, aspect) = self.upright(scales, rotation);
+                let own = sigma * sigma * sigma * aspect;
+                let share = if own > 0.0 { scales.element_product() / own } else { 1.0 };
+                (sigma, aspect, of.map(&value), share)
+            }
+        };
+        let own = sigma * sigma * sigma * aspect;
+        let kappa = match self.density {
+            Density::Kappa(i) => share * size(i, value(i), 0.0)?,
+            Density::Opacity(i) => {
+                let opacity = 1.0 / (1.0 + libm::exp(-finite(i)?));
+                let depth = -libm::log1p(-opacity.min(MOST_OPACITY));
+                // κ (2π)^{3/2} V = τ 2π A, with V and A over those of the unit ball.
+                let mass = depth * libm::exp(log_area(logs)) / SQRT_TAU;
+                let kappa = if own > 0.0 { mass / own } else { 0.0 };
+                size(i, kappa, 0.0)?
+            }
+        };
+        let color = match self.color {
+            Color::White => DVec3::ONE,
+            Color::Linear(of, full) => {
+                let [r, g, b] = of.map(|i| size(i, value(i) / full, 0.0));
+                DVec3::new(r?, g?, b?)
+            }
+            Color::Harmonics(of) => {
+                let [r, g, b] = of.map(|i| {
+                    let v = (0.5 + HARMONIC * finite(i)?).max(0.0);
+                    size(i, v, 0.0)
+                });
+                DVec3::new(r?, g?, b?)
+            }
+        };
+        Ok(Particle { position, sigma, aspect, kappa, color })
+    }
+}
+
+fn aspect_of(high: f64, wide: f64) -> f64 {
+    if wide > 0.0 { (high / wide).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT) } else { 1.0 }
+}
+
+/// Returns the logarithm of the mean over all directions of an ellipsoid's projected area, over π,
+/// from the logarithms of its half axes.
+fn log_area([a, b, c]: [f64; 3]) -> f64 {
+    let pairs = [a + b, a + c, b + c];
+    let most = pairs.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    // The greatest term is 1.
+    let of = |pair: f64| if pair == most { 1.0 } else { libm::exp(THOMSEN * (pair - most)) };
+    most + libm::log(pairs.into_iter().map(of).sum::<f64>() / 3.0) / THOMSEN
+}
+
+/// Returns the expected range when `aspect` is that of no blob.
+fn wrong_aspect(aspect: f64, sigma: f64) -> Option<String> {
+    let within = MIN_ASPECT * (1.0 - 1e-12)..=(1.0 + 1e-12) / MIN_ASPECT;
+    let [low, high] = [MIN_ASPECT, 1.0 / MIN_ASPECT].map(|of| rounded(of * sigma));
+    (!within.contains(&aspect)).then(|| format!("a number from {low} to {high}"))
+}

@@ -79,7 +79,7 @@ void main() {
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 to_eye = push.eye - push.grid.low - edges * (vec3(at) + 0.5);
         vec3 w = dot(to_eye, to_eye) > 0.0 ? normalize(to_eye) : vec3(0.0, 1.0, 0.0);
-        // A cell at the eye's height sees the horizon behind it: the sky's light must not jump there.
+        // A cell at the eye's height has the horizon behind it: light must not jump there.
         float above = clamp(0.5 - to_eye.y / edges.y, 0.0, 1.0);
         vec3 own = sent_along(int(c), w), behind = radiance_along(level, at, w, above);
         vec3 all = push.weakened * own + (1.0 - push.weakened) * behind;

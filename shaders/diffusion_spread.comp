@@ -28,7 +28,8 @@ void main() {
     uvec3 n = push.fine.n_cells;
     FOR_EACH(c, n.x * n.y * n.z) {
         ivec3 n_merged = ivec3(push.merged.n_cells);
-        vec3 at = (vec3(place_of(push.fine, c) + ivec3(push.before)) + 0.5) / float(push.edge) - 0.5;
+        vec3 from_first = vec3(place_of(push.fine, c) + ivec3(push.before)) + 0.5;
+        vec3 at = from_first / float(push.edge) - 0.5;
         Weights of = weights_among(n_merged, at);
         vec3 rise[4] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
         for (int corner = 0; corner < 8; ++corner) {

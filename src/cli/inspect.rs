@@ -8,7 +8,7 @@ use super::progress::spinner;
 use super::scene::{check_time, device_choice, load, print_notes, print_sizes};
 use crate::error::{Error, Result};
 use crate::frame::Stage;
-use crate::inspect::{air, basis, stages as inspect};
+use crate::inspect::{air, basis, particles, stages as inspect};
 use crate::io::claim::Claim;
 use crate::io::console::say;
 use crate::io::ply;
@@ -42,10 +42,10 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     if args.reference {
         let scene = &*scene.lit();
         if let Some(path) = &args.output {
-            return write(path, &inspect::list_reference(scene, i_frame)?, args);
+            return write(path, &particles::list_reference(scene, i_frame)?, args);
         }
         let text = match (args.particles, args.facets) {
-            (true, _) => output::rows(&inspect::particles_reference(scene, i_frame)?, args.json),
+            (true, _) => output::rows(&particles::particles_reference(scene, i_frame)?, args.json),
             (_, true) => facets(args, scene, inspect::facets_reference(scene, i_frame)?),
             _ => boxes(&inspect::boxes_reference(scene), args.json),
         }?;
@@ -57,11 +57,11 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     }
     let mut stage = Stage::new(scene, &device_choice(&args.options), !args.options.no_skip)?;
     if let Some(path) = &args.output {
-        write(path, &inspect::list(&mut stage, i_frame)?, args)?;
+        write(path, &particles::list(&mut stage, i_frame)?, args)?;
         return stage.close();
     }
     let text = match (args.particles, args.facets, args.plan) {
-        (true, _, _) => output::rows(&inspect::particles(&mut stage, i_frame)?, args.json),
+        (true, _, _) => output::rows(&particles::particles(&mut stage, i_frame)?, args.json),
         (_, true, _) => {
             let rows = inspect::facets(&mut stage, i_frame)?;
             print_notes(&mut stage, &args.options)?;

@@ -6,42 +6,13 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::frame::Stage;
 use crate::frame::plan::Pass;
-use crate::layout::particle::{ParticleRecord, PlacedRecord};
-use crate::model::cloud::{CloudSource, Group, Particle, SIGMA_PER_RADIUS};
+use crate::model::cloud::{CloudSource, Group};
 use crate::model::frame_state::FrameState;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::terrain::Terrain;
 use crate::passes::generate::FOLDED;
-use crate::reference::Blob;
 use crate::reference::generate::Generated;
-use crate::reference::picture::{FrameReference, colors};
-
-/// A particle, in scene coordinates.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ParticleRow {
-    /// Number of the particle.
-    pub index: usize,
-    /// Number of its cloud.
-    pub cloud: usize,
-    /// Centre, x.
-    pub x: f64,
-    /// Centre, y.
-    pub y: f64,
-    /// Centre, z.
-    pub z: f64,
-    /// Radius.
-    pub radius: f64,
-    /// Standard deviation σ of its density.
-    pub sigma: f64,
-    /// Extinction at its centre.
-    pub kappa: f64,
-    /// Colour, red.
-    pub r: f64,
-    /// Colour, green.
-    pub g: f64,
-    /// Colour, blue.
-    pub b: f64,
-}
+use crate::reference::picture::FrameReference;
 
 /// A facet, in scene coordinates, with direct and indirect irradiance I_d and I_i, and the radiance
 /// toward the camera of the first and second reflection, L1 and L2. The back of a surface has no
@@ -132,72 +103,6 @@ pub struct PlanRow {
     pub run: bool,
     /// Why.
     pub reason: String,
-}
-
-/// Returns the particles of a frame from the device.
-///
-/// # Errors
-/// Fails if drawing the frame fails.
-pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
-    let origin = draw(stage, i_frame)?.light_origin;
-    let placed = stage.renderer.placed(&stage.device)?;
-    let records = stage.renderer.generate_now(&stage.device)?.0;
-    let groups = stage.scene.groups();
-    let rows = placed.iter().zip(&records).enumerate().map(|(i, (p, r))| {
-        let position = Vec3::from(p.position).as_dvec3() + origin;
-        let color = Vec3::from(r.color).as_dvec3();
-        let [sigma, kappa] = [p.sigma, r.kappa].map(f64::from);
-        particle_row(i, cloud_of(&groups, i), position, sigma, kappa, color)
-    });
-    Ok(rows.collect())
-}
-
-/// Returns the particles of a frame from the device, in scene coordinates.
-///
-/// # Errors
-/// Fails if drawing the frame fails.
-pub fn list(stage: &mut Stage, i_frame: u32) -> Result<Vec<Particle>> {
-    let origin = draw(stage, i_frame)?.light_origin;
-    let placed = stage.renderer.placed(&stage.device)?;
-    let records = stage.renderer.generate_now(&stage.device)?.0;
-    let of = |(p, r): (&PlacedRecord, &ParticleRecord)| Particle {
-        position: Vec3::from(p.position).as_dvec3() + origin,
-        sigma: f64::from(p.sigma),
-        aspect: f64::from(r.aspect),
-        kappa: f64::from(r.kappa),
-        color: Vec3::from(r.color).as_dvec3(),
-    };
-    Ok(placed.iter().zip(&records).map(of).collect())
-}
-
-/// Returns the same from the reference.
-///
-/// # Errors
-/// Fails if the scene has no such reference.
-pub fn list_reference(scene: &Scene, i_frame: u32) -> Result<Vec<Particle>> {
-    let truth = FrameReference::unlit(scene, scene.time.at(i_frame))?;
-    let of = |(b, color): (&Blob, DVec3)| Particle {
-        position: b.position + truth.state.light_origin,
-        sigma: b.sigma,
-        aspect: b.aspect,
-        kappa: b.kappa,
-        color,
-    };
-    Ok(truth.blobs.iter().zip(colors(scene)).map(of).collect())
-}
-
-/// Returns the particles of a frame from the reference.
-///
-/// # Errors
-/// Fails if the scene has no such reference.
-pub fn particles_reference(scene: &Scene, i_frame: u32) -> Result<Vec<ParticleRow>> {
-    let truth = FrameReference::unlit(scene, scene.time.at(i_frame))?;
-    let colors = colors(scene);
-    let rows = truth.blobs.iter().zip(&colors).enumerate().map(|(i, (b, color))| {
-        let position = b.position + truth.state.light_origin;
-        particle_row(i, cloud_of(&truth.groups, i), position, b.sigma, b.kappa, *color)
-    });
-    Ok(rows.collect())
 }
 
 /// Returns the facets of a frame from the device.
@@ -336,7 +241,7 @@ pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
 }
 
 /// Draws a frame and returns its state.
-fn draw(stage: &mut Stage, i_frame: u32) -> Result<FrameState> {
+pub(super) fn draw(stage: &mut Stage, i_frame: u32) -> Result<FrameState> {
     let packet = stage.game.step(i_frame)?;
     let time_s = packet.time_s;
     stage.renderer.step(packet)?;
@@ -355,33 +260,9 @@ fn check_lit(scene: &Scene) -> Result<()> {
 /// Returns the cloud of particle `i`: that of the last group that begins at or before it. Groups
 /// are in the order of their particles, and an empty one precedes the group that begins at its
 /// place.
-fn cloud_of(groups: &[Group], i: usize) -> usize {
+pub(super) fn cloud_of(groups: &[Group], i: usize) -> usize {
     let after = groups.partition_point(|g| g.i_first as usize <= i);
     groups[after.saturating_sub(1)].i_cloud
-}
-
-fn particle_row(
-    index: usize,
-    cloud: usize,
-    p: DVec3,
-    sigma: f64,
-    kappa: f64,
-    c: DVec3,
-) -> ParticleRow {
-    let radius = sigma / SIGMA_PER_RADIUS;
-    ParticleRow {
-        index,
-        cloud,
-        x: p.x,
-        y: p.y,
-        z: p.z,
-        radius,
-        sigma,
-        kappa,
-        r: c.x,
-        g: c.y,
-        b: c.z,
-    }
 }
 
 /// Sets L1 and L2, the last two of `lit`, to zero if the camera sees the back of a surface or

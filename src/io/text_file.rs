@@ -9,7 +9,7 @@ use crate::error::{Error, Place, Result};
 
 /// Largest scene file. Scenes are written by hand; the largest benchmark scene has a few KiB.
 pub const SCENE_LIMIT: u64 = 4 << 20;
-/// Largest box file and particle list: 64 MiB is about a million particles as text.
+/// Largest box file: 64 MiB are about a million boxes.
 pub const DATA_LIMIT: u64 = 64 << 20;
 /// Largest result as JSON: a study of ten thousand configurations. Its tree takes up to a hundred
 /// times its text.

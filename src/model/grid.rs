@@ -107,9 +107,9 @@ impl GridSpec {
     }
 }
 
-/// Returns how many cells the first merged one reaches beyond the box, of `n` along an axis that are
-/// merged by `edge`. A merged cell begins in the middle of the box, so that it stays when layers of
-/// cells come and go at both ends.
+/// Returns how many cells the first merged one reaches beyond the box, of `n` along an axis that
+/// are merged by `edge`. A merged cell begins in the middle of the box, so that it stays when
+/// layers of cells come and go at both ends.
 pub fn cells_before(n: u32, edge: u32) -> u32 {
     (edge - n / 2 % edge) % edge
 }

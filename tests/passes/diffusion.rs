@@ -133,7 +133,7 @@ fn wrong_shaders_are_found() {
         ("boxes", "merged", "diffusion_merge.comp", "min(low + int(push.edge)", "min(low + 2"),
         ("boxes", "merged", "diffusion_merge.comp", "- ivec3(push.before)", ""),
         ("boxes", "merged", "diffusion_spread.comp", "+ ivec3(push.before)", ""),
-        ("boxes", "merged", "diffusion_spread.comp", "+ 0.5) / float", ") / float"),
+        ("boxes", "merged", "diffusion_spread.comp", "(push.before)) + 0.5", "(push.before))"),
         (
             "coloured",
             "merged",

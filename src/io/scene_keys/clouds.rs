@@ -268,7 +268,7 @@ fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource>
     let files = reading.around.files;
     let open = |path: &Path| match ply::is_named(path) {
         true => files.mapped(path).map(Opened::Ply),
-        false => files.text(path, particle_file::FIRST).map(Opened::Text),
+        false => files.list(path, particle_file::FIRST).map(Opened::Text),
     };
     let (opened, path) = open_file(s, reading.around.folder, open)?;
     let particles = match opened {

@@ -5,8 +5,13 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::error::{Error, Result};
 use crate::io::mapped_file::MappedFile;
+use crate::io::memory;
 use crate::io::text_file::{DATA_LIMIT, plain, read_text};
 use crate::io::weather::wrf::{self, WeatherFile};
+
+/// Most memory that a list takes by its size: a row of ten bytes is a particle of 80 and a number
+/// of its line, beside the text.
+const MEMORY_BY_TEXT: u64 = 10;
 
 /// Source of the files that a scene names.
 pub trait Files {
@@ -15,6 +20,14 @@ pub trait Files {
     /// # Errors
     /// When the file cannot be read or is no text.
     fn text(&self, path: &Path, first: &str) -> Result<String>;
+
+    /// Reads a particle list, which may be as large as memory allows.
+    ///
+    /// # Errors
+    /// As [`Files::text`], and when there is too little memory.
+    fn list(&self, path: &Path, first: &str) -> Result<String> {
+        self.text(path, first)
+    }
 
     /// Maps a file into memory.
     ///
@@ -45,6 +58,13 @@ pub struct OnDisk;
 impl Files for OnDisk {
     fn text(&self, path: &Path, first: &str) -> Result<String> {
         read_text(path, DATA_LIMIT, first)
+    }
+
+    fn list(&self, path: &Path, first: &str) -> Result<String> {
+        let n_bytes = path.metadata().map_or(0, |about| about.len());
+        let of = || format!("{}: particles of {} MiB of text", path.display(), n_bytes >> 20);
+        memory::check(n_bytes.saturating_mul(MEMORY_BY_TEXT), of)?;
+        read_text(path, u64::MAX, first)
     }
 
     fn mapped(&self, path: &Path) -> Result<MappedFile> {
@@ -82,6 +102,11 @@ impl Files for Listed {
     fn text(&self, path: &Path, first: &str) -> Result<String> {
         self.add(path);
         OnDisk.text(path, first)
+    }
+
+    fn list(&self, path: &Path, first: &str) -> Result<String> {
+        self.add(path);
+        OnDisk.list(path, first)
     }
 
     fn mapped(&self, path: &Path) -> Result<MappedFile> {

@@ -1,0 +1,130 @@
+//! The particles of a frame, as rows and as a list, from the device or from the reference in f64.
+
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+
+use super::stages::{cloud_of, draw};
+use crate::error::Result;
+use crate::frame::Stage;
+use crate::layout::particle::{ParticleRecord, PlacedRecord};
+use crate::model::cloud::{Particle, SIGMA_PER_RADIUS};
+use crate::model::scene::Scene;
+use crate::reference::Blob;
+use crate::reference::picture::{FrameReference, colors};
+
+/// A particle, in scene coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParticleRow {
+    /// Number of the particle.
+    pub index: usize,
+    /// Number of its cloud.
+    pub cloud: usize,
+    /// Centre, x.
+    pub x: f64,
+    /// Centre, y.
+    pub y: f64,
+    /// Centre, z.
+    pub z: f64,
+    /// Radius.
+    pub radius: f64,
+    /// Standard deviation σ of its density.
+    pub sigma: f64,
+    /// Extinction at its centre.
+    pub kappa: f64,
+    /// Colour, red.
+    pub r: f64,
+    /// Colour, green.
+    pub g: f64,
+    /// Colour, blue.
+    pub b: f64,
+}
+
+/// Returns the particles of a frame from the device.
+///
+/// # Errors
+/// Fails if drawing the frame fails.
+pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
+    let origin = draw(stage, i_frame)?.light_origin;
+    let placed = stage.renderer.placed(&stage.device)?;
+    let records = stage.renderer.generate_now(&stage.device)?.0;
+    let groups = stage.scene.groups();
+    let rows = placed.iter().zip(&records).enumerate().map(|(i, (p, r))| {
+        let position = Vec3::from(p.position).as_dvec3() + origin;
+        let color = Vec3::from(r.color).as_dvec3();
+        let [sigma, kappa] = [p.sigma, r.kappa].map(f64::from);
+        particle_row(i, cloud_of(&groups, i), position, sigma, kappa, color)
+    });
+    Ok(rows.collect())
+}
+
+/// Returns the particles of a frame from the device, in scene coordinates.
+///
+/// # Errors
+/// Fails if drawing the frame fails.
+pub fn list(stage: &mut Stage, i_frame: u32) -> Result<Vec<Particle>> {
+    let origin = draw(stage, i_frame)?.light_origin;
+    let placed = stage.renderer.placed(&stage.device)?;
+    let records = stage.renderer.generate_now(&stage.device)?.0;
+    let of = |(p, r): (&PlacedRecord, &ParticleRecord)| Particle {
+        position: Vec3::from(p.position).as_dvec3() + origin,
+        sigma: f64::from(p.sigma),
+        aspect: f64::from(r.aspect),
+        kappa: f64::from(r.kappa),
+        color: Vec3::from(r.color).as_dvec3(),
+    };
+    Ok(placed.iter().zip(&records).map(of).collect())
+}
+
+/// Returns the same from the reference.
+///
+/// # Errors
+/// Fails if the scene has no such reference.
+pub fn list_reference(scene: &Scene, i_frame: u32) -> Result<Vec<Particle>> {
+    let truth = FrameReference::unlit(scene, scene.time.at(i_frame))?;
+    let of = |(b, color): (&Blob, DVec3)| Particle {
+        position: b.position + truth.state.light_origin,
+        sigma: b.sigma,
+        aspect: b.aspect,
+        kappa: b.kappa,
+        color,
+    };
+    Ok(truth.blobs.iter().zip(colors(scene)).map(of).collect())
+}
+
+/// Returns the particles of a frame from the reference.
+///
+/// # Errors
+/// Fails if the scene has no such reference.
+pub fn particles_reference(scene: &Scene, i_frame: u32) -> Result<Vec<ParticleRow>> {
+    let truth = FrameReference::unlit(scene, scene.time.at(i_frame))?;
+    let colors = colors(scene);
+    let rows = truth.blobs.iter().zip(&colors).enumerate().map(|(i, (b, color))| {
+        let position = b.position + truth.state.light_origin;
+        particle_row(i, cloud_of(&truth.groups, i), position, b.sigma, b.kappa, *color)
+    });
+    Ok(rows.collect())
+}
+
+fn particle_row(
+    index: usize,
+    cloud: usize,
+    p: DVec3,
+    sigma: f64,
+    kappa: f64,
+    c: DVec3,
+) -> ParticleRow {
+    let radius = sigma / SIGMA_PER_RADIUS;
+    ParticleRow {
+        index,
+        cloud,
+        x: p.x,
+        y: p.y,
+        z: p.z,
+        radius,
+        sigma,
+        kappa,
+        r: c.x,
+        g: c.y,
+        b: c.z,
+    }
+}

@@ -134,7 +134,7 @@ fn finder(what: &str) -> &'static [&'static str] {
             "--set",
             "lighting.grid=24",
             "--set",
-            "lighting.mode='diffusion'",
+            "lighting.bounces=0",
         ],
         "the sky's light from everywhere is too bright" => {
             &["scenes/cubes-554.toml", "--set", "lighting.mode='single'"]

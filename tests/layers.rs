@@ -208,7 +208,11 @@ fn layers_are_those_of_the_reference_on_both_paths() {
         ("without light", "scenes/ground.toml", vec!["lighting.mode=\"none\"", F32]),
         ("over a floor", "scenes/ground.toml", vec![TILES, F32]),
         ("over a floor, sprites", "scenes/ground.toml", vec![SPRITES, F32]),
-        ("discs, of which some slots show nothing", "scenes/puff.toml", vec![F32]),
+        (
+            "discs, of which some slots show nothing",
+            "scenes/puff.toml",
+            vec![F32, "lighting.mode=\"first\""],
+        ),
     ] {
         draw(file, &more).check(what);
     }

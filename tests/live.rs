@@ -26,6 +26,7 @@ fn scene(overrides: &[&str]) -> Scene {
     let small = [
         "film.width=80",
         "film.height=60",
+        "lighting.mode='first'",
         "lighting.grid=16",
         "cloud.0.particles=300",
         "time.step_s=0.5",

@@ -1,7 +1,5 @@
 //! `nimbus inspect SCENE`.
 
-use std::path::Path;
-
 use super::args::{BasisArg, InspectArgs};
 use super::output::{self, header, or_dash};
 use super::progress::spinner;
@@ -41,11 +39,8 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     // The text is complete before any of it is printed.
     if args.reference {
         let scene = &*scene.lit();
-        if let Some(path) = &args.output {
-            return write(path, &particles::list_reference(scene, i_frame)?, args);
-        }
         let text = match (args.particles, args.facets) {
-            (true, _) => output::rows(&particles::particles_reference(scene, i_frame)?, args.json),
+            (true, _) => listed(scene, &particles::list_reference(scene, i_frame)?, args),
             (_, true) => facets(args, scene, inspect::facets_reference(scene, i_frame)?),
             _ => boxes(&inspect::boxes_reference(scene), args.json),
         }?;
@@ -56,12 +51,11 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         return output::text(&text);
     }
     let mut stage = Stage::new(scene, &device_choice(&args.options), !args.options.no_skip)?;
-    if let Some(path) = &args.output {
-        write(path, &particles::list(&mut stage, i_frame)?, args)?;
-        return stage.close();
-    }
     let text = match (args.particles, args.facets, args.plan) {
-        (true, _, _) => output::rows(&particles::particles(&mut stage, i_frame)?, args.json),
+        (true, _, _) => {
+            let list = particles::list(&mut stage, i_frame)?;
+            listed(&stage.scene, &list, args)
+        }
         (_, true, _) => {
             let rows = inspect::facets(&mut stage, i_frame)?;
             print_notes(&mut stage, &args.options)?;
@@ -104,10 +98,14 @@ fn claim(args: &InspectArgs) -> Result<Option<Claim>> {
     output::claim_file(path, args.force)
 }
 
-fn write(path: &Path, particles: &[Particle], args: &InspectArgs) -> Result<()> {
-    ply::write(path, particles)?;
-    output::wrote(path, &format!("{} particles", particles.len()), args.options.quiet);
-    Ok(())
+/// Returns the rows of particles. With a file to write, they go there, and no text is left.
+fn listed(scene: &Scene, list: &[Particle], args: &InspectArgs) -> Result<String> {
+    let Some(path) = &args.output else {
+        return output::rows(&particles::rows(scene, list), args.json);
+    };
+    ply::write(path, list)?;
+    output::wrote(path, &format!("{} particles", list.len()), args.options.quiet);
+    Ok(String::new())
 }
 
 /// Returns the rows of facets, or their means over each surface.

@@ -1,5 +1,5 @@
-//! The rows that `nimbus inspect` prints: the buffers of each stage of a frame ([`stages`],
-//! [`particles`]), the [`air`] and the BRDF [`basis`]. [`mitsuba`] has a scene as another program
+//! The rows that `nimbus inspect` prints. They are buffers of a frame's [`stages`], its
+//! [`particles`], the [`air`] and the BRDF [`basis`]. [`mitsuba`] has a scene as another program
 //! reads it.
 
 pub mod air;

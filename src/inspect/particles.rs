@@ -39,24 +39,6 @@ pub struct ParticleRow {
     pub b: f64,
 }
 
-/// Returns the particles of a frame from the device.
-///
-/// # Errors
-/// Fails if drawing the frame fails.
-pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
-    let origin = draw(stage, i_frame)?.light_origin;
-    let placed = stage.renderer.placed(&stage.device)?;
-    let records = stage.renderer.generate_now(&stage.device)?.0;
-    let groups = stage.scene.groups();
-    let rows = placed.iter().zip(&records).enumerate().map(|(i, (p, r))| {
-        let position = Vec3::from(p.position).as_dvec3() + origin;
-        let color = Vec3::from(r.color).as_dvec3();
-        let [sigma, kappa] = [p.sigma, r.kappa].map(f64::from);
-        particle_row(i, cloud_of(&groups, i), position, sigma, kappa, color)
-    });
-    Ok(rows.collect())
-}
-
 /// Returns the particles of a frame from the device, in scene coordinates.
 ///
 /// # Errors
@@ -91,40 +73,21 @@ pub fn list_reference(scene: &Scene, i_frame: u32) -> Result<Vec<Particle>> {
     Ok(truth.blobs.iter().zip(colors(scene)).map(of).collect())
 }
 
-/// Returns the particles of a frame from the reference.
-///
-/// # Errors
-/// Fails if the scene has no such reference.
-pub fn particles_reference(scene: &Scene, i_frame: u32) -> Result<Vec<ParticleRow>> {
-    let truth = FrameReference::unlit(scene, scene.time.at(i_frame))?;
-    let colors = colors(scene);
-    let rows = truth.blobs.iter().zip(&colors).enumerate().map(|(i, (b, color))| {
-        let position = b.position + truth.state.light_origin;
-        particle_row(i, cloud_of(&truth.groups, i), position, b.sigma, b.kappa, *color)
-    });
-    Ok(rows.collect())
-}
-
-fn particle_row(
-    index: usize,
-    cloud: usize,
-    p: DVec3,
-    sigma: f64,
-    kappa: f64,
-    c: DVec3,
-) -> ParticleRow {
-    let radius = sigma / SIGMA_PER_RADIUS;
-    ParticleRow {
+/// Returns a row for each particle of a scene.
+pub fn rows(scene: &Scene, particles: &[Particle]) -> Vec<ParticleRow> {
+    let groups = scene.groups();
+    let row = |(index, p): (usize, &Particle)| ParticleRow {
         index,
-        cloud,
-        x: p.x,
-        y: p.y,
-        z: p.z,
-        radius,
-        sigma,
-        kappa,
-        r: c.x,
-        g: c.y,
-        b: c.z,
-    }
+        cloud: cloud_of(&groups, index),
+        x: p.position.x,
+        y: p.position.y,
+        z: p.position.z,
+        radius: p.sigma / SIGMA_PER_RADIUS,
+        sigma: p.sigma,
+        kappa: p.kappa,
+        r: p.color.x,
+        g: p.color.y,
+        b: p.color.z,
+    };
+    particles.iter().enumerate().map(row).collect()
 }

@@ -4,15 +4,17 @@ use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
 use crate::error::{Error, Result};
 
-/// Sizes below this are not checked, in bytes: asking the system takes longer than to try.
+/// Sizes below this are not checked, in bytes: every machine that runs nimbus has them.
 const SMALL: u64 = 64 << 20;
 
-/// Returns the bytes that can be allocated now: of the machine, and of its control group.
+/// Returns the bytes that can be allocated now: of the machine, and of its control group. Where the
+/// system does not say, there is no limit.
 pub fn available() -> u64 {
     let memory = RefreshKind::nothing().with_memory(MemoryRefreshKind::nothing().with_ram());
     let system = System::new_with_specifics(memory);
     let of_group = system.cgroup_limits().map_or(u64::MAX, |limits| limits.free_memory);
-    system.available_memory().min(of_group)
+    let of_machine = system.available_memory();
+    if of_machine == 0 { of_group } else { of_machine.min(of_group) }
 }
 
 /// Checks that `n_bytes` can be allocated; `what` they are for stands in the message.

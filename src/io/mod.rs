@@ -25,6 +25,7 @@ pub mod layers;
 pub mod mapped_file;
 mod memory;
 mod near_file;
+mod particle_digest;
 pub mod particle_file;
 pub mod plain_text;
 pub mod ply;

@@ -217,7 +217,7 @@ impl Columns {
 }
 
 /// Returns the expected range when `v` is no σ along y beside `sigma` along x and z.
-fn wrong_height(v: f64, sigma: f64) -> Option<String> {
+pub(super) fn wrong_height(v: f64, sigma: f64) -> Option<String> {
     let expected = || {
         let [low, high] = [MIN_ASPECT, 1.0 / MIN_ASPECT].map(|of| rounded(of * sigma));
         format!("a number from {low} to {high}, a thousandth to a thousand times the other")

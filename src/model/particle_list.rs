@@ -1,4 +1,4 @@
-//! A list of particles, and what holds for all of them.
+//! A list of particles, with bounds and means over all of them.
 
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
@@ -18,7 +18,7 @@ struct Shared {
     summary: OnceLock<Summary>,
 }
 
-/// What holds for all particles of a list. Without particles, sizes are 0 and aspects 1.
+/// Bounds and means over all particles of a list. Without particles, sizes are 0 and aspects 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Summary {
     /// Least coordinates of the centres.
@@ -95,7 +95,7 @@ impl Summary {
 }
 
 impl ParticleList {
-    /// Returns what holds for all particles.
+    /// Returns bounds and means over all particles.
     pub fn summary(&self) -> &Summary {
         self.0.summary.get_or_init(|| Summary::of(&self.0.particles))
     }

@@ -164,7 +164,7 @@ fn read_all(folder: &Path) -> Vec<Error> {
             .err(),
         MappedFile::open(&path("p.ply"))
             .map_err(|e| Error::io(&path("p.ply"), e))
-            .and_then(|file| ply::read(&file, Path::new("p.ply")))
+            .and_then(|file| ply::parse(file.bytes(), Path::new("p.ply")))
             .err(),
         read_earlier(folder).err(),
         wrf::open(&path("w.nc")).err(),

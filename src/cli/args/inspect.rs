@@ -8,6 +8,8 @@ use super::scene::SceneArgs;
 
 /// Arguments of `nimbus inspect`.
 #[derive(Debug, ClapArgs)]
+#[command(after_help = "The particles of a frame, as a file that scenes can read:\n  \
+    nimbus inspect scenes/cubes-554.toml --particles -o cubes.ply")]
 #[command(group = clap::ArgGroup::new("what")
     .args(["boxes", "particles", "facets", "plan", "basis"]))]
 pub struct InspectArgs {

@@ -95,7 +95,7 @@ pub struct Element {
     pub name: String,
     /// Number of rows.
     pub n: u64,
-    /// What each row has, in order.
+    /// The properties of each row, in order.
     pub properties: Vec<Property>,
     /// The header's line that declares it, from 1.
     pub line: usize,
@@ -166,6 +166,9 @@ impl Header {
                         ));
                     }
                 },
+                ["format", ..] if format.is_some() => {
+                    return fault("the line `format` stands twice".to_owned());
+                }
                 ["element", name, n] => {
                     let Ok(n) = n.parse() else {
                         return fault(format!("expected a number of rows, found `{}`", shown(n)));

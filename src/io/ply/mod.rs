@@ -1,8 +1,8 @@
 //! Particles in PLY files, which are read where they lie, and written.
 //!
-//! A file has particles as CSV has them (`x`, `y`, `z`, `sigma`, `kappa`, `r`, `g`, `b`), or splats
-//! of 3D Gaussian splatting (`scale_0`…, `rot_0`…, `opacity`, `f_dc_0`…), or a mixture of both:
-//! model.md §14 says what the latter mean in optical depth.
+//! A file has the properties that CSV has as columns, or those of 3D Gaussian splatting
+//! (`scale_0`…, `rot_0`…, `opacity`, `f_dc_0`…). A file may mix both. Model.md §14 says what the
+//! properties of splats mean in optical depth.
 
 mod header;
 mod rows;
@@ -17,9 +17,6 @@ use rows::Rows;
 use splats::Columns;
 pub use write::{ENDING, write};
 
-use sha2::{Digest, Sha256};
-
-use super::mapped_file::MappedFile;
 use super::memory;
 use crate::error::{Error, Place, Result};
 use crate::model::cloud::Particle;
@@ -32,32 +29,13 @@ const ELEMENT: &str = "vertex";
 pub struct Read {
     /// The particles, in the order of the file.
     pub particles: Vec<Particle>,
-    /// What the user should know of them.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
 /// Returns whether a file is named as a PLY file.
 pub fn is_named(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(ENDING))
-}
-
-/// Reads the particles of a file.
-///
-/// # Errors
-/// As [`parse`].
-pub fn read(file: &MappedFile, path: &Path) -> Result<Read> {
-    parse(file.bytes(), path)
-}
-
-/// Returns the SHA-256 of particles, which stands in a scene's hash for their file.
-pub fn digest(particles: &[Particle]) -> [u8; 32] {
-    let mut hash = Sha256::new();
-    for p in particles {
-        let ([x, y, z], [r, g, b]) = (p.position.to_array(), p.color.to_array());
-        let all = [x, y, z, p.sigma, p.aspect, p.kappa, r, g, b];
-        hash.update(bytemuck::cast::<[f64; 9], [u8; 72]>(all));
-    }
-    hash.finalize().into()
 }
 
 /// Reads particles from the bytes of a PLY file; `path` is its name in messages.

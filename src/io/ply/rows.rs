@@ -11,21 +11,21 @@ use crate::io::document::suggest::shown;
 /// The fewest rows of a part: less is not worth a thread.
 const LEAST_PART: usize = 1 << 14;
 
-/// What a row becomes.
+/// The outcome of reading a row.
 pub type Made<T> = std::result::Result<T, Fault>;
 
-/// What is wrong with a row.
+/// A fault of a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
     /// Number of the property.
     pub i: usize,
-    /// What was expected, and what was found.
+    /// The message: what was expected, and what was found.
     pub what: String,
 }
 
-/// What is made of rows.
+/// A maker of values from rows.
 pub trait OfRow<T> {
-    /// Returns what is made of the row whose properties `value` returns by their numbers.
+    /// Returns the value of the row whose properties `value` returns by their numbers.
     fn made(&self, value: impl Fn(usize) -> f64) -> Made<T>;
 }
 
@@ -91,7 +91,7 @@ impl<'a> Rows<'a> {
         Ok(Rows { element, format, bytes: rest, n_lines, path })
     }
 
-    /// Returns what `of` makes of every row, in order. Binary rows are read on all threads.
+    /// Returns the value of every row, in order. Binary rows are read on all threads.
     ///
     /// # Errors
     /// The fault of the first wrong row, with its place.

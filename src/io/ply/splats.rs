@@ -1,13 +1,15 @@
-//! What the properties of a row mean: a particle of a list, or a splat of 3D Gaussian splatting
-//! (Kerbl et al. 2023).
+//! The meaning of a row's properties: those of a particle in a list, or of a splat of 3D Gaussian
+//! splatting (Kerbl et al. 2023).
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::header::Element;
+use super::header::{Element, Scalar};
 use super::rows::{Fault, Made, OfRow};
-use crate::io::bounds::{AMOUNT, DIVISOR, GREATEST, LEAST, rounded, wrong_coordinate, wrong_size};
+use crate::io::bounds::{AMOUNT, DIVISOR, GREATEST, LEAST, wrong_coordinate, wrong_size};
+use crate::io::document::suggest::list;
+use crate::io::particle_file::wrong_height;
 use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, SQRT_TAU};
 
 /// Greatest opacity of a splat, as in the rasterizer of Kerbl et al.: no splat hides all behind it.
@@ -35,8 +37,8 @@ enum Density {
 
 enum Color {
     White,
-    /// Linear, divided by what integers count as 1.
-    Linear(Three, f64),
+    /// Linear, with the number that counts as 1.
+    Linear(Three, [f64; 3]),
     /// Coefficients of harmonics of degree 0.
     Harmonics(Three),
 }
@@ -57,26 +59,16 @@ impl Columns {
     /// Finds the properties of an element. A failure says which one is missing.
     pub fn find(element: &Element) -> Result<Columns, String> {
         let find = |name: &str| element.properties.iter().position(|p| p.name == name);
-        let three = |names: [&str; 3]| {
-            let [a, b, c] = names.map(find);
-            Some([a?, b?, c?])
-        };
-        let Some(position) = three(["x", "y", "z"]) else {
+        let Ok(Some(position)) = all_of(element, ["x", "y", "z"]) else {
             return Err("expected properties `x`, `y`, `z`".to_owned());
         };
-        let scales = three(["scale_0", "scale_1", "scale_2"]);
+        let scales = all_of(element, ["scale_0", "scale_1", "scale_2"])?;
         let sizes = (find("sigma"), find("radius"), scales);
         let size = match sizes {
             (Some(i), None, None) => Size::Sigma(i, 1.0, find("sigma_y")),
             (None, Some(i), None) => Size::Sigma(i, SIGMA_PER_RADIUS, find("sigma_y")),
             (None, None, Some(scales)) => {
-                let [w, x, y, z] = ["rot_0", "rot_1", "rot_2", "rot_3"].map(find);
-                let rotation = match (w, x, y, z) {
-                    (Some(w), Some(x), Some(y), Some(z)) => Some([w, x, y, z]),
-                    (None, None, None, None) => None,
-                    _ => return Err("expected all of `rot_0` to `rot_3`, or none".to_owned()),
-                };
-                Size::Scales(scales, rotation)
+                Size::Scales(scales, all_of(element, ["rot_0", "rot_1", "rot_2", "rot_3"])?)
             }
             (None, None, None) => {
                 return Err("expected a property `sigma`, `radius` (3 sigma), or `scale_0`, \
@@ -93,11 +85,13 @@ impl Columns {
             }
             _ => return Err("expected `kappa` or `opacity`, found both".to_owned()),
         };
-        let linear = three(["r", "g", "b"]).or_else(|| three(["red", "green", "blue"]));
-        let color = match (linear, three(["f_dc_0", "f_dc_1", "f_dc_2"])) {
+        let [linear, named, harmonics] =
+            [["r", "g", "b"], ["red", "green", "blue"], ["f_dc_0", "f_dc_1", "f_dc_2"]]
+                .map(|names| all_of(element, names));
+        let color = match (linear?.or(named?), harmonics?) {
             (Some(of), _) => {
-                let full = of.map(|i| element.properties[i].scalar.and_then(|s| s.full()));
-                Color::Linear(of, full[0].unwrap_or(1.0))
+                let full = |i: usize| element.properties[i].scalar.and_then(Scalar::full);
+                Color::Linear(of, of.map(|i| full(i).unwrap_or(1.0)))
             }
             (None, Some(of)) => Color::Harmonics(of),
             (None, None) => Color::White,
@@ -146,12 +140,27 @@ impl Columns {
             across += r * DVec3::new(r.y, r.z, r.x);
         }
         let wide = 0.5 * (own.x + own.z);
-        // What the upright one has not, and all that there is.
+        // Squares of what the upright one lacks, and of all. Rotations in f32 are rounded by 6e-8,
+        // so that a relative difference of 1e-6 counts as none.
         let lost = 2.0 * (own.x - wide).powi(2) + 2.0 * across.length_squared();
         if lost > 1e-12 * (own.length_squared() + 2.0 * across.length_squared()) {
             self.askew.fetch_add(1, Ordering::Relaxed);
         }
         (wide.sqrt(), aspect_of(own.y.sqrt(), wide.sqrt()))
+    }
+}
+
+/// Returns the numbers of properties that stand together; `None` if the element has none of them.
+fn all_of<const N: usize>(
+    element: &Element,
+    names: [&str; N],
+) -> Result<Option<[usize; N]>, String> {
+    let find = |name: &str| element.properties.iter().position(|p| p.name == name);
+    let found: Vec<usize> = names.iter().filter_map(|name| find(name)).collect();
+    match found.try_into() {
+        Ok(all) => Ok(Some(all)),
+        Err(some) if some.is_empty() => Ok(None),
+        Err(_) => Err(format!("expected all of {} or none", list(&names))),
     }
 }
 
@@ -178,8 +187,8 @@ impl OfRow<Particle> for Columns {
                 let sigma = size(i, factor * value(i), LEAST)?;
                 let aspect = match high {
                     Some(j) if sigma > 0.0 => {
-                        let aspect = finite(j)? / sigma;
-                        checked(j, aspect, wrong_aspect(aspect, sigma))?
+                        let high = finite(j)?;
+                        checked(j, high, wrong_height(high, sigma))? / sigma
                     }
                     _ => 1.0,
                 };
@@ -231,8 +240,8 @@ impl OfRow<Particle> for Columns {
         let color = match self.color {
             Color::White => DVec3::ONE,
             Color::Linear(of, full) => {
-                let [r, g, b] = of.map(|i| size(i, value(i) / full, 0.0));
-                DVec3::new(r?, g?, b?)
+                let of = |k: usize| size(of[k], value(of[k]) / full[k], 0.0);
+                DVec3::new(of(0)?, of(1)?, of(2)?)
             }
             Color::Harmonics(of) => {
                 let [r, g, b] = of.map(|i| {
@@ -246,6 +255,7 @@ impl OfRow<Particle> for Columns {
     }
 }
 
+/// Returns the aspect of an ellipsoid, within what is drawn.
 fn aspect_of(high: f64, wide: f64) -> f64 {
     if wide > 0.0 { (high / wide).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT) } else { 1.0 }
 }
@@ -258,11 +268,4 @@ fn log_area([a, b, c]: [f64; 3]) -> f64 {
     // The greatest term is 1.
     let of = |pair: f64| if pair == most { 1.0 } else { libm::exp(THOMSEN * (pair - most)) };
     most + libm::log(pairs.into_iter().map(of).sum::<f64>() / 3.0) / THOMSEN
-}
-
-/// Returns the expected range when `aspect` is that of no blob.
-fn wrong_aspect(aspect: f64, sigma: f64) -> Option<String> {
-    let within = MIN_ASPECT * (1.0 - 1e-12)..=(1.0 + 1e-12) / MIN_ASPECT;
-    let [low, high] = [MIN_ASPECT, 1.0 / MIN_ASPECT].map(|of| rounded(of * sigma));
-    (!within.contains(&aspect)).then(|| format!("a number from {low} to {high}"))
 }

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, LN_2};
 use glam::DVec3;
 
 use super::*;
+use crate::io::mapped_file::MappedFile;
 
 const PATH: &str = "a.ply";
 /// √(2π).
@@ -154,7 +155,7 @@ fn faults_say_where_and_what() {
     let mut bytes = header("binary_little_endian", 20_000, &list).into_bytes();
     let start = bytes.len();
     bytes.resize(start + 20 * 20_000, 0);
-    // Of two wrong rows the first is told.
+    // The message is about the first of two wrong rows.
     for row in [19_000, 17_001] {
         bytes[start + 20 * row + 4..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
     }
@@ -205,5 +206,26 @@ fn what_is_written_is_read_again() {
     write(&path, &all).expect("room");
     assert!(is_named(&path));
     let file = MappedFile::open(&path).expect("a file");
-    assert_eq!(read(&file, &path).expect("a list"), Read { particles: all, notes: vec![] });
+    assert_eq!(parse(file.bytes(), &path).expect("a list"), Read { particles: all, notes: vec![] });
+}
+
+#[test]
+fn the_difference_from_splatting_is_as_told() {
+    // Over u = b²/2, in which the area is even. model.md §14 has the table.
+    const N: u32 = 100_000;
+    for (alpha, rms, ratio) in
+        [(0.1_f64, 0.0007, 1.03), (0.5, 0.024, 1.18), (0.9, 0.141, 1.59), (0.99, 0.279, 2.10)]
+    {
+        let depth = -(-alpha).ln_1p();
+        let (mut squares, mut sums) = (0.0, [0.0; 2]);
+        for i in 0..N {
+            let fall = (-4.5 * (f64::from(i) + 0.5) / f64::from(N)).exp();
+            let (volume, splat) = (1.0 - (-depth * fall).exp(), alpha * fall);
+            squares += (volume - splat).powi(2);
+            sums = [sums[0] + volume, sums[1] + splat];
+        }
+        let found = (squares / f64::from(N)).sqrt();
+        assert!((found / rms - 1.0).abs() < 0.07, "{alpha}: {found}");
+        assert!((sums[0] / sums[1] - ratio).abs() < 0.005, "{alpha}: {sums:?}");
+    }
 }

@@ -21,6 +21,7 @@ use crate::io::bounds::{AMOUNT, COORDINATE, GREATEST, is_carried_place, shortest
 use crate::io::document::section::Section;
 use crate::io::mapped_file::MappedFile;
 use crate::io::near_file::MISSING;
+use crate::io::particle_digest::digest;
 use crate::io::weather::{blobs, moving};
 use crate::io::{box_file, particle_file, ply};
 use crate::model::air::Air;
@@ -279,10 +280,10 @@ fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource>
             particles
         }
         Opened::Ply(file) => {
-            let ply::Read { particles, notes } = ply::read(&file, &path)?;
+            let ply::Read { particles, notes } = ply::parse(file.bytes(), &path)?;
             let cloud = reading.i_cloud;
             let found = &mut *reading.found;
-            found.digests.push(ply::digest(&particles));
+            found.digests.push(digest(&particles));
             found.notes.extend(notes.into_iter().map(|note| format!("cloud {cloud}: {note}")));
             particles
         }
@@ -314,6 +315,6 @@ fn read_weather(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
         return Ok(CloudSource::Animated(moving::moving(file, settings, seed)?));
     }
     let particles = blobs::particles(&file, &settings, seed)?;
-    found.digests.push(blobs::digest(&particles));
+    found.digests.push(digest(&particles));
     Ok(CloudSource::Particles(particles.into()))
 }

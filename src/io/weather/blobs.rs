@@ -61,17 +61,6 @@ pub fn particle(blob: &WeatherBlob, exaggeration: f64) -> Particle {
     }
 }
 
-/// Returns the SHA-256 of the particles of a step, which stands in a scene's hash for a file of
-/// which one step is drawn.
-pub fn digest(particles: &[Particle]) -> [u8; 32] {
-    let mut hash = Sha256::new();
-    for p in particles {
-        let [x, y, z] = p.position.to_array();
-        [x, y, z, p.sigma, p.aspect, p.kappa].iter().for_each(|v| hash.update(v.to_le_bytes()));
-    }
-    hash.finalize().into()
-}
-
 /// Returns the SHA-256 of the ground.
 pub fn digest_of_ground(terrain: &Terrain) -> [u8; 32] {
     let mut hash = Sha256::new();

@@ -83,7 +83,7 @@ fn light_does_not_jump_where_cells_come_and_go() {
             let (before, now, after) = (&frames[0], &frames[1], &frames[2]);
             let jump = rms((0..now.len()).map(|p| after[p] - 2.0 * now[p] + before[p])) / all;
             println!("{mode}, {grid} cells, {bounces} bounces, after frame {i}: {jump:.5}");
-            // Marches pass empty cells unchanged. What is left is the motion: 0.00085 at most.
+            // Marches pass empty cells unchanged. The rest is the motion, 0.00085 at most.
             let most = if mode == "first" { 1e-3 } else { GREATEST_JUMP };
             assert!(jump < most, "{mode}, {grid} cells, {bounces} bounces, frame {i}: {jump}");
         }

@@ -7,7 +7,8 @@
 // "grid"). In: placed particles (lengths), kappa (1/length). Out: fixed-point sums of mass by cell,
 // 64 bits. Law: the Gaussian, cut at 3 sigma and normalised, integrated over each cell. The
 // fixed-point sums do not depend on the order of the atomics. Bound: half a quantum a deposit, and
-// erf_approx's error in the weights.
+// erf_approx's error in the weights. Wide blobs are deposited on grids of wider cells, by another
+// dispatch.
 
 // The host asks for one subgroup, where barriers are cheap.
 #ifndef WORKGROUP
@@ -22,15 +23,21 @@ const float CUT_SIGMA = 3.0;
 const float WITHIN_CUT = 0.9973002039367398;
 // (2 pi)^(3/2)
 const float MASS_FACTOR = 15.7496099457224;
+// Least sigma along every axis of a blob on wider cells, in these.
+const float LEVEL_SIGMA = 1.5;
 
 layout(push_constant) uniform Push {
     Grid grid;
     uint n_particles;
     float quanta_per_mass;
+    // Number of grids, and whether those of wider cells are written.
+    uint n_levels;
+    uint is_wide;
 } push;
 READS(0, Placed, placed)
 READS(1, Particle, particles)
-// Cell c: low word at 2c, high word at 2c + 1.
+// Cell c: low word at 2c, high word at 2c + 1. Each grid of wider cells lies behind that of half
+// their edges.
 UPDATES(2, uint, sums)
 
 shared float weights[3][MAX_CELLS];
@@ -55,7 +62,25 @@ void main() {
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 inv_edges = push.grid.inv_cell * vec3(1.0, push.grid.inv_aspect, 1.0);
         vec3 x = blob.position - push.grid.low;
-        ivec3 last = ivec3(push.grid.n_cells) - 1;
+        ivec3 n_cells = ivec3(push.grid.n_cells);
+        // Place of the grid's first cell, and its cells' edge.
+        int i_first = 0;
+        float edge = 1.0;
+        vec3 resolved = sigma * inv_edges;
+        float least = min(resolved.x, min(resolved.y, resolved.z));
+        for (uint level = 1; level < push.n_levels && least >= LEVEL_SIGMA * 2.0 * edge; ++level) {
+            i_first += level > 1u ? n_cells.x * n_cells.y * n_cells.z : 0;
+            n_cells = (n_cells + 1) / 2;
+            edge *= 2.0;
+        }
+        mass = (edge > 1.0) == (push.is_wide != 0u) ? mass : 0.0;
+        // What spreading will add to the variance.
+        if (edge > 1.0) {
+            sigma = sqrt(sigma * sigma - 0.5 * (edge * edge - 1.0) * edges * edges);
+        }
+        edges *= edge;
+        inv_edges /= edge;
+        ivec3 last = n_cells - 1;
         ivec3 begin = clamp(ivec3(floor((x - CUT_SIGMA * sigma) * inv_edges)), ivec3(0), last);
         ivec3 end = clamp(ivec3(floor((x + CUT_SIGMA * sigma) * inv_edges)), begin, last);
         if (mass > 0.0) {
@@ -71,17 +96,16 @@ void main() {
         barrier();
         ivec3 n = mass > 0.0 ? end - begin + 1 : ivec3(0);
         float total_quanta = mass * push.quanta_per_mass;
-        int row = int(push.grid.n_cells.x), layer = row * int(push.grid.n_cells.y);
-        for (int z = 0; z < n.z; ++z) {
-            int first = begin.x + row * begin.y + layer * (begin.z + z);
-            float layer_quanta = total_quanta * weights[2][z];
-            // k / n.x by a float quotient is exact: k < MAX_CELLS^2 = 2^18 leaves the half a margin
-            // of many ulp. Integer division is slow on most devices.
-            for (int k = int(gl_LocalInvocationID.x); k < n.x * n.y; k += int(gl_WorkGroupSize.x)) {
-                int y = int((float(k) + 0.5) / float(n.x));
-                int x = k - y * n.x;
-                uint quanta = uint(layer_quanta * (weights[0][x] * weights[1][y]) + 0.5);
-                int cell = first + x + row * y;
+        int row = n_cells.x, layer = row * n_cells.y;
+        // k / n.x by a float quotient is exact: k < MAX_CELLS^2 = 2^18 leaves the half a margin of
+        // many ulp. Integer division is slow on most devices.
+        for (int k = int(gl_LocalInvocationID.x); k < n.x * n.y; k += int(gl_WorkGroupSize.x)) {
+            int y = int((float(k) + 0.5) / float(n.x));
+            int x = k - y * n.x;
+            float across = weights[0][x] * weights[1][y];
+            int cell = i_first + begin.x + x + row * (begin.y + y) + layer * begin.z;
+            for (int z = 0; z < n.z; ++z, cell += layer) {
+                uint quanta = uint(total_quanta * weights[2][z] * across + 0.5);
                 if (quanta > 0) {
                     uint before = atomicAdd(sums[2 * cell], quanta);
                     if (before + quanta < before) {

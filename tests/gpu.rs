@@ -25,7 +25,7 @@ use sha2::{Digest, Sha256};
 fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
     let spec = GridSpec { aspect: 1.0, n_cells: UVec3::splat(8), cell: 1.0, low: DVec3::ZERO };
     let place = place::Place::new(&gpu.device, &gpu.compiler).unwrap();
-    let grid = grid::Grid::new(&gpu.device, &gpu.compiler, spec.n_total()).unwrap();
+    let grid = grid::Grid::new(&gpu.device, &gpu.compiler, spec.n_total(), false).unwrap();
     let (particles, i_group) = (gpu.buffer::<ParticleRecord>(64), gpu.buffer::<u32>(64));
     let (groups, placed) = (gpu.buffer::<GroupRecord>(1), gpu.buffer::<PlacedRecord>(64));
     let (density, modes) = (gpu.buffer::<f32>(512), gpu.buffer::<ModeRecord>(1));
@@ -39,7 +39,8 @@ fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
             placed: &placed,
         };
         place.record(rec, &buffers, 64)?;
-        grid.record(rec, [&placed, &particles, &density], &record, 64, 1.0)
+        let of = grid::Deposit { grid: &record, n_particles: 64, heaviest: 1.0, n_levels: 1 };
+        grid.record(rec, [&placed, &particles, &density], &of)
     });
     recorded.unwrap();
     // The commands are void once their buffers are gone, so others are recorded in their place.

@@ -22,7 +22,7 @@ use nimbus::layout::particle::{
 };
 use nimbus::layout::second::{PackedRecord, SourceRecord};
 use nimbus::layout::tiles::SplatRecord;
-use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
+use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, LEVEL_SIGMA, MAX_CELLS};
 use nimbus::passes::{self, SHADERS, cull, generate, sort, texture, tiles, transmit};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -253,6 +253,7 @@ fn shared_constants_have_one_value() {
         ("include/upsample.glsl", "ALIKE", nimbus::model::resolution::ALIKE),
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
+        ("grid_deposit.comp", "LEVEL_SIGMA", LEVEL_SIGMA),
         ("include/shell.glsl", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),
         ("include/shell.glsl", "SMOOTH_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
         ("include/shell.glsl", "CONDITION_LOW", nimbus::reference::facets::CONDITIONING.0),

@@ -23,8 +23,8 @@ fn scene(n_particles: u32, grid: u32, mode: &str) -> Scene {
 #[test]
 fn blobs_much_larger_than_cells_give_advice() {
     assert!(advice(&scene(500, 64, "first")).is_empty());
-    assert!(advice(&scene(300_000, 64, "first"))[0].contains("lighting.grid = 64"));
-    assert!(advice(&scene(300_000, 64, "none")).is_empty());
+    assert!(advice(&scene(3_000_000, 64, "first"))[0].contains("lighting.grid = 64"));
+    assert!(advice(&scene(3_000_000, 64, "none")).is_empty());
     // The inner cells are half as many a side: 60 and 30.
     assert!(n_deposits(&scene(1000, 64, "first")) > 6.0 * n_deposits(&scene(1000, 34, "first")));
 }

@@ -17,7 +17,7 @@ use crate::layout::particle::{
 };
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{Cloud, CloudSource};
-use crate::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
+use crate::model::grid::{self, DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use crate::model::material::Material;
 use crate::model::scene::Scene;
 use crate::passes::blobs::BlobBuffers;
@@ -156,6 +156,12 @@ fn n_table_rows(scene: &Scene) -> u64 {
 /// Returns the most cells that the density grid has at any time; 0 if nothing is lit.
 pub fn n_cells(scene: &Scene) -> u64 {
     if is_lit(scene) { n_cells_max(scene) } else { 0 }
+}
+
+/// Returns whether wide blobs are deposited on wider cells.
+pub fn has_levels(scene: &Scene) -> bool {
+    let side = scene.lighting.grid.min(MAX_CELLS);
+    is_lit(scene) && grid::has_levels(scene.n_particles(), side)
 }
 
 /// Returns the room that the diffusion of light takes; `None` without.

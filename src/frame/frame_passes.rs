@@ -1,6 +1,6 @@
 //! The passes of a scene's frames and the buffers that they share.
 
-use super::buffers::{SceneBuffers, diffusion_room, n_cells};
+use super::buffers::{SceneBuffers, diffusion_room, has_levels, n_cells};
 use super::constants::FrameConstants;
 use super::culling::Culling;
 use super::features::{
@@ -91,7 +91,7 @@ impl FramePasses {
             placed_uploads: is_moved_by_host
                 .then(|| PlacedUploads::new(device, scene))
                 .transpose()?,
-            grid: Grid::new(device, compiler, n_cells(scene))?,
+            grid: Grid::new(device, compiler, n_cells(scene), has_levels(scene))?,
             runs,
             facets: Facets::new(device, compiler, scene.has_ellipsoids(), is_medium(scene))?,
             transmit: Transmit::new(device, compiler, arriving(scene), &sums)?,

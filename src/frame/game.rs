@@ -151,6 +151,7 @@ impl Game {
         };
         let heaviest = self.heaviest(&grown, live.as_ref());
         let extents = self.extents(&grown, &origins, live.as_deref());
+        let widest = extents.iter().map(|e| e.sigma_max).fold(0.0, f64::max);
         Ok(Packet {
             i_frame,
             time_s,
@@ -183,6 +184,7 @@ impl Game {
                 .collect(),
             grid: GridRecord::from(&setting.grid),
             heaviest,
+            n_levels: setting.grid.n_used_levels(self.scene.n_particles(), widest),
             radius: setting.radius,
             sort_bits: self.sort_bits(&grown, setting.radius),
             slice: slice_length(self.scene.draw.slice, &grown, setting.radius),

@@ -3,9 +3,9 @@
 
 use glam::DVec3;
 
-use super::buffers::{SceneBuffers, diffusion_room, n_cells};
+use super::buffers::{SceneBuffers, diffusion_room, has_levels, n_cells};
 use super::culling::Culling;
-use super::features::{has_second, is_grouped, is_lit};
+use super::features::{has_bounces, has_second, is_grouped, is_lit};
 use super::gather::IndirectGather;
 use super::live;
 use super::morton_sort::FacetRuns;
@@ -13,7 +13,7 @@ use super::picture::Picture;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferSpec, Limits};
 use crate::model::cloud::Group;
-use crate::model::grid::DEPOSIT_CUT_SIGMA;
+use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Draw, Scene};
 use crate::model::sums::Precision;
@@ -85,7 +85,7 @@ fn specs(scene: &Scene) -> Vec<BufferSpec> {
     [
         SceneBuffers::specs(&exact),
         live::specs(&exact),
-        grid::Scratch::specs(n_cells(&exact)),
+        grid::specs(n_cells(&exact), has_levels(&exact)),
         diffusion_room(&exact).map_or(vec![], diffusion::specs),
         when(is_grouped(&exact), FacetRuns::specs),
         when(has_second(&exact), IndirectGather::specs),
@@ -98,16 +98,22 @@ fn specs(scene: &Scene) -> Vec<BufferSpec> {
     .concat()
 }
 
+/// Returns the density grid at the start; `None` without particles.
+fn start_grid(scene: &Scene) -> Option<GridSpec> {
+    let groups = scene.groups();
+    let (low, high) = scene.bounds(&groups, scene.time.start_s, DEPOSIT_CUT_SIGMA)?;
+    Some(scene.density_grid(&groups, 0.5 * (high - low)))
+}
+
 /// Returns the cell updates of one deposit of all blobs into the density grid: particles × cells
 /// that a blob covers.
 pub fn n_deposits(scene: &Scene) -> f64 {
+    let Some(grid) = start_grid(scene) else { return 0.0 };
     let groups = scene.groups();
-    let Some((low, high)) = scene.bounds(&groups, scene.time.start_s, DEPOSIT_CUT_SIGMA) else {
-        return 0.0;
-    };
-    let grid = scene.density_grid(&groups, 0.5 * (high - low));
     let blob = |g: &Group| {
         let sigma = g.sigma_mean * DVec3::new(1.0, g.aspects[1], 1.0);
+        let level = grid.level_of(sigma, grid.n_levels(scene.n_particles()));
+        let (sigma, grid) = (grid.deposited(sigma, level), grid.level(level));
         let covered =
             (2.0 * DEPOSIT_CUT_SIGMA * sigma / grid.edges() + 1.0).min(grid.n_cells.as_dvec3());
         f64::from(g.n_particles) * covered.x * covered.y * covered.z
@@ -118,7 +124,7 @@ pub fn n_deposits(scene: &Scene) -> f64 {
 /// Returns sentences about a demanding scene for the user to read before it runs; none for most
 /// scenes.
 pub fn advice(scene: &Scene) -> Vec<String> {
-    [grid_advice(scene), ground_advice(scene)].into_iter().flatten().collect()
+    [grid_advice(scene), bounce_advice(scene), ground_advice(scene)].into_iter().flatten().collect()
 }
 
 fn ground_advice(scene: &Scene) -> Option<String> {
@@ -133,14 +139,27 @@ fn ground_advice(scene: &Scene) -> Option<String> {
     })
 }
 
+fn bounce_advice(scene: &Scene) -> Option<String> {
+    /// Most bounces that bring light nearer to transport in all scenes of studies.md.
+    const SAFE: u32 = 2;
+    let n = if has_bounces(scene) { scene.lighting.diffusion.bounces } else { 0 };
+    let is_flat = n > SAFE && start_grid(scene).is_some_and(|grid| grid.aspect < 0.9);
+    is_flat.then(|| {
+        format!(
+            "lighting.bounces = {n}: in cells as flat as these, more than {SAFE} can take light \
+             farther from transport; see docs/explanation/model.md, \"Bounces\""
+        )
+    })
+}
+
 fn grid_advice(scene: &Scene) -> Option<String> {
     /// Some ten seconds on two cores of a software device.
     const MANY: f64 = 1e9;
     let (n, grid) = (n_deposits(scene), scene.lighting.grid);
     (is_lit(scene) && n >= MANY).then(|| {
         format!(
-            "lighting.grid = {grid} makes its cells far smaller than the blobs: {n:.1e} cell \
-             updates each time they move; half the cells a side take about an eighth of that"
+            "lighting.grid = {grid} makes its cells smaller than the blobs: {n:.1e} cell updates \
+             each time they move; half the cells a side take an eighth of that, or somewhat more"
         )
     })
 }

@@ -57,6 +57,10 @@ pub struct Packet {
     pub grid: GridRecord,
     /// Bound of every blob's mass κ (2π)^{3/2} σ³.
     pub heaviest: f64,
+    /// Number of grids that any blob may be deposited on ([`GridSpec::n_levels`]).
+    ///
+    /// [`GridSpec::n_levels`]: crate::model::grid::GridSpec::n_levels
+    pub n_levels: u32,
     /// Bound of |view depth| relative to the lighting origin.
     pub radius: f64,
     /// Bits of a sort key: 16 or 32.

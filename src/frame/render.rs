@@ -17,6 +17,7 @@ use crate::model::boxes::MAX_ATTEMPTS;
 use crate::passes::blobs::{BlobBuffers, BlobCount};
 use crate::passes::cull::{CullBuffers, Order};
 use crate::passes::facets;
+use crate::passes::grid::Deposit;
 use crate::passes::morton;
 use crate::passes::place::PlaceBuffers;
 use crate::passes::sort::{Count, TILE};
@@ -104,7 +105,10 @@ impl FramePasses {
             }
         })?;
         pass(rec, plan, Pass::Grid, |rec| {
-            grid.record(rec, [placed, particles, density], &packet.grid, n, packet.heaviest)
+            let Packet { grid: of, heaviest, n_levels, .. } = packet;
+            let deposit =
+                Deposit { grid: of, n_particles: n, heaviest: *heaviest, n_levels: *n_levels };
+            grid.record(rec, [placed, particles, density], &deposit)
         })
     }
 

@@ -8,6 +8,18 @@ use glam::{DVec3, UVec3};
 /// is spread over the rest, so that mass is kept.
 pub const DEPOSIT_CUT_SIGMA: f64 = 3.0;
 
+/// Least σ along every axis, in cells, of a blob that is deposited on a grid of wider cells.
+pub const LEVEL_SIGMA: f64 = 1.5;
+
+/// Most grids that blobs are deposited on. The cells of the last are 32 times as wide as those of
+/// the first. A blob that may lie on a next one would be wider than the greatest grid.
+pub const MAX_LEVELS: u32 = 6;
+
+/// Cells of the finest grid that are spread in the time that one blob takes longer on it than on
+/// wider ones. At its least that is 19³ cells against 10³, and spreading sums 27 cells; an atomic
+/// sum takes about as long as one of these.
+pub const CELLS_PER_BLOB: u64 = 200;
+
 /// Margin around the bounds, cells: trilinear sampling at the bounds never leaves the grid.
 pub const MARGIN_CELLS: u32 = 2;
 
@@ -69,6 +81,40 @@ impl GridSpec {
         GridSpec { n_cells, cell: self.cell * f64::from(edge), low, ..*self }
     }
 
+    /// Returns the grid of cells that are 2^`level` times as wide, from the same corner on. The
+    /// last ones may reach beyond the box.
+    pub fn level(&self, level: u32) -> GridSpec {
+        let n_cells = self.n_cells.map(|n| n.div_ceil(1 << level));
+        GridSpec { n_cells, cell: self.cell * f64::from(1 << level), ..*self }
+    }
+
+    /// Returns the number of levels that `n_blobs` are deposited on.
+    pub fn n_levels(&self, n_blobs: u64) -> u32 {
+        if has_levels(n_blobs, self.n_cells.max_element()) { MAX_LEVELS } else { 1 }
+    }
+
+    /// Returns how many of these levels blobs of at most `widest` σ can be on, in f32, too.
+    pub fn n_used_levels(&self, n_blobs: u64, widest: f64) -> u32 {
+        1 + self.level_of(DVec3::splat(widest * (1.0 + 1e-5)), self.n_levels(n_blobs))
+    }
+
+    /// Returns the level, of `n_levels`, that a blob of `sigma` along each axis is deposited on:
+    /// the widest cells of which it has [`LEVEL_SIGMA`] a σ.
+    pub fn level_of(&self, sigma: DVec3, n_levels: u32) -> u32 {
+        let cells = (sigma / self.edges()).min_element();
+        (1..n_levels).take_while(|l| cells >= LEVEL_SIGMA * f64::from(1 << l)).count() as u32
+    }
+
+    /// Returns σ along each axis of what is deposited on a level for a blob of `sigma`. Spreading
+    /// it to the finest cells adds the rest of its variance (passes.md "grid").
+    pub fn deposited(&self, sigma: DVec3, level: u32) -> DVec3 {
+        if level == 0 {
+            return sigma;
+        }
+        let spread = 0.5 * (f64::from(1 << level).powi(2) - 1.0);
+        (sigma * sigma - spread * self.edges() * self.edges()).map(f64::sqrt)
+    }
+
     /// Returns the number of cells.
     pub fn n_total(&self) -> u64 {
         u64::from(self.n_cells.x) * u64::from(self.n_cells.y) * u64::from(self.n_cells.z)
@@ -107,11 +153,38 @@ impl GridSpec {
     }
 }
 
+/// Returns whether `n_blobs` are deposited on several levels of a grid whose longest axis has
+/// `side` cells. Few blobs take less time than spreading wide cells. A cube's cells count, so that
+/// the answer stays as clouds move.
+pub fn has_levels(n_blobs: u64, side: u32) -> bool {
+    n_blobs * CELLS_PER_BLOB >= u64::from(side).pow(3)
+}
+
 /// Returns how many cells the first merged one reaches beyond the box, of `n` along an axis that
 /// are merged by `edge`. A merged cell begins in the middle of the box, so that it stays when
 /// layers of cells come and go at both ends.
 pub fn cells_before(n: u32, edge: u32) -> u32 {
     (edge - n / 2 % edge) % edge
+}
+
+/// Sums of what the six finer cells next to a cell get of it, from the first on, in sixteenths.
+const GIVEN_UP_TO: [f64; 6] = [1.0, 6.0, 16.0, 26.0, 31.0, 32.0];
+
+/// Returns the weights that three cells of the next level have in cell `i` of `n` along an axis:
+/// the one that it lies in, with that before and that after it. What would leave the box stays in
+/// its last cell.
+pub fn given_by_coarser(i: u32, n: u32) -> [f64; 3] {
+    let up_to = |k: i64| if k < 0 { 0.0 } else { GIVEN_UP_TO[k.min(5) as usize] / 16.0 };
+    [-1, 0, 1].map(|k| {
+        let (i, coarse) = (i64::from(i), i64::from(i / 2) + k);
+        if coarse < 0 || coarse >= i64::from(n.div_ceil(2)) {
+            return 0.0;
+        }
+        // The first of the six has the number 2c - 2.
+        let first = if i == 0 { 0 } else { i - 2 * coarse + 2 };
+        let last = if i == i64::from(n) - 1 { 5 } else { i - 2 * coarse + 2 };
+        up_to(last) - up_to(first - 1)
+    })
 }
 
 /// Number of patches along each edge of the box's faces, through which light passes between the
@@ -186,6 +259,46 @@ mod tests {
                 before = now;
             }
         }
+    }
+
+    #[test]
+    fn wide_blobs_are_deposited_on_wide_cells() {
+        let n_cells = UVec3::new(20, 5, 1);
+        let grid = GridSpec { n_cells, cell: 0.5, aspect: 0.5, low: DVec3::ZERO };
+        let of = |x: f64, y: f64| grid.level_of(DVec3::new(x, y, x), MAX_LEVELS);
+        assert_eq!((grid.n_levels(39), grid.n_levels(40)), (1, MAX_LEVELS));
+        assert_eq!(grid.level_of(DVec3::splat(50.0), 1), 0);
+        assert_eq!(
+            [(39, 50.0), (40, 1.4999), (40, 1.5)].map(|(n, w)| grid.n_used_levels(n, w)),
+            [1, 1, 2]
+        );
+        assert_eq!([of(1.49, 9.0), of(1.5, 9.0), of(2.99, 9.0), of(3.0, 9.0)], [0, 1, 1, 2]);
+        // Along y cells are half as wide.
+        assert_eq!([of(50.0, 0.74), of(50.0, 0.75), of(1e9, 1e9)], [0, 1, 5]);
+        let coarse = grid.level(3);
+        assert_eq!((coarse.n_cells, coarse.cell), (UVec3::new(3, 1, 1), 4.0));
+        // By hand: 16 - 3/2 of the squared edges, 1/4 and 1/16.
+        let sigma = grid.deposited(DVec3::splat(4.0), 1);
+        assert!((sigma.x.powi(2) - 15.625).abs() < 1e-6);
+        assert!((sigma.y.powi(2) - 15.906_25).abs() < 1e-6);
+    }
+
+    #[test]
+    fn coarse_cells_give_all_that_they_have() {
+        for n in 1_u32..40 {
+            let mut given = vec![0.0; n.div_ceil(2) as usize + 2];
+            for i in 0..n {
+                for (k, weight) in given_by_coarser(i, n).into_iter().enumerate() {
+                    given[i as usize / 2 + k] += weight;
+                }
+            }
+            let [before, inside @ .., after] = &given[..] else { unreachable!() };
+            assert_eq!([*before, *after], [0.0; 2], "{n}");
+            assert!(inside.iter().all(|sum| *sum == 2.0), "{n}: {given:?}");
+        }
+        // In the middle: 5, 10 and 1 sixteenths, or the same from the other side.
+        assert_eq!(given_by_coarser(8, 20).map(|w| 16.0 * w), [5.0, 10.0, 1.0]);
+        assert_eq!(given_by_coarser(9, 20).map(|w| 16.0 * w), [1.0, 10.0, 5.0]);
     }
 
     #[test]

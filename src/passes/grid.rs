@@ -4,10 +4,11 @@
 //! at x + n_x (y + n_y z). Law: mass-conserving separable deposit. Source:
 //! model.md §8, passes.md. Error: at most 2.5e-6 of a weight, of which 3e-7 are from the
 //! formula of erf and the rest from rounding (1e-6 measured); and half a quantum of the fixed-point
-//! sum a deposit.
+//! sum a deposit. Where there are many blobs, wide ones are deposited on grids of wider cells, each
+//! of which is spread to the one of half its edges.
 
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder, buffers};
+use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
@@ -20,6 +21,10 @@ record! {
         n_particles: u32,
         /// Quanta of a unit of mass.
         quanta_per_mass: f32,
+        /// Number of grids, of ever wider cells.
+        n_levels: u32,
+        /// 1: blobs are deposited on wider cells, and else on the finest.
+        is_wide: u32,
     }
 }
 
@@ -33,40 +38,99 @@ record! {
     }
 }
 
+record! {
+    /// Push constants of `grid_spread.comp`.
+    pub struct SpreadPush {
+        /// Cells of the grid along each axis.
+        n_cells: [u32; 3],
+        /// Place of its first cell in its buffers.
+        i_first: u32,
+        /// Cells of the grid of wider cells; 0 if there is none.
+        n_wider: [u32; 3],
+        /// Place of its first cell.
+        i_first_wider: u32,
+        /// Extinction per length of a quantum in one of the grid's cells.
+        density_per_quantum: f32,
+    }
+}
+
 /// Quanta of the heaviest particle's mass: 2³¹ in one cell fits a 32-bit word with room for
 /// rounding up, and 2³³ such particles fit the 64-bit sum.
 const QUANTA_OF_HEAVIEST: f64 = 2_147_483_648.0;
 
 buffers! {
-    /// Scratch of the pass for a number of cells.
-    pub struct Scratch(n_cells: u64) {
+    /// Scratch of the pass for a number of cells, and for those of wider grids.
+    pub struct Scratch(n_cells: u64, n_wide: u64) {
         /// Fixed-point sums by cell.
         sums: Buffer => [u32; 2], n_cells, "grid.sums";
+        /// The same by wider cell.
+        wide_sums: Buffer => [u32; 2], n_wide, "grid.wide_sums";
+        /// Density by wider cell.
+        wide: Buffer => f32, n_wide, "grid.wide";
     }
+}
+
+/// Returns the room for the cells of all wider grids: half of those of the finest. An axis has five
+/// cells or more, of which the next grid has at most three, and so on: less than a third together.
+fn room_of_wide(n_cells: u64, has_levels: bool) -> u64 {
+    if has_levels { n_cells / 2 } else { 0 }
+}
+
+/// Returns the sizes of the scratch buffers.
+pub fn specs(n_cells: u64, has_levels: bool) -> Vec<BufferSpec> {
+    Scratch::specs(n_cells, room_of_wide(n_cells, has_levels))
+}
+
+/// What is deposited in a frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Deposit<'a> {
+    /// The density grid.
+    pub grid: &'a GridRecord,
+    /// Number of particles.
+    pub n_particles: u32,
+    /// At least the greatest mass κ (2π)^{3/2} σ³ of a particle.
+    pub heaviest: f64,
+    /// Number of grids that particles may be deposited on, each with cells twice as wide.
+    pub n_levels: u32,
 }
 
 /// The pipelines and scratch buffers of the pass.
 pub struct Grid {
     deposit: Kernel,
     resolve: Kernel,
+    /// For wider grids, and for the finest where there are some.
+    spread: Option<[Kernel; 2]>,
     scratch: Scratch,
     capacity: u64,
 }
 
 impl Grid {
-    /// Creates the pipelines, and scratch buffers for `n_cells` cells.
+    /// Creates the pipelines, and scratch buffers for `n_cells` cells; with `has_levels`, those of
+    /// wider cells, too.
     ///
     /// # Errors
     /// Fails if a shader does not compile or the device cannot hold the buffers.
-    pub fn new(device: &Device, compiler: &Compiler, n_cells: u64) -> Result<Grid> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        n_cells: u64,
+        has_levels: bool,
+    ) -> Result<Grid> {
         // A workgroup of one subgroup does not wait at its barriers, and a blob's few cells fill
         // it.
-        let width = [("WORKGROUP", device.limits().subgroup_size.clamp(8, 64))];
+        let width = device.limits().subgroup_size.clamp(8, 64);
+        let macros = [("WORKGROUP", width)];
         let fields = DepositPush::FIELDS;
+        let spread = |finest: u32| {
+            let macros = [("FINEST", finest)];
+            let fields = SpreadPush::FIELDS;
+            Kernel::with_macros(device, compiler, "grid.spread", fields, &[], &macros)
+        };
         Ok(Grid {
-            deposit: Kernel::with_macros(device, compiler, "grid.deposit", fields, &[], &width)?,
+            deposit: Kernel::with_macros(device, compiler, "grid.deposit", fields, &[], &macros)?,
             resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS)?,
-            scratch: Scratch::new(device, n_cells)?,
+            spread: if has_levels { Some([spread(0)?, spread(1)?]) } else { None },
+            scratch: Scratch::new(device, n_cells, room_of_wide(n_cells, has_levels))?,
             capacity: n_cells,
         })
     }
@@ -81,15 +145,15 @@ impl Grid {
     /// # Errors
     /// Fails if the device cannot hold them.
     pub fn set_capacity(&mut self, device: &Device, n_cells: u64) -> Result<()> {
-        self.scratch = Scratch::new(device, n_cells)?;
+        let has_levels = self.spread.is_some();
+        self.scratch = Scratch::new(device, n_cells, room_of_wide(n_cells, has_levels))?;
         self.capacity = n_cells;
         Ok(())
     }
 
-    /// Writes the density of every cell of `grid`.
+    /// Writes the density of every cell of a grid.
     ///
     /// `placed`: `PlacedRecord`; `particles`: `ParticleRecord`; `density`: `f32` by cell.
-    /// `heaviest` is at least the greatest mass κ (2π)^{3/2} σ³ of a particle.
     ///
     /// # Errors
     /// Fails if the grid has more cells than the scratch buffers.
@@ -97,27 +161,94 @@ impl Grid {
         &self,
         rec: &mut Recorder<'_>,
         [placed, particles, density]: [&Buffer; 3],
-        grid: &GridRecord,
-        n_particles: u32,
-        heaviest: f64,
+        of: &Deposit<'_>,
     ) -> Result<()> {
-        let n_wanted = grid.n_cells.iter().map(|n| u64::from(*n)).product::<u64>();
-        if n_wanted > self.capacity {
+        let Scratch { sums, wide_sums, .. } = &self.scratch;
+        let levels = Levels::new(of);
+        if levels.n_finest() > self.capacity {
             return Err(Error::limit(format!(
-                "a density grid of {n_wanted} cells, where there is room for {}",
+                "a density grid of {} cells, where there is room for {}",
+                levels.n_finest(),
                 self.capacity
             )));
         }
-        let sums = &self.scratch.sums;
+        let room = room_of_wide(self.capacity, self.spread.is_some());
+        if levels.n_wide() > room {
+            return Err(Error::limit(format!(
+                "density grids of {} wide cells, where there is room for {room}",
+                levels.n_wide()
+            )));
+        }
+        let quanta_per_mass =
+            if of.heaviest > 0.0 { QUANTA_OF_HEAVIEST / of.heaviest } else { 0.0 };
+        let push = DepositPush {
+            grid: *of.grid,
+            n_particles: of.n_particles,
+            quanta_per_mass: quanta_per_mass as f32,
+            n_levels: levels.0.len() as u32,
+            is_wide: 0,
+        };
         rec.fill(sums, 0);
-        let quanta_per_mass = if heaviest > 0.0 { QUANTA_OF_HEAVIEST / heaviest } else { 0.0 };
-        let push =
-            DepositPush { grid: *grid, n_particles, quanta_per_mass: quanta_per_mass as f32 };
-        rec.dispatch_groups(&self.deposit, &[placed, particles, sums], &push, n_particles)?;
-        let n_cells = grid.n_cells.iter().product();
+        let buffers = [placed, particles, sums];
+        rec.dispatch_groups(&self.deposit, &buffers, &push, of.n_particles)?;
+        let spread = self.spread.as_ref().filter(|_| levels.n_wide() > 0);
+        let Some([spread, spread_finest]) = spread else {
+            return self.resolve(rec, density, &levels.0[0]);
+        };
+        rec.fill(wide_sums, 0);
+        let (buffers, push) = ([placed, particles, wide_sums], DepositPush { is_wide: 1, ..push });
+        rec.dispatch_groups(&self.deposit, &buffers, &push, of.n_particles)?;
+        let wide = &self.scratch.wide;
+        for level in levels.0[1..].iter().rev() {
+            rec.dispatch(spread, &[wide_sums, wide], level, level.n_cells.iter().product())?;
+        }
+        let finest = &levels.0[0];
+        let n_cells = finest.n_cells.iter().product();
+        rec.dispatch(spread_finest, &[sums, wide, density], finest, n_cells)
+    }
+
+    /// Converts the sums of the finest grid to density.
+    fn resolve(&self, rec: &mut Recorder<'_>, density: &Buffer, of: &SpreadPush) -> Result<()> {
+        let n_cells = of.n_cells.iter().product();
+        let push = ResolvePush { n_cells, density_per_quantum: of.density_per_quantum };
+        rec.dispatch(&self.resolve, &[&self.scratch.sums, density], &push, n_cells)
+    }
+}
+
+/// The grids of a frame, the finest first.
+struct Levels(Vec<SpreadPush>);
+
+impl Levels {
+    fn new(of: &Deposit<'_>) -> Levels {
+        let grid = of.grid;
         let volume = f64::from(grid.cell).powi(3) * f64::from(grid.aspect);
-        let density_per_quantum = (heaviest / QUANTA_OF_HEAVIEST / volume) as f32;
-        let push = ResolvePush { n_cells, density_per_quantum };
-        rec.dispatch(&self.resolve, &[sums, density], &push, n_cells)
+        let n_levels = of.n_levels.clamp(1, 31);
+        let cells = |level: u32| grid.n_cells.map(|n| n.div_ceil(1 << level));
+        let n_total = |level: u32| cells(level).iter().product::<u32>();
+        let mut i_next = 0;
+        let of_level = |level: u32| {
+            let i_first = i_next;
+            i_next += if level > 0 { n_total(level) } else { 0 };
+            let n_wider = if level + 1 < n_levels { cells(level + 1) } else { [0; 3] };
+            let wider = f64::from(1 << level).powi(3);
+            let density = of.heaviest / QUANTA_OF_HEAVIEST / (volume * wider);
+            SpreadPush {
+                n_cells: cells(level),
+                i_first,
+                n_wider,
+                i_first_wider: i_next,
+                density_per_quantum: density as f32,
+            }
+        };
+        Levels((0..n_levels).map(of_level).collect())
+    }
+
+    fn n_finest(&self) -> u64 {
+        self.0[0].n_cells.iter().map(|n| u64::from(*n)).product()
+    }
+
+    fn n_wide(&self) -> u64 {
+        let of = |level: &SpreadPush| level.n_cells.iter().map(|n| u64::from(*n)).product::<u64>();
+        self.0[1..].iter().map(of).sum()
     }
 }

@@ -88,6 +88,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "generate.comp",
     "grid_deposit.comp",
     "grid_resolve.comp",
+    "grid_spread.comp",
     "impostors.frag",
     "impostors.vert",
     "impostors_part.comp",

@@ -101,8 +101,8 @@ mod tests {
     use glam::UVec3;
 
     use super::*;
+    use crate::reference::deposit::deposit;
     use crate::reference::facets::{FacetPlace, facets};
-    use crate::reference::grid::deposit;
 
     const SPEC: GridSpec =
         GridSpec { aspect: 1.0, n_cells: UVec3::splat(50), cell: 0.2, low: DVec3::splat(-5.0) };

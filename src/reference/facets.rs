@@ -189,7 +189,7 @@ pub(super) fn facet_at(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::grid::deposit;
+    use crate::reference::deposit::deposit;
     use glam::UVec3;
 
     const SPEC: GridSpec =

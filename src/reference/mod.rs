@@ -16,6 +16,7 @@ pub mod composite;
 pub mod contract;
 pub mod count;
 pub mod cull;
+pub mod deposit;
 pub mod diffusion;
 pub mod facet_runs;
 pub mod facets;

@@ -11,10 +11,11 @@ use nimbus::model::grid::DEPOSIT_CUT_SIGMA;
 use nimbus::model::light::Light;
 use nimbus::model::pairings::pairings;
 use nimbus::model::scene::{Gather, Scene};
+use nimbus::reference::deposit::deposit;
 use nimbus::reference::occlude::Rectangle;
 use nimbus::reference::parallel::parallel_map;
 use nimbus::reference::transmit::{Obstacles, Receiver};
-use nimbus::reference::{grid, morton, place, sort};
+use nimbus::reference::{morton, place, sort};
 
 use crate::emulation::{Exchange, Facet, Gathered, Region};
 use crate::harness::{Gpu, assert_within_and_say, check_within};
@@ -52,7 +53,7 @@ pub fn reference(f: &Frame) -> Vec<Gathered> {
     let offsets = place::offsets(&groups, &scene.clouds, 0.0, origin);
     let rest: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
     let blobs = place::blobs(&generated, &place::place(&rest, &groups, &offsets));
-    let cells = grid::deposit(&setting.grid, &blobs);
+    let cells = deposit(&setting.grid, &blobs);
     let forward = if blobs.is_empty() { 1.0 } else { scene.lighting.forward };
     let lights: Vec<Light> = scene.lights.iter().map(|l| l.relative_to(origin)).collect();
     let step = scene.lighting.step;

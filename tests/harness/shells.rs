@@ -7,7 +7,7 @@ use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::grid::GridSpec;
 use nimbus::passes::facets::{Facets, ParticleBuffers};
-use nimbus::passes::grid::Grid;
+use nimbus::passes::grid::{Deposit, Grid};
 use nimbus::reference::Blob;
 use nimbus::reference::facets::{
     CONDITIONING, Facet, FacetPlace, FacetSources, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions,
@@ -121,7 +121,7 @@ impl Scene {
         runs: &[(u64, u64)],
     ) -> (Vec<f64>, Vec<FacetRecord>, Vec<u32>) {
         let (n, n_cells) = (self.blobs.len(), self.spec.n_total() as usize);
-        let grid = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
+        let grid = Grid::new(&gpu.device, compiler, n_cells as u64, false).unwrap();
         let pass = Facets::new(&gpu.device, compiler, self.has_ellipsoids(), false).unwrap();
         let placed = |b: &Blob| PlacedRecord {
             position: b.position.as_vec3().to_array(),
@@ -145,7 +145,9 @@ impl Scene {
         let (order, records, i_facet) =
             (gpu.upload(order), gpu.upload(&records), gpu.buffer::<u32>(n));
         gpu.run(|rec| {
-            grid.record(rec, [&placed, &particles, &density], &self.record, n as u32, heaviest)?;
+            let grid_of = &self.record;
+            let deposit = Deposit { grid: grid_of, n_particles: n as u32, heaviest, n_levels: 1 };
+            grid.record(rec, [&placed, &particles, &density], &deposit)?;
             let buffers = ParticleBuffers {
                 placed: &placed,
                 particles: &particles,

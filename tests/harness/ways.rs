@@ -13,7 +13,7 @@ use nimbus::model::material::Brdf;
 use nimbus::model::sums::Sums;
 use nimbus::model::surface::Surface;
 use nimbus::passes::transmit::{Arriving, MarchParams, Transmit, TransmitBuffers};
-use nimbus::reference::{Blob, grid::deposit, occlude::Rectangle, transmit};
+use nimbus::reference::{Blob, deposit::deposit, occlude::Rectangle, transmit};
 
 use crate::bounded::{Bounded, Random};
 use crate::harness::Gpu;

@@ -89,6 +89,7 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("generate.comp", generate::Push::FIELDS, "Box 4 Particle 4"),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, "Placed Particle 4"),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, "8 4"),
+    ("grid_spread.comp", grid::SpreadPush::FIELDS, "8 4"),
     ("impostors.frag", impostors::Push::FIELDS, "T"),
     ("impostors.vert", impostors::Push::FIELDS, ""),
     ("impostors_part.comp", impostors::PartPush::FIELDS, "8 4 8 8 Placed"),

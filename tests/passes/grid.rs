@@ -1,22 +1,23 @@
 //! The pass grid against its f64 reference: every cell within a bound derived from its own
 //! deposits.
 
+mod blobs;
+
 use glam::{DVec3, UVec3, Vec3};
+
+use blobs::{at_the_cut, ellipsoids, paper, scattered, wide, wide_ellipsoids};
 
 use crate::harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
 use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{ParticleRecord, PlacedRecord};
-use nimbus::model::boxes::{BoxLaw, Form};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
-use nimbus::passes::grid::Grid;
+use nimbus::passes::grid::{Deposit, Grid};
 use nimbus::reference::Blob;
-use nimbus::reference::generate::{generate_box, uniforms};
-use nimbus::reference::grid::{axis_weights, deposit};
+use nimbus::reference::deposit::{axis_weights, deposit, deposit_on, spread};
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32, erf_bound};
 
 const U: f64 = U_F32;
-const LAW: BoxLaw = BoxLaw { radius_scale: 0.6, ..BoxLaw::new(Form::Centred) };
 
 /// The input of the pass, and the f64 numbers that its f32 records stand for.
 struct Scene {
@@ -53,7 +54,8 @@ impl Scene {
 
     fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> Vec<f64> {
         let n_cells = self.spec.n_total() as usize;
-        let pass = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
+        let n_levels = self.n_levels();
+        let pass = Grid::new(&gpu.device, compiler, n_cells as u64, n_levels > 1).unwrap();
         let placed = |b: &Blob| PlacedRecord {
             position: b.position.as_vec3().to_array(),
             sigma: b.sigma as f32,
@@ -68,19 +70,56 @@ impl Scene {
         let density = gpu.buffer::<f32>(n_cells);
         let n = self.blobs.len() as u32;
         gpu.run(|rec| {
-            pass.record(rec, [&placed, &particles, &density], &self.record, n, self.heaviest)
+            pass.record(rec, [&placed, &particles, &density], &self.deposit(n, n_levels))
         });
         gpu.download::<f32>(&density, n_cells).into_iter().map(f64::from).collect()
     }
 
+    fn deposit(&self, n_particles: u32, n_levels: u32) -> Deposit<'_> {
+        Deposit { grid: &self.record, n_particles, heaviest: self.heaviest, n_levels }
+    }
+
+    /// The grids that a blob of the scene is deposited on.
+    fn n_levels(&self) -> u32 {
+        let widest = self.blobs.iter().map(Blob::widest).fold(0.0, f64::max);
+        self.spec.n_used_levels(self.blobs.len() as u64, widest)
+    }
+
     /// Bound of every cell's density.
     fn bounds(&self) -> Vec<f64> {
-        let n = self.spec.n_cells.as_usizevec3();
+        let n_levels = self.n_levels();
+        let level_of = |b: &Blob| self.spec.level_of(b.sigma * b.axes(), n_levels);
+        let mut wider: Option<[Vec<f64>; 2]> = None;
+        for level in (0..n_levels).rev() {
+            let of = |b: &&Blob| b.sigma > 0.0 && b.kappa > 0.0 && level_of(b) == level;
+            let blobs: Vec<Blob> = self.blobs.iter().filter(of).copied().collect();
+            let mut values = deposit_on(&self.spec, level, &blobs);
+            let mut bounds = self.bounds_on(level, &blobs);
+            if let Some([of_values, of_bounds]) = &wider {
+                let spec = self.spec.level(level);
+                let mut given = vec![0.0; values.len()];
+                spread(&spec, of_values, &mut given);
+                spread(&spec, of_bounds, &mut bounds);
+                for (i, given) in given.into_iter().enumerate() {
+                    values[i] += given;
+                    bounds[i] += SPREAD_ROUNDINGS * U * values[i];
+                }
+            }
+            wider = Some([values, bounds]);
+        }
+        let [_, bounds] = wider.unwrap();
+        bounds
+    }
+
+    /// Bound of the density that blobs have in the cells of a level.
+    fn bounds_on(&self, level: u32, blobs: &[Blob]) -> Vec<f64> {
+        let spec = self.spec.level(level);
+        let n = spec.n_cells.as_usizevec3();
         let mut bounds = vec![0.0; n.x * n.y * n.z];
-        let volume = self.spec.cell_volume();
+        let volume = spec.cell_volume();
         let quantum = self.heaviest / 2f64.powi(31) / volume;
-        for blob in self.blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0) {
-            let axis = |k: usize| self.axis(blob, k, n[k]);
+        for blob in blobs {
+            let axis = |k: usize| self.axis(blob, level, k, n[k]);
             let (x, y, z) = (axis(0), axis(1), axis(2));
             let density = blob.mass() / volume;
             for &(k, wz, ez) in &z {
@@ -99,9 +138,13 @@ impl Scene {
     }
 
     /// (cell, weight, its bound) of the cells that a blob can meet along an axis.
-    fn axis(&self, blob: &Blob, k: usize, n: usize) -> Vec<(usize, f64, f64)> {
-        let (p, sigma) = (blob.position[k], (blob.sigma * blob.axes())[k]);
-        let (low, cell) = (self.spec.low[k], self.spec.edges()[k]);
+    fn axis(&self, blob: &Blob, level: u32, k: usize, n: usize) -> Vec<(usize, f64, f64)> {
+        let (p, of) = (blob.position[k], blob.sigma * blob.axes());
+        let sigma = self.spec.deposited(of, level)[k];
+        let (low, cell) = (self.spec.low[k], self.spec.level(level).edges()[k]);
+        // On wider cells σ is the root of a difference that is at least 7/9 of σ²: the square's
+        // rounding and four of what is taken away, over that, half of it, and the root's own.
+        let of_root = if level > 0 { ROOT_ERROR } else { 0.0 };
         let (first, weights) = axis_weights(p, sigma, low, cell, n);
         let x = p - low;
         let face = |i: usize| (cell * i as f64 - x) / sigma;
@@ -111,13 +154,13 @@ impl Scene {
         let face_error = |i: usize| {
             let at = cell * i as f64;
             (U * ((1.0 + of_shape) * at.abs() + x.abs() + (at - x).abs()) / sigma
-                + (DIVISION_ERROR + of_shape) * U * face(i).abs())
+                + (DIVISION_ERROR + of_shape + of_root) * U * face(i).abs())
                 * (1.0 + 8.0 * U)
         };
         // The ends of the range: x, 3σ, their sum, 1/h and the product are rounded once each. A
         // cell left out or let in lies that near to the cut, where the density is φ(3).
         let range_error =
-            (5.0 + 3.0 * of_shape) * U * (x.abs() + DEPOSIT_CUT_SIGMA * sigma) / sigma;
+            (5.0 + 3.0 * of_shape + of_root) * U * (x.abs() + DEPOSIT_CUT_SIGMA * sigma) / sigma;
         let weight = |i: usize| {
             if (first..first + weights.len()).contains(&i) { weights[i - first] } else { 0.0 }
         };
@@ -138,6 +181,13 @@ impl Scene {
         (first.saturating_sub(1)..=last).map(of).collect()
     }
 }
+
+/// Roundings of a cell's density that wider cells are spread to: 13 of the sum of 27 terms, and one
+/// of the sum with its own.
+const SPREAD_ROUNDINGS: f64 = 14.0;
+/// Error of σ on wider cells: (1 + 4·2/9)·9/7/2 + 1/2, and 3 of a root that is made of an inverse
+/// one (2 ulp and a product).
+const ROOT_ERROR: f64 = 6.0;
 
 /// ½/erf(3/√2): what a weight makes of the difference of two erf.
 const SHARE: f64 = 0.5 / 0.997_300_203_936_739_8;
@@ -160,62 +210,6 @@ fn erf_error(a: f64, e: f64) -> f64 {
     slope * e + erf_bound((t - e).max(0.0)).max(erf_bound(t + e))
 }
 
-/// Blobs from a hundredth of a cell to a fifth of the scene, of masses over nine orders of
-/// magnitude.
-fn scattered(n: u32) -> Vec<Blob> {
-    let blob = |i: u32| {
-        let ([a, b, c, d], [e, ..]) = (uniforms(0x64123, 0, i, 0), uniforms(0x64123, 1, i, 0));
-        let position = DVec3::new(20.0 * a - 8.0, 12.0 * b, 9.0 * c - 40.0);
-        Blob {
-            aspect: 1.0,
-            position,
-            sigma: 0.004 * 500f64.powf(d),
-            kappa: 10f64.powf(3.0 * e - 2.0),
-        }
-    };
-    (0..n).map(blob).collect()
-}
-
-/// The same, from a fiftieth to five times as high as wide.
-fn ellipsoids(n: u32) -> Vec<Blob> {
-    let shaped = |(b, i): (Blob, u32)| Blob {
-        aspect: 0.02 * 250f64.powf(uniforms(0x64124, 0, i, 0)[0]),
-        ..b
-    };
-    scattered(n).into_iter().zip(0..).map(shaped).collect()
-}
-
-fn paper() -> Vec<Blob> {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cubes-554.dat");
-    let boxes = nimbus::io::box_file::read(&path).unwrap();
-    let of_box = |(b, i): (&nimbus::model::boxes::CloudBox, u32)| {
-        let center = b.center;
-        generate_box(b, i, 1, &LAW)
-            .into_iter()
-            .map(move |g| Blob {
-                aspect: g.aspect,
-                position: center + g.position,
-                sigma: g.sigma,
-                kappa: g.kappa,
-            })
-            .collect::<Vec<_>>()
-    };
-    boxes.iter().zip(0..).flat_map(of_box).collect()
-}
-
-/// Small blobs whose cut ends within rounding of a cell's face, on either side of it: where
-/// rounding makes the share of the cell beyond negative, it must not become 2³² quanta.
-fn at_the_cut() -> Vec<Blob> {
-    let blob = |i: u32| {
-        let [a, b, ..] = uniforms(0xc07, 0, i, 0);
-        let sigma = 0.02 + 0.1 * a;
-        // Cells of 1 from 0 on: the face at 5 lies 3σ(1 ± 1e-6) away.
-        let x = 5.0 - 3.0 * sigma * (1.0 + 2e-6 * (b - 0.5));
-        Blob { aspect: 1.0, position: DVec3::new(x, 4.5, 3.5), sigma, kappa: 1.0 / sigma.powi(3) }
-    };
-    (0..4000).map(blob).collect()
-}
-
 fn compiler() -> Compiler {
     Compiler::new(nimbus::passes::sources(), Compiler::default_cache()).unwrap()
 }
@@ -225,6 +219,9 @@ fn scenes() -> Vec<(&'static str, Scene)> {
     let cells = GridSpec { aspect: 1.0, n_cells: UVec3::splat(9), cell: 1.0, low: DVec3::ZERO };
     vec![
         ("scattered", Scene::fitted(&scattered(3000), 48)),
+        ("wide", Scene::fitted(&wide(3000), 64)),
+        ("wide, of 45 cells", Scene::fitted(&wide(1000), 45)),
+        ("wide ellipsoids", Scene::fitted(&wide_ellipsoids(3000), 64)),
         ("ellipsoids", Scene::fitted(&ellipsoids(3000), 48)),
         ("the paper's 554", Scene::fitted(&paper(), 64)),
         ("at the cut", Scene::new(&cells, &at_the_cut())),
@@ -260,7 +257,7 @@ fn every_cell_is_within_its_bound() {
 #[test]
 fn mass_is_kept() {
     let mut gpu = Gpu::new();
-    for blobs in [scattered(3000), ellipsoids(3000), paper()] {
+    for blobs in [scattered(3000), ellipsoids(3000), paper(), wide(3000)] {
         let scene = Scene::fitted(&blobs, 64);
         let volume = scene.spec.cell_volume();
         let values = scene.run(&mut gpu, &compiler());
@@ -317,7 +314,35 @@ fn a_wrong_shader_is_noticed() {
         ("grid_deposit.comp", "15.7496099457224", "15.75"),
         ("grid_deposit.comp", "const float CUT_SIGMA = 3.0", "const float CUT_SIGMA = 2.9"),
         ("grid_deposit.comp", "float(i + 1)", "(float(i) + 0.99)"),
-        ("grid_deposit.comp", "first + x + row * y", "first + y + row * x"),
+        (
+            "grid_deposit.comp",
+            "begin.x + x + row * (begin.y + y)",
+            "begin.x + y + row * (begin.y + x)",
+        ),
+    ];
+    for (file, from, to) in mutations {
+        let values = scene.run(&mut gpu, &Gpu::wrong_compiler(file, from, to));
+        assert!(check_within("wrong", &values, &truths, &bounds).is_err(), "{to} was not noticed");
+    }
+}
+
+#[test]
+fn a_wrong_grid_of_wide_cells_is_noticed() {
+    let mut gpu = Gpu::new();
+    let scene = Scene::fitted(&wide(1000), 45);
+    assert!(scene.n_levels() > 2);
+    let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());
+    let mutations = [
+        ("grid_deposit.comp", "const float LEVEL_SIGMA = 1.5", "const float LEVEL_SIGMA = 1.6"),
+        ("grid_deposit.comp", "0.5 * (edge * edge - 1.0)", "0.5 * edge * edge"),
+        ("grid_deposit.comp", "(edge > 1.0) == (push.is_wide != 0u)", "push.is_wide == 0u"),
+        ("grid_deposit.comp", "i_first += level > 1u ?", "i_first += level > 0u ?"),
+        ("grid_deposit.comp", "n_cells = (n_cells + 1) / 2", "n_cells = n_cells / 2"),
+        ("grid_spread.comp", "vec3(5.0, 10.0, 1.0)", "vec3(6.0, 10.0, 0.0)"),
+        ("grid_spread.comp", "vec2(6.0, 26.0)", "vec2(5.0, 10.0)"),
+        ("grid_spread.comp", "w.y = 16.0", "w.y = 10.0"),
+        ("grid_spread.comp", "max(own.x, 1u) - 1u", "own.x"),
+        ("grid_spread.comp", "uint first = push.i_first_wider", "uint first = push.i_first"),
     ];
     for (file, from, to) in mutations {
         let values = scene.run(&mut gpu, &Gpu::wrong_compiler(file, from, to));
@@ -330,13 +355,12 @@ fn a_grid_without_room_is_refused() {
     let mut gpu = Gpu::new();
     let scene = Scene::fitted(&scattered(10), 24);
     let n_cells = scene.spec.n_total();
-    let pass = Grid::new(&gpu.device, &compiler(), n_cells - 1).unwrap();
+    let pass = Grid::new(&gpu.device, &compiler(), n_cells - 1, false).unwrap();
     let (placed, particles) = (gpu.buffer::<PlacedRecord>(10), gpu.buffer::<ParticleRecord>(10));
     let density = gpu.buffer::<f32>(n_cells as usize);
     let mut what = String::new();
     gpu.run(|rec| {
-        let refused =
-            pass.record(rec, [&placed, &particles, &density], &scene.record, 10, scene.heaviest);
+        let refused = pass.record(rec, [&placed, &particles, &density], &scene.deposit(10, 1));
         what = refused.expect_err("no room").to_string();
         Ok(())
     });

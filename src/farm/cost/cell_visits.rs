@@ -3,7 +3,7 @@
 use crate::model::light::Light;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::Blob;
-use crate::reference::grid::n_deposited;
+use crate::reference::deposit::n_deposited;
 use crate::reference::picture::FrameReference;
 use crate::reference::transmit::n_samples;
 

@@ -70,6 +70,7 @@ fn packet() -> Packet {
         lights: vec![LightRecord { energy: [0.0, 1.0, 0.0], ..LightRecord::default() }],
         grid: GridRecord::default(),
         heaviest: 1.0,
+        n_levels: 1,
         radius: 1.0,
         sort_bits: 32,
         slice: 1.0,

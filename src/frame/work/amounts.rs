@@ -223,12 +223,19 @@ fn waves(scene: &Scene, packet: &Packet) -> f64 {
     groups.iter().zip(&packet.groups).map(of).sum()
 }
 
+/// Least σ of what is deposited on wider cells, in these: √(1.5² − ½).
+const LEAST_SIGMA: f64 = 1.322;
+
 /// Returns the least number of cells that blobs reach. A blob of σ reaches over 6σ along each axis,
 /// which is at least 6σ/h cells of edge h, and one. The product is convex in σ, so that the blobs
-/// of a group reach at least as many as if all had their mean σ.
+/// of a group reach at least as many as if all had their mean σ. A blob on wider cells has
+/// [`LEAST_SIGMA`] cells and more a σ, as if cells were as wide as to give the widest blob so many.
 fn deposits(scene: &Scene, packet: &Packet) -> f64 {
+    let widest = packet.extents.iter().map(|e| e.sigma_max).fold(0.0, f64::max);
+    let least = if packet.n_levels > 1 { widest / LEAST_SIGMA } else { 0.0 };
     let cell = f64::from(packet.grid.cell);
-    let reached = |sigma: f64, edge: f64| (2.0 * DEPOSIT_CUT_SIGMA * sigma / edge).max(1.0);
+    let reached =
+        |sigma: f64, edge: f64| (2.0 * DEPOSIT_CUT_SIGMA * sigma / edge.max(least)).max(1.0);
     let groups = scene.groups();
     let of = |((group, record), extent): ((&Group, &GroupRecord), &Extent)| {
         let across = reached(f64::from(record.sigma_mean), cell);

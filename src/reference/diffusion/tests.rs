@@ -5,7 +5,8 @@ use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 use crate::model::medium::MeanMedium;
 use crate::reference::Blob;
-use crate::reference::grid::{density, deposit};
+use crate::reference::deposit::deposit;
+use crate::reference::grid::density;
 use crate::reference::transmit::Obstacles;
 
 const MEAN: MeanMedium =

@@ -171,7 +171,7 @@ impl FrameReference {
     ) -> T {
         let (grid, origin) = (self.state.grid, self.state.light_origin);
         let local = LocalScene::new(scene, origin, self.state.time_s);
-        let cells = reference::grid::deposit(&grid, &self.blobs);
+        let cells = reference::deposit::deposit(&grid, &self.blobs);
         (self.facets, self.facet_colors) = self.cloud_facets(scene, &cells);
         self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, local.ground.len()));
         self.facets.splice(0..0, local.ground.iter().copied());

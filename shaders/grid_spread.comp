@@ -5,10 +5,10 @@
 
 // Converts the sums of a grid to density and adds what the grid of wider cells gives (model.md §8,
 // passes.md "grid"). In: 64-bit sums by cell; the density of the wider cells, which have twice the
-// edges. Out: density by cell, extinction per unit length. Law: a wide cell's density goes to its
-// own two cells along each axis and to two on each side, 1 : 5 : 10 : 10 : 5 : 1 of 16. What would
-// leave the box stays in its last cell. Error: the roundings of the sums, and of 27 terms that are
-// not negative.
+// edges. Out: density by cell, extinction per unit length. Law: along each axis a wide cell gives
+// its density to its own two cells and to two on each side, 1 : 5 : 10 : 10 : 5 : 1 of 16. The last
+// cell of the box keeps the shares beyond it. Error: the roundings of the sums, and of 27 terms
+// that are not negative.
 
 // 1: the finest grid, whose density others read.
 #ifndef FINEST
@@ -31,8 +31,8 @@ WRITES(2, float, density)
 UPDATES(1, float, wide)
 #endif
 
-// Returns the weights of three wider cells in cell i of n along an axis: of the one before that in
-// which it lies, of that, and of the one after.
+// Returns the weights of three wider cells in cell i of n along an axis. The second is the one that
+// cell i lies in.
 vec3 given(uint i, uint n, uint n_wider) {
     bool is_odd = (i & 1u) == 1u;
     vec3 w = is_odd ? vec3(1.0, 10.0, 5.0) : vec3(5.0, 10.0, 1.0);

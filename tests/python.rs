@@ -107,6 +107,17 @@ fn cells_of_the_notebook_print_what_it_shows() {
 }
 
 #[test]
+fn peers_are_compared_with_their_laws() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let mut command = Command::new(interpreter());
+    command.args(["tests/python/check_peers.py", &program::path(&dir, "")]).current_dir(ROOT);
+    command.env("NIMBUS", env!("CARGO_BIN_EXE_nimbus")).env("PYTHONDONTWRITEBYTECODE", "1");
+    let output = command.output().expect("Python runs");
+    assert!(output.status.success(), "{}", said(&output));
+    assert!(said(&output).contains("all as expected"), "{}", said(&output));
+}
+
+#[test]
 fn statistics_of_a_fresh_bench_are_those_of_run_json() {
     let dir = tempfile::tempdir().expect("a temporary folder");
     let run = bench(&dir);

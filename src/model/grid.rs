@@ -170,9 +170,9 @@ pub fn cells_before(n: u32, edge: u32) -> u32 {
 /// Sums of what the six finer cells next to a cell get of it, from the first on, in sixteenths.
 const GIVEN_UP_TO: [f64; 6] = [1.0, 6.0, 16.0, 26.0, 31.0, 32.0];
 
-/// Returns the weights that three cells of the next level have in cell `i` of `n` along an axis:
-/// the one that it lies in, with that before and that after it. What would leave the box stays in
-/// its last cell.
+/// Returns the weights that three cells of the next level have in cell `i` of `n` along an axis.
+/// The second is the one that the cell lies in. The last cell of the box keeps the shares beyond
+/// it.
 pub fn given_by_coarser(i: u32, n: u32) -> [f64; 3] {
     let up_to = |k: i64| if k < 0 { 0.0 } else { GIVEN_UP_TO[k.min(5) as usize] / 16.0 };
     [-1, 0, 1].map(|k| {

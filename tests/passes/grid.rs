@@ -142,8 +142,8 @@ impl Scene {
         let (p, of) = (blob.position[k], blob.sigma * blob.axes());
         let sigma = self.spec.deposited(of, level)[k];
         let (low, cell) = (self.spec.low[k], self.spec.level(level).edges()[k]);
-        // On wider cells σ is the root of a difference that is at least 7/9 of σ²: the square's
-        // rounding and four of what is taken away, over that, half of it, and the root's own.
+        // On wider cells σ is the root of a difference that is at least 7/9 of σ². The square has a
+        // rounding, and the subtrahend four.
         let of_root = if level > 0 { ROOT_ERROR } else { 0.0 };
         let (first, weights) = axis_weights(p, sigma, low, cell, n);
         let x = p - low;

@@ -329,7 +329,7 @@ fn a_wrong_shader_is_noticed() {
 #[test]
 fn a_wrong_grid_of_wide_cells_is_noticed() {
     let mut gpu = Gpu::new();
-    let scene = Scene::fitted(&wide(1000), 45);
+    let scene = Scene::fitted(&wide(1400), 64);
     assert!(scene.n_levels() > 2);
     let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());
     let mutations = [

@@ -33,10 +33,9 @@ pub fn ellipsoids(n: u32) -> Vec<Blob> {
     scattered(n).into_iter().zip(0..).map(shaped).collect()
 }
 
-/// Blobs of two to ten cells of 64.
+/// Blobs of one to seven cells of 64.
 pub fn wide(n: u32) -> Vec<Blob> {
-    let of =
-        |(b, i): (Blob, u32)| Blob { sigma: 0.7 * 5f64.powf(uniforms(0x64125, 0, i, 0)[0]), ..b };
+    let of = |(b, i): (Blob, u32)| Blob { sigma: 8f64.powf(uniforms(0x64125, 0, i, 0)[0]), ..b };
     scattered(n).into_iter().zip(0..).map(of).collect()
 }
 

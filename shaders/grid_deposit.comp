@@ -23,7 +23,7 @@ const float CUT_SIGMA = 3.0;
 const float WITHIN_CUT = 0.9973002039367398;
 // (2 pi)^(3/2)
 const float MASS_FACTOR = 15.7496099457224;
-// Least sigma along every axis of a blob on wider cells, in these.
+// A blob on wider cells has at least so many of them a sigma, along every axis.
 const float LEVEL_SIGMA = 1.5;
 
 layout(push_constant) uniform Push {
@@ -63,7 +63,7 @@ void main() {
         vec3 inv_edges = push.grid.inv_cell * vec3(1.0, push.grid.inv_aspect, 1.0);
         vec3 x = blob.position - push.grid.low;
         ivec3 n_cells = ivec3(push.grid.n_cells);
-        // Place of the grid's first cell, and its cells' edge.
+        // Place of the grid's first cell, and its cells' edge over that of the finest.
         int i_first = 0;
         float edge = 1.0;
         vec3 resolved = sigma * inv_edges;
@@ -74,7 +74,7 @@ void main() {
             edge *= 2.0;
         }
         mass = (edge > 1.0) == (push.is_wide != 0u) ? mass : 0.0;
-        // What spreading will add to the variance.
+        // Spreading adds the rest of the variance.
         if (edge > 1.0) {
             sigma = sqrt(sigma * sigma - 0.5 * (edge * edge - 1.0) * edges * edges);
         }

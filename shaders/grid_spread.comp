@@ -6,9 +6,9 @@
 // Converts the sums of a grid to density and adds what the grid of wider cells gives (model.md §8,
 // passes.md "grid"). In: 64-bit sums by cell; the density of the wider cells, which have twice the
 // edges. Out: density by cell, extinction per unit length. Law: along each axis a wide cell gives
-// its density to its own two cells and to two on each side, 1 : 5 : 10 : 10 : 5 : 1 of 16. The last
-// cell of the box keeps the shares beyond it. Error: the roundings of the sums, and of 27 terms
-// that are not negative.
+// its density to six cells, its own two and two on each side. Their shares are 1, 5, 10, 10, 5 and
+// 1 of 16. The last cell of the box keeps the shares beyond it. Error: the roundings of the sums,
+// and of 27 terms that are not negative.
 
 // 1: the finest grid, whose density others read.
 #ifndef FINEST

@@ -140,7 +140,7 @@ fn ground_advice(scene: &Scene) -> Option<String> {
 }
 
 fn bounce_advice(scene: &Scene) -> Option<String> {
-    /// Most bounces that bring light nearer to transport in all scenes of studies.md.
+    /// On 32 cells so many bring light nearer to transport in all scenes of studies.md.
     const SAFE: u32 = 2;
     let n = if has_bounces(scene) { scene.lighting.diffusion.bounces } else { 0 };
     let is_flat = n > SAFE && start_grid(scene).is_some_and(|grid| grid.aspect < 0.9);

@@ -81,7 +81,7 @@ pub fn specs(n_cells: u64, has_levels: bool) -> Vec<BufferSpec> {
     Scratch::specs(n_cells, room_of_wide(n_cells, has_levels))
 }
 
-/// What is deposited in a frame.
+/// The deposit of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Deposit<'a> {
     /// The density grid.
@@ -222,7 +222,8 @@ impl Levels {
     fn new(of: &Deposit<'_>) -> Levels {
         let grid = of.grid;
         let volume = f64::from(grid.cell).powi(3) * f64::from(grid.aspect);
-        let n_levels = of.n_levels.clamp(1, 31);
+        // At most as many as 32 bits can shift by; the cells of a grid end long before.
+        let n_levels = of.n_levels.clamp(1, u32::BITS - 1);
         let cells = |level: u32| grid.n_cells.map(|n| n.div_ceil(1 << level));
         let n_total = |level: u32| cells(level).iter().product::<u32>();
         let mut i_next = 0;

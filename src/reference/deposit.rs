@@ -28,12 +28,11 @@ pub fn deposit(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
 /// ones.
 ///
 /// Error: mass is kept. A blob's density differs by at most 9e-3 of its peak from that on the
-/// finest cells. What is deposited and spread has the same variance and is even, so that the
-/// difference begins with the fourth cumulant: −h⁴/120 of a cell of edge h, and −5h⁴/120 of being
-/// spread to ever finer ones by five coins each. Over σ⁴, an eighth of −h⁴/20 is the share by which
-/// the peak changes, on each axis: 3.7e-3 together, as σ is 1.5h or more. Where the blob is cut at
-/// 3σ, a hundredth of the peak ends at once. Half of that ends within a wide cell, 5.6e-3, and the
-/// other axes change 2.5e-3.
+/// finest cells. Deposit and spread are even and keep the variance, so the difference begins with
+/// the fourth cumulant. A cell of edge h has −h⁴/120. The binomial shares of all levels have
+/// −5h⁴/120. Over σ⁴, an eighth of −h⁴/20 is the share by which the peak changes, on each axis:
+/// 3.7e-3 together, as σ is 1.5h or more. Where the blob is cut at 3σ, a hundredth of the peak ends
+/// at once. Half of that ends within a wide cell, 5.6e-3, and the other axes change 2.5e-3.
 pub fn deposit_by_levels(spec: &GridSpec, blobs: &[Blob], n_levels: u32) -> Vec<f64> {
     let mut of_level = vec![Vec::new(); n_levels as usize];
     for blob in dense(blobs) {

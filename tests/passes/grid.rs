@@ -304,11 +304,19 @@ fn two_words_hold_what_overflows_one() {
     }
 }
 
+/// Asserts that every change of a shader, (file, from, to), leads beyond the bounds.
+fn assert_noticed(scene: &Scene, mutations: &[(&str, &str, &str)]) {
+    let mut gpu = Gpu::new();
+    let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());
+    for (file, from, to) in mutations {
+        let values = scene.run(&mut gpu, &Gpu::wrong_compiler(file, from, to));
+        assert!(check_within("wrong", &values, &truths, &bounds).is_err(), "{to} was not noticed");
+    }
+}
+
 #[test]
 fn a_wrong_shader_is_noticed() {
-    let mut gpu = Gpu::new();
     let scene = Scene::fitted(&scattered(500), 32);
-    let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());
     let mutations = [
         ("grid_deposit.comp", "0.9973002039367398", "0.9974"),
         ("grid_deposit.comp", "15.7496099457224", "15.75"),
@@ -320,18 +328,13 @@ fn a_wrong_shader_is_noticed() {
             "begin.x + y + row * (begin.y + x)",
         ),
     ];
-    for (file, from, to) in mutations {
-        let values = scene.run(&mut gpu, &Gpu::wrong_compiler(file, from, to));
-        assert!(check_within("wrong", &values, &truths, &bounds).is_err(), "{to} was not noticed");
-    }
+    assert_noticed(&scene, &mutations);
 }
 
 #[test]
 fn a_wrong_grid_of_wide_cells_is_noticed() {
-    let mut gpu = Gpu::new();
     let scene = Scene::fitted(&wide(1400), 64);
     assert!(scene.n_levels() > 2);
-    let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());
     let mutations = [
         ("grid_deposit.comp", "const float LEVEL_SIGMA = 1.5", "const float LEVEL_SIGMA = 1.6"),
         ("grid_deposit.comp", "0.5 * (edge * edge - 1.0)", "0.5 * edge * edge"),
@@ -344,10 +347,7 @@ fn a_wrong_grid_of_wide_cells_is_noticed() {
         ("grid_spread.comp", "max(own.x, 1u) - 1u", "own.x"),
         ("grid_spread.comp", "uint first = push.i_first_wider", "uint first = push.i_first"),
     ];
-    for (file, from, to) in mutations {
-        let values = scene.run(&mut gpu, &Gpu::wrong_compiler(file, from, to));
-        assert!(check_within("wrong", &values, &truths, &bounds).is_err(), "{to} was not noticed");
-    }
+    assert_noticed(&scene, &mutations);
 }
 
 #[test]

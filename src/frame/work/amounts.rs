@@ -228,8 +228,8 @@ const LEAST_SIGMA: f64 = 1.322;
 
 /// Returns the least number of cells that blobs reach. A blob of σ reaches over 6σ along each axis,
 /// which is at least 6σ/h cells of edge h, and one. The product is convex in σ, so that the blobs
-/// of a group reach at least as many as if all had their mean σ. A blob on wider cells has
-/// [`LEAST_SIGMA`] cells and more a σ, as if cells were as wide as to give the widest blob so many.
+/// of a group reach at least as many as if all had their mean σ. A blob on wider cells has at least
+/// [`LEAST_SIGMA`] of them a σ. Any blob has fewer of cells of which the widest blob has so many.
 fn deposits(scene: &Scene, packet: &Packet) -> f64 {
     let widest = packet.extents.iter().map(|e| e.sigma_max).fold(0.0, f64::max);
     let least = if packet.n_levels > 1 { widest / LEAST_SIGMA } else { 0.0 };

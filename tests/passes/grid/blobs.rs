@@ -64,7 +64,7 @@ pub fn paper() -> Vec<Blob> {
     boxes.iter().zip(0..).flat_map(of_box).collect()
 }
 
-/// Small blobs whose cut ends within rounding of a cell's face, on either side of it: where
+/// Small blobs whose cut ends within rounding of a cell's face, on either side of it. Where
 /// rounding makes the share of the cell beyond negative, it must not become 2³² quanta.
 pub fn at_the_cut() -> Vec<Blob> {
     let blob = |i: u32| {

@@ -53,8 +53,9 @@ impl Cluster {
     fn command(&self, verb: &[&str], rest: &[&str]) -> Command {
         let mut command = Command::new(TOOL);
         command.args(verb).arg(self.folder.path()).args(rest);
-        // A stopped run may hold the lock of Mesa's cache, which all others wait for.
-        command.env("MESA_SHADER_CACHE_DISABLE", "true");
+        // A stopped run may hold the lock of Mesa's cache, which all others wait for. A cache of
+        // many files has no such lock.
+        command.env("MESA_DISK_CACHE_MULTI_FILE", "true");
         command
     }
 

@@ -16,9 +16,9 @@ pub type Ran = (Option<i32>, String, String);
 
 pub fn nimbus(args: &[&str]) -> Command {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
-    // Newer versions of Mesa lock their cache of shaders while they write to it. A run that is
-    // stopped then would hold up all others.
-    command.env("NIMBUS_PROGRESS_S", "0").env("MESA_SHADER_CACHE_DISABLE", "true");
+    // Newer versions of Mesa lock the one file of their cache of shaders while they write to it. A
+    // run that is stopped then would hold up all others. A cache of many files has no such lock.
+    command.env("NIMBUS_PROGRESS_S", "0").env("MESA_DISK_CACHE_MULTI_FILE", "true");
     command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
     command.env_remove("SLURMD_NODENAME").env_remove("NIMBUS_EXCLUSIVE");
     command

@@ -115,6 +115,19 @@ fn peers_are_compared_with_their_laws() {
     let output = command.output().expect("Python runs");
     assert!(output.status.success(), "{}", said(&output));
     assert!(said(&output).contains("all as expected"), "{}", said(&output));
+
+    let schema = fs::read_to_string(Path::new(ROOT).join("docs/reference/schemas/run.schema.json"));
+    let schema = serde_json::from_str(&schema.expect("a schema")).expect("JSON");
+    let schema = jsonschema::validator_for(&schema).expect("a schema");
+    for name in ["nimbus", "other"] {
+        let run = dir.path().join("runs").join(name);
+        let record = fs::read(run.join("run.json")).expect("run.json");
+        let record: Value = serde_json::from_slice(&record).expect("JSON");
+        let wrong: Vec<_> = schema.iter_errors(&record).map(|error| error.to_string()).collect();
+        assert!(wrong.is_empty(), "{name}: {wrong:?}");
+        let table = succeed(&[READER, run.to_str().expect("UTF-8")]);
+        assert_eq!(table.contains("drawn by other 1.2"), name == "other", "{table}");
+    }
 }
 
 #[test]

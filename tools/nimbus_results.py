@@ -710,6 +710,8 @@ class Metadata:
     """Version of nimbus."""
     revision: Optional[str] = None
     """Git revision that was built, with "-dirty" if sources differed from it."""
+    tool: Optional[str] = None
+    """Name and version of the program that drew; None: nimbus."""
     date: Optional[str] = None
     """Start, UTC, ISO 8601."""
     command: Optional[List[str]] = None
@@ -766,6 +768,7 @@ def _metadata(kind: str, path: Path, record: Optional[_Node], verified: bool) ->
         shown,
         nimbus=record["nimbus"].text(),
         revision=record["revision"].text(),
+        tool=record.get("tool").text_or_empty() or None,
         date=record["date"].text(),
         device=device["name"].text(),
         driver=device["driver"].text(),
@@ -800,6 +803,8 @@ class _Result:
         if about.device is not None:
             lines.append(_plain(f"{about.device}; {about.driver}"))
             lines.append(_plain(f"nimbus {about.nimbus} ({about.revision}); {about.date}"))
+        if about.tool is not None:
+            lines.append(_plain(f"drawn by {about.tool}"))
         if about.scene_hash is not None:
             lines.append(f"scene {about.scene_hash[:12]}; pass times: {_plain(about.pass_times)}")
         if about.interrupted:

@@ -129,6 +129,7 @@ impl Recorder {
             schema: Run::SCHEMA,
             nimbus: env!("CARGO_PKG_VERSION").into(),
             revision: machine::revision().into(),
+            tool: None,
             date: self.date.clone(),
             command: command_line(),
             scene_hash: self.scene_hash.clone(),

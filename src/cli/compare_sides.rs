@@ -34,7 +34,7 @@ pub fn allowed<'a>(
 pub fn side(folder: &Path, run: &Run) -> Value {
     json!({
         "folder": folder.display().to_string(), "date": run.date, "nimbus": run.nimbus,
-        "revision": run.revision,
+        "revision": run.revision, "program": run.program(),
         "device": format!("{} ({})", run.device.name, run.device.driver),
         "scene_hash": run.scene_hash,
     })
@@ -65,9 +65,9 @@ pub fn line(d: &Difference) -> String {
 
 /// Returns the line that names a compared run.
 pub fn side_line(name: &str, folder: &Path, run: &Run) -> String {
-    let (folder, Run { date, nimbus, revision, device, .. }) = (folder.display(), run);
+    let (folder, Run { date, device, .. }) = (folder.display(), run);
     let device = format!("{} ({})", device.name, device.driver);
-    format!("{name}  {folder}, {date}, nimbus {nimbus} {revision}, {device}\n")
+    format!("{name}  {folder}, {date}, {}, {device}\n", run.program())
 }
 
 /// Returns the verdict in words, with the frames that would decide it.

@@ -15,7 +15,7 @@ use super::records::Run;
 pub enum Condition {
     /// Device, driver, processor, and variables that change what drivers do
     Device,
-    /// Version and revision of nimbus
+    /// Version and revision of nimbus, or another program
     Build,
     /// The scene's settings and files
     Scene,
@@ -73,6 +73,7 @@ pub fn differences(a: &Run, b: &Run) -> Vec<Difference> {
         (Condition::Device, "caches", |r| caches(r).to_owned()),
         (Condition::Build, "version", |r| r.nimbus.clone()),
         (Condition::Build, "revision", |r| r.revision.clone()),
+        (Condition::Build, "program", |r| r.tool.clone().unwrap_or_else(|| "nimbus".to_owned())),
     ] {
         let values = [of(a), of(b)];
         if kind == Condition::Build && what == "version" {
@@ -160,7 +161,8 @@ fn add_leaves(value: &Value, at: &str, leaves: &mut BTreeMap<String, String>) {
 /// commands.
 pub(super) fn remarks(a: &Run, b: &Run) -> Vec<String> {
     let mut remarks = Vec::new();
-    if a.revision == b.revision && (a.revision == "unknown" || a.revision.ends_with("-dirty")) {
+    let is_one_program = a.revision == b.revision && a.tool == b.tool;
+    if is_one_program && (a.revision == "unknown" || a.revision.ends_with("-dirty")) {
         let revision = &a.revision;
         remarks.push(format!(
             "both builds have the revision {revision}: their sources may differ all the same"

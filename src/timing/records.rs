@@ -27,6 +27,9 @@ pub struct Run {
     /// Git revision that was built, with "-dirty" if sources were modified; "unknown" outside a
     /// checkout.
     pub revision: String,
+    /// Name and version of the program that drew; absent if nimbus did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool: Option<String>,
     /// Start of the run, UTC, ISO 8601.
     pub date: String,
     /// The command line.
@@ -80,6 +83,12 @@ impl Run {
     /// Returns the number of starts of the program that ran blocks.
     pub fn n_starts(&self) -> usize {
         self.block_order.iter().map(|block| block.start).collect::<BTreeSet<u32>>().len()
+    }
+
+    /// Returns the name and version of the program that drew.
+    pub fn program(&self) -> String {
+        let ours = || format!("nimbus {} {}", self.nimbus, self.revision);
+        self.tool.clone().unwrap_or_else(ours)
     }
 
     /// Returns every loop with its case, in order.

@@ -15,6 +15,7 @@ use crate::timing::machine::{Clocks, Cpu, Device};
 struct Origin {
     nimbus: String,
     revision: String,
+    tool: Option<String>,
     date: String,
     command: Vec<String>,
     scene_file: Option<String>,
@@ -72,6 +73,7 @@ pub fn section(record: &impl Serialize) -> Result<Markup> {
                 "; times of passes: " (how)
             }
             dt { "Date" } dd { time datetime=(origin.date) { (origin.date) } }
+            @if let Some(tool) = &origin.tool { dt { "Drawn by" } dd { (tool) } }
             dt { "nimbus" } dd { (origin.nimbus) ", revision " code { (origin.revision) } }
             dt { "Command" } dd { code { (origin.command.join(" ")) } }
             @if let Some(file) = &origin.scene_file { dt { "Scene" } dd { code { (file) } } }

@@ -1,16 +1,18 @@
-// Serves page.html to Chromium, has it draw the frames of a job, and prints the result.
+// Serves a page to Chromium, has it draw the frames of a job, and prints the result.
+//     node draw.mjs JOB PAGE
 import fs from 'fs';
 import http from 'http';
 import path from 'path';
 import puppeteer from 'puppeteer-core';
 
 const here = path.dirname(new URL(import.meta.url).pathname);
-const job = JSON.parse(fs.readFileSync(process.argv[2], 'utf8'));
+const [, , job_file, page_file] = process.argv;
+const job = JSON.parse(fs.readFileSync(job_file, 'utf8'));
 const kinds = { '.js': 'text/javascript', '.html': 'text/html' };
 
 const server = http.createServer((request, response) => {
   const url = request.url.split('?')[0];
-  const own = path.join(here, url === '/' ? 'page.html' : url);
+  const own = path.join(here, url === '/' ? page_file : url);
   const file = url === '/particles' ? job.particles : own;
   try {
     const body = fs.readFileSync(file);
@@ -52,7 +54,9 @@ try {
   const { png, ...result } = await page.evaluate(job => window.draw(job), job);
   fs.writeFileSync(`${job.picture}.png`, Buffer.from(png.split(',')[1], 'base64'));
   const memory_bytes = memoryOf(String(browser.process().pid));
-  console.log(JSON.stringify({ ...result, memory_bytes, picture: `${job.picture}.png` }));
+  const picture = `${job.picture}.png`;
+  // Chromium rounds its clock to 0.1 ms.
+  console.log(JSON.stringify({ ...result, clock_ns: 1e5, memory_bytes, picture }));
 } finally {
   await browser.close();
   server.close();

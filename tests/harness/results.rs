@@ -57,6 +57,7 @@ pub fn run(modes: Vec<Mode>) -> Run {
         schema: Run::SCHEMA,
         nimbus: "0.1.0".to_owned(),
         revision: "0123456789ab".to_owned(),
+        tool: None,
         date: "2024-02-29T12:34:56Z".to_owned(),
         command: ["nimbus", "bench", "a.toml", "--out", "a"].map(str::to_owned).to_vec(),
         scene_hash: "ab".repeat(32),

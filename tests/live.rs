@@ -12,12 +12,12 @@ use harness::Gpu;
 use nimbus::frame::Game;
 use nimbus::frame::Renderer;
 use nimbus::frame::plan::Pass;
-use nimbus::frame::{parallel, serial};
+use nimbus::frame::{open_sides, parallel, serial};
 use nimbus::gpu::Compiler;
 use nimbus::io::scene_file;
 use nimbus::model::cloud::CloudSource;
 use nimbus::model::disc::Disc;
-use nimbus::model::scene::{Scene, Simulate, Threading};
+use nimbus::model::scene::{Scene, Threading};
 use nimbus::reference::live::alive;
 use nimbus::reference::picture::FrameReference;
 
@@ -43,13 +43,7 @@ fn disc(scene: &Scene) -> (Disc, u32, DVec3) {
 }
 
 fn started(gpu: &Gpu, compiler: &Compiler, scene: Scene, skip: bool) -> (Renderer, Game) {
-    let scene = Arc::new(scene);
-    let mut renderer = Renderer::new(&gpu.device, compiler, &scene, skip).expect("a renderer");
-    let rest = match scene.threads.simulate {
-        Simulate::Gpu => None,
-        Simulate::Cpu => Some(renderer.generate_now(&gpu.device).expect("particles").0),
-    };
-    (renderer, Game::new(scene, rest).with_culling(skip))
+    open_sides(&gpu.device, compiler, &Arc::new(scene), skip).expect("both sides")
 }
 
 fn draw(renderer: &mut Renderer, game: &mut Game, i_frame: u32) -> Vec<u8> {

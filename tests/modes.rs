@@ -11,10 +11,10 @@ use nimbus::frame::FrameTimes;
 use nimbus::frame::Game;
 use nimbus::frame::Renderer;
 use nimbus::frame::plan::Pass;
-use nimbus::frame::{parallel, serial};
+use nimbus::frame::{open_sides, parallel, serial};
 use nimbus::io::scene_file;
 use nimbus::model::camera::CameraKey;
-use nimbus::model::scene::{DrawPath, Scene, Simulate, Threading};
+use nimbus::model::scene::{DrawPath, Scene, Threading};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -49,12 +49,8 @@ fn run_for(
 ) -> Vec<(Vec<u8>, FrameTimes)> {
     let gpu = Gpu::new();
     let scene = Arc::new(scene);
-    let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, skip).expect("a renderer");
-    let rest = match scene.threads.simulate {
-        Simulate::Gpu => None,
-        Simulate::Cpu => Some(renderer.generate_now(&gpu.device).expect("particles").0),
-    };
-    let mut game = Game::new(scene.clone(), rest).with_culling(skip);
+    let (mut renderer, mut game) =
+        open_sides(&gpu.device, &gpu.compiler, &scene, skip).expect("both sides");
     let mut frames = Vec::new();
     let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
         frames.push((renderer.image_bytes()?, times));
@@ -317,11 +313,8 @@ fn the_game_thread_and_the_gpu_place_particles_alike() {
     let placed = |simulate: &str| {
         let gpu = Gpu::new();
         let scene = Arc::new(scene(&[simulate, "cloud.0.grow_to=1.5", "cloud.0.grow_time_s=0.5"]));
-        let mut renderer =
-            Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
-        let rest = renderer.generate_now(&gpu.device).expect("particles").0;
-        let rest = (scene.threads.simulate == Simulate::Cpu).then_some(rest);
-        let mut game = Game::new(scene.clone(), rest);
+        let (mut renderer, mut game) =
+            open_sides(&gpu.device, &gpu.compiler, &scene, true).expect("both sides");
         renderer.step(game.step(3).expect("a packet")).expect("a frame");
         renderer.placed(&gpu.device).expect("places")
     };

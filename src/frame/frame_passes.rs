@@ -7,7 +7,7 @@ use super::features::{
     SceneFeatures, has_bounces, has_diffusion, has_second, has_slopes, is_grouped, is_medium,
 };
 use super::gather::IndirectGather;
-use super::live::{LiveParticles, PlacedUploads};
+use super::live::{LiveParticles, PlacedUploads, unmoved};
 use super::morton_sort::FacetRuns;
 use super::packet::Packet;
 use super::picture::Picture;
@@ -129,7 +129,8 @@ impl FramePasses {
         if let Some(live) = &mut self.live {
             live.write(slot, packet)?;
         }
-        if let (Some(uploads), Some(placed)) = (&mut self.placed_uploads, &packet.placed) {
+        if let Some(uploads) = &mut self.placed_uploads {
+            let placed = packet.placed.as_ref().ok_or_else(|| unmoved("places of particles"))?;
             uploads.placed.write(slot, placed)?;
         }
         let order = self.gather.iter_mut().filter_map(|gather| gather.order.as_mut());

@@ -4,7 +4,7 @@
 use super::features::{discs, has_live, has_live_on_host};
 use super::packet::Packet;
 use super::staging::{StagedBuffer, Staging, UploadBuffers};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{BufferSpec, Compiler, Device, buffers};
 use crate::layout::disc::DiscRecord;
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
@@ -111,9 +111,15 @@ impl LiveParticles {
         match (self, &packet.live) {
             (LiveParticles::Device { buffers, .. }, _) => buffers.discs.write(slot, &packet.discs),
             (LiveParticles::Host(uploads), Some(live)) => uploads.particles.0[slot].write(live),
-            (LiveParticles::Host(_), None) => Ok(()),
+            (LiveParticles::Host(_), None) => Err(unmoved("particles")),
         }
     }
+}
+
+/// Returns the fault of a packet without what the game thread moves. The device would draw what
+/// its memory had before.
+pub(super) fn unmoved(what: &str) -> Error {
+    Error::Fault { what: format!("a packet without {what}, which the game thread moves") }
 }
 
 /// Lists the sizes of the buffers of particles that move.

@@ -68,6 +68,7 @@ pub use pipelines::pipelines;
 pub use player::Player;
 pub use renderer::{Rendered, Renderer};
 pub use reshape::Reshaped;
+pub use sides::open_sides;
 pub use stage::{DeviceChoice, GpuContext, Stage};
 pub use still::{is_still, plan_of_frame};
 pub use tensor_shape::{Block, Shape, basis_of};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::choice::{Choice, ImpostorChoice, LightChoice, choose_light};
 use super::game::Game;
 use super::renderer::Renderer;
-use super::sides::open;
+use super::sides::open_sides;
 use crate::error::{Error, Result};
 use crate::gpu::{Compiler, Device};
 use crate::model::scene::{Impostors, Scene};
@@ -67,7 +67,7 @@ fn with_given_impostors(
     mut scene: Arc<Scene>,
     skip: bool,
 ) -> Result<Player> {
-    let (mut renderer, mut game) = open(device, compiler, &scene, skip)?;
+    let (mut renderer, mut game) = open_sides(device, compiler, &scene, skip)?;
     let (draw, choices) = renderer.choose(device, compiler, &scene, &mut game)?;
     if draw != scene.draw {
         Arc::make_mut(&mut scene).draw = draw;

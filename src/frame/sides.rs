@@ -13,7 +13,7 @@ use crate::model::scene::{Scene, Simulate};
 ///
 /// # Errors
 /// Fails if the scene exceeds a limit of the device or a shader does not compile.
-pub(super) fn open(
+pub fn open_sides(
     device: &Device,
     compiler: &Compiler,
     scene: &Arc<Scene>,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::program;
 use nimbus::error::Error;
-use nimbus::frame::{DeviceChoice, Game, GpuContext, Renderer};
+use nimbus::frame::{DeviceChoice, GpuContext, open_sides};
 use nimbus::gpu::{DeviceOptions, LoweredLimits};
 use nimbus::io::scene_file;
 use nimbus::model::scene::{DrawPath, Scene};
@@ -40,8 +40,7 @@ fn scene(path: &Path, draw: DrawPath) -> Scene {
 /// Draws one frame with all knobs exact.
 fn picture(context: &GpuContext, scene: &Scene) -> Result<Vec<u8>, Error> {
     let scene = Arc::new(scene.exact().into_owned());
-    let mut renderer = Renderer::new(&context.device, context.compiler(), &scene, true)?;
-    let mut game = Game::new(scene, None);
+    let (mut renderer, mut game) = open_sides(&context.device, context.compiler(), &scene, true)?;
     renderer.step(game.step(0)?)?;
     renderer.image_bytes()
 }

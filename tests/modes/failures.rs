@@ -27,6 +27,16 @@ fn an_error_of_the_game_step_ends_both_loops() {
 }
 
 #[test]
+fn a_packet_without_the_places_that_the_game_thread_computes_is_refused() {
+    let gpu = Gpu::new();
+    let scene = Arc::new(scene(&["threads.simulate=cpu"]));
+    let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+    let packet = Game::new(scene.clone(), None).step(0).expect("a packet");
+    let error = renderer.step(packet).map(|_| ()).expect_err("no places").to_string();
+    assert!(error.contains("a packet without places of particles"), "{error}");
+}
+
+#[test]
 fn a_panic_of_the_game_thread_ends_both_sides_with_what_it_said() {
     let gpu = Gpu::new();
     let scene = Arc::new(scene(&["threads.simulate=cpu"]));

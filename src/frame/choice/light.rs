@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::knobs::toml_name;
 use crate::error::{Error, Result};
-use crate::frame::sides::open;
+use crate::frame::sides::open_sides;
 use crate::gpu::{Compiler, Device};
 use crate::model::scene::{LightBudget, Lighting, LightingMode, RUNGS, Rung, Scene};
 
@@ -140,7 +140,7 @@ pub(in crate::frame) fn choose_light(
 /// without timestamps. `None` if it does not fit the device.
 fn frame_ms(device: &Device, compiler: &Compiler, scene: Scene) -> Result<Option<f64>> {
     let scene = Arc::new(Scene { draw: scene.draw.exact(), ..scene });
-    let (mut renderer, mut game) = match open(device, compiler, &scene, true) {
+    let (mut renderer, mut game) = match open_sides(device, compiler, &scene, true) {
         Err(Error::Limit { .. }) => return Ok(None),
         opened => opened?,
     };

@@ -51,7 +51,7 @@ def check_splat(peers, focal):
     wide = image + 0.3 * np.eye(2)
     fade = math.sqrt(np.linalg.det(image) / np.linalg.det(wide))
     center = projected(place, focal)
-    for i, j in [(475, 272), (477, 270)]:
+    for i, j in [(468, 272), (470, 270)]:
         off = np.array([i + 0.5 - 400, 300 - j - 0.5]) - center
         by_hand = opacity * fade * math.exp(-0.5 * off @ np.linalg.inv(wide) @ off)
         if by_hand < 1e-3:

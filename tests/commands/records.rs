@@ -141,6 +141,7 @@ fn sample() -> Run {
     Run {
         nimbus: env!("CARGO_PKG_VERSION").to_owned(),
         revision: revision().to_owned(),
+        tool: Some("another program 1.2".to_owned()),
         date: utc_now(),
         cpu: cpu(),
         cases: vec![case],
@@ -208,6 +209,15 @@ fn a_run_of_one_process_has_no_parts() {
     let value = serde_json::to_value(Run { parts: Vec::new(), ..sample() }).unwrap();
     assert!(value.get("parts").is_none());
     assert!(serde_json::from_value::<Run>(value).unwrap().parts.is_empty());
+}
+
+#[test]
+fn a_run_of_nimbus_names_no_other_program() {
+    let run = Run { tool: None, ..sample() };
+    assert_eq!(run.program(), format!("nimbus {} {}", run.nimbus, run.revision));
+    let value = serde_json::to_value(run).unwrap();
+    assert!(value.get("tool").is_none());
+    assert_eq!(complaints(&value), [""; 0]);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! one line which limit it needs.
 
 use std::collections::BTreeSet;
+use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -30,7 +31,12 @@ fn open(limits: Option<LoweredLimits>) -> GpuContext {
 /// A scene small enough that a test draws it many times: fewer particles and pixels, and a grid
 /// that still has more texels than the least that Vulkan promises.
 fn scene(path: &Path, draw: DrawPath) -> Scene {
-    let set = ["film.width=64", "film.height=48"].map(str::to_owned);
+    let text = fs::read_to_string(path).expect("a scene");
+    let is_weather = text.contains("from = \"weather\"");
+    // Weather has a number of particles of its own.
+    let fewer = is_weather.then_some("cloud.0.particles=2000");
+    let set: Vec<String> =
+        ["film.width=64", "film.height=48"].into_iter().chain(fewer).map(str::to_owned).collect();
     let mut scene = scene_file::load(path, &set, None).expect("a scene").scene;
     scene.draw.n_particles = scene.draw.n_particles.min(2000);
     scene.draw.path = draw;

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use nimbus::frame::{Game, Renderer};
+use nimbus::frame::open_sides;
 use nimbus::gpu::Compiler;
 use nimbus::io::scene_file;
 use nimbus::model::frame_state::FrameState;
@@ -108,9 +108,8 @@ pub struct Lit {
 
 /// Returns the light of the facets on the device.
 pub fn on_device(gpu: &Gpu, compiler: &Compiler, scene: &Scene) -> Lit {
-    let mut renderer =
-        Renderer::new(&gpu.device, compiler, &Arc::new(scene.clone()), true).expect("a renderer");
-    let mut game = Game::new(Arc::new(scene.clone()), None);
+    let (mut renderer, mut game) =
+        open_sides(&gpu.device, compiler, &Arc::new(scene.clone()), true).expect("both sides");
     renderer.step(game.step(0).expect("a packet")).expect("a frame");
     let (facets, lit) = renderer.facets(&gpu.device).expect("facets");
     let slopes = renderer.slopes(&gpu.device).expect("slopes");

@@ -52,9 +52,10 @@ def processor():
     return {"model": model[1].strip() if model else "unknown", "logical_cores": cores}
 
 
-def measured(values):
-    """Returns a summary with the interval of the median."""
-    interval = nimbus_results.median_interval(values)
+def measured(values, n_rounds):
+    """Returns a summary, with the interval of the median for one round. Frames of a round do not
+    tell how starts of a program differ; `nimbus compare` compares the rounds with each other."""
+    interval = nimbus_results.median_interval(values) if n_rounds == 1 else None
     ends = [interval.low, interval.high] if interval else [None, None]
     return {**nimbus_results.summary(values), "p50_low": ends[0], "p50_high": ends[1]}
 
@@ -82,7 +83,7 @@ def case_of(size, results, error):
     view, times = size["view"], [ms for result in results for ms in result["frame_ms"]]
     mode = {
         "threading": "serial", "skip": True, "simulate": "cpu", "frames": len(times),
-        "warm_up": 1 + view["warm_up"], "blocks": len(results), "frame_ms": measured(times),
+        "warm_up": 1 + view["warm_up"], "blocks": len(results), "frame_ms": measured(times, len(results)),
         "frame_lows": nimbus_results.lows(times), **dict.fromkeys(STEPS), "queue_depth": 0.0,
         "drawn": [float(size["n"])] * 3, "impostors_reused": 0, "passes": [],
         "image_hash": None, "block_spread": None,

@@ -109,6 +109,7 @@ pub(super) fn gather_variant(scene: &Scene, device: &Device, has_tree: bool) -> 
     GatherVariant {
         has_clouds: scene.n_particles() > 0,
         has_tree,
+        is_diffuse: (0..scene.n_regions()).any(|i| !is_glossy(scene, i)),
         is_glossy: has_glossy(scene),
         is_wide: is_wide(device),
         budget: iteration_budget(scene, device),

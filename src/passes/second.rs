@@ -169,6 +169,8 @@ pub struct GatherVariant {
     pub has_clouds: bool,
     /// Sources are the nodes of a tree.
     pub has_tree: bool,
+    /// Some region has no specular lobe.
+    pub is_diffuse: bool,
     /// Some region has a specular lobe.
     pub is_glossy: bool,
     /// Few registers are used, at the cost of more loads: for devices that are no CPU.
@@ -177,8 +179,9 @@ pub struct GatherVariant {
     pub budget: IterationBudget,
 }
 
-/// The gather kernels, for receivers without and with a lobe.
-struct Gather([Kernel; 2]);
+/// The gather kernels, for receivers without and with a lobe; `None` where there are no such
+/// receivers.
+struct Gather([Option<Kernel>; 2]);
 
 impl Gather {
     fn new(
@@ -204,7 +207,9 @@ impl Gather {
             let macros = [&shared[..], macros].concat();
             Kernel::with_macros(device, compiler, name, GatherPush::FIELDS, &[], &macros)
         };
-        Ok(Gather([kernel(0)?, kernel(1)?]))
+        let diffuse = variant.is_diffuse.then(|| kernel(0)).transpose()?;
+        let glossy = variant.is_glossy.then(|| kernel(1)).transpose()?;
+        Ok(Gather([diffuse, glossy]))
     }
 
     /// Records a round. The first one has a workgroup a block, every other one as many as the round
@@ -216,7 +221,8 @@ impl Gather {
         push: &GatherPush,
         (receivers, n_blocks): (Receivers, u32),
     ) -> Result<()> {
-        let (kernel, all) = (&self.0[receivers as usize], buffers.by_binding());
+        let Some(kernel) = &self.0[receivers as usize] else { return Ok(()) };
+        let all = buffers.by_binding();
         match push.i_round {
             0 => rec.dispatch_blocks(kernel, &all, push, n_blocks),
             i => rec.dispatch_indirect(kernel, &all, push, (buffers.rounds, 3 * i)),

@@ -10,7 +10,7 @@ pub fn digest(particles: &[Particle]) -> [u8; 32] {
     let mut hash = Sha256::new();
     for p in particles {
         let ([x, y, z], [r, g, b]) = (p.position.to_array(), p.color.to_array());
-        let all = [x, y, z, p.sigma, p.aspect, p.kappa, r, g, b].map(f64::to_le_bytes);
+        let all = [x, y, z, p.sigma, p.shape.aspect, p.kappa, r, g, b].map(f64::to_le_bytes);
         hash.update(all.as_flattened());
     }
     hash.finalize().into()

@@ -11,7 +11,7 @@ use super::bounds::{LEAST, rounded, wrong_coordinate, wrong_size};
 use super::document::suggest::{did_you_mean, list, shown};
 use super::text_file::line_column;
 use crate::error::{Error, Place, Result};
-use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS};
+use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, Shape};
 
 const COLUMNS: [&str; 10] = ["x", "y", "z", "sigma", "radius", "sigma_y", "kappa", "r", "g", "b"];
 const POSITION: std::ops::Range<usize> = 0..3;
@@ -209,7 +209,7 @@ impl Columns {
         Ok(Particle {
             position: DVec3::new(x?, y?, z?),
             sigma,
-            aspect,
+            shape: Shape::upright(aspect),
             kappa: size(KAPPA)?.unwrap_or(0.0),
             color: DVec3::new(r?.unwrap_or(1.0), g?.unwrap_or(1.0), b?.unwrap_or(1.0)),
         })
@@ -239,7 +239,7 @@ mod tests {
         let list = good("kappa, b,g,r, radius,z,y,x\n2,0.3,0.2,0.1,6,-3,2,1\n");
         let position = DVec3::new(1.0, 2.0, -3.0);
         let expected = Particle {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position,
             sigma: 2.0,
             kappa: 2.0,
@@ -247,7 +247,7 @@ mod tests {
         };
         assert_eq!(list, [expected]);
         let flat = good("x,y,z,sigma,sigma_y,kappa\n1,2,-3,2,0.5,2\n0,0,0,0,7,1\n");
-        assert_eq!([flat[0].aspect, flat[1].aspect], [0.25, 1.0]);
+        assert_eq!([flat[0].shape, flat[1].shape], [Shape::upright(0.25), Shape::BALL]);
         let plain = good("\n\"x\",y,z,sigma,kappa\r\n\r\n1,2,-3, 2.0 ,\"2\"\r\n \r\n");
         assert_eq!(plain, [Particle { color: DVec3::ONE, ..expected }]);
         assert_eq!(good("x,y,z,sigma,kappa"), []);

@@ -70,7 +70,7 @@ impl ParticleRecord {
             sigma: particle.sigma as f32,
             color: particle.color.as_vec3().to_array(),
             kappa: particle.kappa as f32,
-            aspect: particle.aspect as f32,
+            aspect: particle.shape.aspect as f32,
             unused: 0.0,
             unused_too: [0.0; 2],
         }

@@ -9,8 +9,9 @@ pub use super::group::{Group, max_blob_mass, runs};
 use super::growth::Growth;
 use super::gust::Gust;
 use super::named::named;
-pub use super::particle::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
+pub use super::particle::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
 pub use super::particle_list::ParticleList;
+pub use super::shape::{MIN_ASPECT, Shape};
 use super::texture::Texture;
 
 /// A cloud of a scene.
@@ -143,6 +144,7 @@ impl Cloud {
             sigma_mean: 0.0,
             sigma_by_area: 0.0,
             aspects: [1.0; 3],
+            is_turned: false,
             kappa_max: 0.0,
             mass_max: 0.0,
             gust_reach: self.gust.reach(),
@@ -199,6 +201,7 @@ fn list_group(list: &ParticleList, at_rest: Group) -> Group {
         sigma_mean: of.sigma_mean,
         sigma_by_area: of.sigma_by_area,
         aspects: of.aspects,
+        is_turned: of.is_turned,
         kappa_max: of.kappa_max,
         mass_max: of.mass_max,
         ..at_rest.between(of.low, of.high)
@@ -226,6 +229,7 @@ fn animated_group(m: &AnimatedParticles, at_rest: Group) -> Group {
         sigma_mean: m.sigma_mean,
         sigma_by_area: m.sigma_mean,
         aspects: [MIN_ASPECT, m.aspect_mean, 1.0 / MIN_ASPECT],
+        is_turned: false,
         kappa_max: m.kappa_max,
         mass_max: m.mass_max,
         ..at_rest.between(m.low, m.high)
@@ -283,7 +287,7 @@ mod tests {
     #[test]
     fn a_grown_group_is_similar_about_the_clouds_centre() {
         let blob = |x: f64, sigma| Particle {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position: DVec3::X * x,
             sigma,
             kappa: 2.0,
@@ -321,7 +325,7 @@ mod tests {
     #[test]
     fn the_greatest_mass_is_of_one_blob_and_not_of_two_maxima() {
         let blob = |sigma, kappa| Particle {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position: DVec3::ZERO,
             sigma,
             kappa,

@@ -6,6 +6,7 @@ use glam::DVec3;
 use super::named::named;
 use super::particle::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
 use super::philox::{philox4x32_10, uniform};
+use crate::model::shape::Shape;
 
 /// Greatest spread of a size or a lifetime; a tenth of either is left.
 pub const MAX_SPREAD: f64 = 0.9;
@@ -214,7 +215,7 @@ impl Disc {
         });
         let diluted = (born / sigma).powi(self.dilution.exponent() as i32);
         Particle {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position,
             sigma,
             kappa: self.kappa() * diluted * fades * condensed,

@@ -111,8 +111,12 @@ impl GridSpec {
         if level == 0 {
             return sigma;
         }
-        let spread = 0.5 * (f64::from(1 << level).powi(2) - 1.0);
-        (sigma * sigma - spread * self.edges() * self.edges()).map(f64::sqrt)
+        (sigma * sigma - self.spread_variance(level)).map(f64::sqrt)
+    }
+
+    /// Returns the variance along each axis that spreading from a level to the finest cells adds.
+    pub fn spread_variance(&self, level: u32) -> DVec3 {
+        0.5 * (f64::from(1 << level).powi(2) - 1.0) * self.edges() * self.edges()
     }
 
     /// Returns the number of cells.

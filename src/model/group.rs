@@ -31,8 +31,11 @@ pub struct Group {
     /// The same, weighted by the areas that particles cover: Σσ³/Σσ². Of discs and animated
     /// particles it is the plain mean.
     pub sigma_by_area: f64,
-    /// Least, mean and greatest aspect: σ along y over σ along x and z.
+    /// Least, mean and greatest aspect: σ along y over σ along x and z. Of turned ellipsoids, the
+    /// least counts as that of the shortest axis over σ.
     pub aspects: [f64; 3],
+    /// Whether some ellipsoid is not upright.
+    pub is_turned: bool,
     /// Greatest peak extinction.
     pub kappa_max: f64,
     /// Greatest mass κ (2π)^{3/2} σ² σ_y of a blob.

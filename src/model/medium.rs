@@ -189,7 +189,8 @@ impl MeanMedium {
             let medium = Medium::new(material, time_s, scene.lighting.forward);
             match &cloud.source {
                 CloudSource::Particles(list) => {
-                    let of = list.iter().map(|p| (mass(p.kappa, p.sigma) * p.aspect, p.color));
+                    let of =
+                        list.iter().map(|p| (mass(p.kappa, p.sigma) * p.shape.volume(), p.color));
                     of.for_each(|(m, color)| add(m, &medium, color));
                 }
                 _ => {

@@ -38,6 +38,7 @@ pub mod philox;
 pub mod resolution;
 pub mod scene;
 pub mod shade;
+pub mod shape;
 pub mod sort_bits;
 pub mod sums;
 pub mod surface;

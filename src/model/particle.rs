@@ -2,11 +2,10 @@
 
 use glam::DVec3;
 
+use super::shape::Shape;
+
 /// σ of a Gaussian blob over its radius: σ = R/3 (model.md §1).
 pub const SIGMA_PER_RADIUS: f64 = 1.0 / 3.0;
-
-/// Least aspect of a blob; the greatest is its inverse.
-pub const MIN_ASPECT: f64 = 1e-3;
 
 /// √(2π): the optical depth through a blob's centre is √(2π) κ σ.
 pub const SQRT_TAU: f64 = 2.506_628_274_631_000_5;
@@ -16,10 +15,10 @@ pub const SQRT_TAU: f64 = 2.506_628_274_631_000_5;
 pub struct Particle {
     /// Centre, scene units.
     pub position: DVec3,
-    /// σ along x and z, scene units.
+    /// σ along the first axis of its shape, scene units: of an upright one that along x and z.
     pub sigma: f64,
-    /// Aspect: σ along y over σ along x and z; 1 for a ball (model.md §14).
-    pub aspect: f64,
+    /// Its shape (model.md §14).
+    pub shape: Shape,
     /// κ: peak extinction per unit length.
     pub kappa: f64,
     /// Linear RGB: radiance if the lighting mode is "none", otherwise a factor on the material's
@@ -28,7 +27,7 @@ pub struct Particle {
 }
 
 /// Returns the integral of a ball's extinction, κ (2π)^{3/2} σ³. That of an ellipsoid is larger by
-/// its aspect.
+/// its shape's volume.
 pub fn mass(kappa: f64, sigma: f64) -> f64 {
     kappa * (SQRT_TAU * sigma).powi(3)
 }

@@ -35,8 +35,11 @@ pub struct Summary {
     pub sigma_mean: f64,
     /// The same, weighted by σ².
     pub sigma_by_area: f64,
-    /// Least, mean and greatest aspect.
+    /// Least, mean and greatest aspect: σ along y over σ along x and z. Of turned ellipsoids, the
+    /// least counts as that of the shortest axis over σ.
     pub aspects: [f64; 3],
+    /// Whether some ellipsoid is not upright.
+    pub is_turned: bool,
     /// Greatest κ.
     pub kappa_max: f64,
     /// Greatest integral of extinction of a particle.
@@ -54,16 +57,20 @@ impl Summary {
         let (mut sigma_max, mut sigma_y_max, mut sums) = (0.0_f64, 0.0_f64, [0.0; 3]);
         let (mut least, mut aspects, mut greatest) = (f64::INFINITY, 0.0, 0.0_f64);
         let (mut kappa_max, mut mass_max, mut i_heaviest) = (0.0_f64, 0.0_f64, 0);
-        let mut is_grey = true;
+        let (mut is_grey, mut is_turned) = (true, false);
         for (i, p) in list.iter().enumerate() {
             (low, high, center) = (low.min(p.position), high.max(p.position), center + p.position);
-            sigma_max = sigma_max.max(p.sigma);
-            sigma_y_max = sigma_y_max.max(p.sigma * p.aspect);
+            let extents = p.shape.extents();
+            sigma_max = sigma_max.max(p.sigma * extents.x.max(extents.z));
+            sigma_y_max = sigma_y_max.max(p.sigma * extents.y);
             (1..).zip(&mut sums).for_each(|(power, sum)| *sum += p.sigma.powi(power));
-            (least, greatest) = (least.min(p.aspect), greatest.max(p.aspect));
-            aspects += p.aspect;
+            let aspect = p.shape.aspect_upright();
+            let own = if p.shape.is_upright() { aspect } else { p.shape.narrowest() };
+            (least, greatest) = (least.min(own), greatest.max(aspect));
+            aspects += aspect;
+            is_turned |= !p.shape.is_upright();
             kappa_max = kappa_max.max(p.kappa);
-            let mass = mass(p.kappa, p.sigma) * p.aspect;
+            let mass = mass(p.kappa, p.sigma) * p.shape.volume();
             if mass >= mass_max {
                 (mass_max, i_heaviest) = (mass, i);
             }
@@ -90,6 +97,7 @@ impl Summary {
             mass_max,
             i_heaviest,
             is_grey,
+            is_turned,
         }
     }
 }
@@ -130,10 +138,17 @@ impl PartialEq for ParticleList {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::shape::Shape;
 
     fn blob(x: f64, sigma: f64, aspect: f64) -> Particle {
         let position = DVec3::new(x, -x, 1.0);
-        Particle { position, sigma, aspect, kappa: 2.0 / sigma, color: DVec3::ONE }
+        Particle {
+            position,
+            sigma,
+            shape: Shape::upright(aspect),
+            kappa: 2.0 / sigma,
+            color: DVec3::ONE,
+        }
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use super::shape::Shape;
+
 /// Greatest change of the light over a σ, as a share of that at the centre. A steeper slope is
 /// reduced to it.
 pub const STEEPEST: f64 = 0.25;
@@ -33,15 +35,15 @@ pub struct Shade {
 }
 
 impl Shade {
-    /// Returns the light of a blob whose σ along each axis is `sigmas`, `from_facet` away from
-    /// its facet, where the light changes by `slope` per length.
-    pub fn new(slope: DVec3, from_facet: DVec3, sigmas: DVec3) -> Shade {
+    /// Returns the light of a blob of `sigma` and `shape`, `from_facet` away from its facet, where
+    /// the light changes by `slope` per length.
+    pub fn new(slope: DVec3, from_facet: DVec3, sigma: f64, shape: &Shape) -> Shade {
         let base = (1.0 + slope.dot(from_facet)).clamp(0.0, MOST_OF_FACET);
         if base == 0.0 {
             return Shade { base, slope: DVec3::ZERO };
         }
         let slope = slope / base;
-        let steep = (slope * sigmas).length();
+        let steep = sigma * shape.stretch(slope).length();
         Shade { base, slope: if steep > STEEPEST { slope * (STEEPEST / steep) } else { slope } }
     }
 }
@@ -79,16 +81,16 @@ mod tests {
 
     #[test]
     fn slopes_are_limited_by_the_blobs_size() {
-        let small = Shade::new(DVec3::X * 0.5, DVec3::ZERO, DVec3::splat(0.4));
+        let small = Shade::new(DVec3::X * 0.5, DVec3::ZERO, 0.4, &Shape::BALL);
         assert_eq!(small, Shade { base: 1.0, slope: DVec3::X * 0.5 });
-        let wide = Shade::new(DVec3::X * 0.5, DVec3::ZERO, DVec3::new(4.0, 0.1, 4.0));
+        let wide = Shade::new(DVec3::X * 0.5, DVec3::ZERO, 4.0, &Shape::upright(0.025));
         assert_eq!(wide, Shade { base: 1.0, slope: DVec3::X * 0.0625 });
         // 1 + ½ at a member of a group; a third of the facet's slope is its own. None below 0.
-        let member = Shade::new(DVec3::X * 0.5, DVec3::X, DVec3::splat(0.1));
+        let member = Shade::new(DVec3::X * 0.5, DVec3::X, 0.1, &Shape::BALL);
         assert!((member.base - 1.5).abs() < 1e-15 && (member.slope.x - 1.0 / 3.0).abs() < 1e-15);
-        let dark = Shade::new(DVec3::X * 0.5, DVec3::X * -3.0, DVec3::ONE);
+        let dark = Shade::new(DVec3::X * 0.5, DVec3::X * -3.0, 1.0, &Shape::BALL);
         assert_eq!(dark, Shade { base: 0.0, slope: DVec3::ZERO });
-        let most = Shade::new(DVec3::X * 0.5, DVec3::X * 30.0, DVec3::splat(0.1)).base;
+        let most = Shade::new(DVec3::X * 0.5, DVec3::X * 30.0, 0.1, &Shape::BALL).base;
         assert_eq!(most, MOST_OF_FACET);
     }
 }

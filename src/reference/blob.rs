@@ -1,20 +1,20 @@
-//! A Gaussian blob of extinction, model.md §14: a ball, or an ellipsoid with an axis along y.
-//! Optical depths along lines through it, and the slopes between which it is seen, in f64.
+//! A Gaussian blob of extinction, model.md §14: a ball or an ellipsoid. Optical depths along lines
+//! through it, and the slopes between which it is seen, in f64.
 
-use glam::{DMat2, DVec2, DVec3};
+use glam::{DMat2, DMat3, DVec2, DVec3};
 
-use crate::model::cloud::SQRT_TAU;
+use crate::model::cloud::{SQRT_TAU, Shape};
 
-/// A blob of extinction ρ(x) = κ exp(−|M (x − p)|²/2σ²), M = diag(1, 1/a, 1), relative to the
+/// A blob of extinction ρ(x) = κ exp(−|M (x − p)|²/2σ²), M that of its shape, relative to the
 /// lighting origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blob {
     /// p: centre.
     pub position: DVec3,
-    /// σ along x and z.
+    /// σ along the first axis of its shape: of an upright one that along x and z.
     pub sigma: f64,
-    /// a: σ along y over σ along x and z; 1 for a ball.
-    pub aspect: f64,
+    /// Its shape.
+    pub shape: Shape,
     /// κ: peak extinction per unit length.
     pub kappa: f64,
 }
@@ -37,34 +37,40 @@ impl Line {
 }
 
 impl Blob {
-    /// Returns (1, a, 1).
-    pub fn axes(&self) -> DVec3 {
-        DVec3::new(1.0, self.aspect, 1.0)
-    }
-
     /// Returns M v: the space in which the blob is a ball of σ.
     pub fn whiten(&self, v: DVec3) -> DVec3 {
-        v / self.axes()
+        self.shape.whiten(v)
+    }
+
+    /// Returns M/σ, which takes the blob to the unit ball.
+    pub fn white_matrix(&self) -> DMat3 {
+        let axes = self.shape.axes();
+        axes * DMat3::from_diagonal((self.sigma * self.shape.lengths()).recip()) * axes.transpose()
+    }
+
+    /// Returns the standard deviations along x, y and z.
+    pub fn extents(&self) -> DVec3 {
+        self.sigma * self.shape.extents()
     }
 
     /// Returns the greatest σ over all directions.
     pub fn widest(&self) -> f64 {
-        self.sigma * self.aspect.max(1.0)
+        self.sigma * self.shape.widest()
     }
 
     /// Returns the least σ over all directions.
     pub fn narrowest(&self) -> f64 {
-        self.sigma * self.aspect.min(1.0)
+        self.sigma * self.shape.narrowest()
     }
 
-    /// Returns a bound on the optical depth of any line: √(2π) κ σ max(1, a).
+    /// Returns a bound on the optical depth of any line: √(2π) κ times the greatest σ.
     pub fn deepest(&self) -> f64 {
         SQRT_TAU * self.kappa * self.widest()
     }
 
-    /// Returns m = ∫ρ dV = κ (2π)^{3/2} σ³ a.
+    /// Returns m = ∫ρ dV = κ (2π)^{3/2} σ³ V, V the shape's volume.
     pub fn mass(&self) -> f64 {
-        self.kappa * (SQRT_TAU * self.sigma).powi(3) * self.aspect
+        self.kappa * (SQRT_TAU * self.sigma).powi(3) * self.shape.volume()
     }
 
     /// Returns the line along `d`, of any length, that passes the centre at offset `c`.
@@ -79,12 +85,12 @@ impl Blob {
     /// the blob reaches beside the eye or lies behind it.
     pub fn slopes(&self, c: DVec3, [side, forward]: [DVec3; 2], reach: f64) -> (f64, f64) {
         let at = DVec2::new(c.dot(side), c.dot(forward));
-        if self.aspect == 1.0 {
+        if self.shape == Shape::BALL {
             return disc_slopes(at, reach * self.sigma);
         }
         // The planes n·x = 0 with (n·c)² = nᵀ S n touch the blob, S its matrix and n = (1, −slope).
         let r = reach * self.sigma;
-        let [s, f] = [side, forward].map(|axis| r * axis * self.axes());
+        let [s, f] = [side, forward].map(|axis| r * self.shape.stretch(axis));
         let shape =
             DMat2::from_cols(DVec2::new(s.dot(s), s.dot(f)), DVec2::new(s.dot(f), f.dot(f)));
         let (x, z) = (at.x, at.y);
@@ -117,10 +123,22 @@ fn disc_slopes(at: DVec2, reach: f64) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
+    use glam::DQuat;
+
     use super::*;
+    use crate::model::shape::Turn;
+
+    fn of_shape(shape: Shape) -> Blob {
+        Blob { position: DVec3::ZERO, sigma: 2.0, shape, kappa: 0.5 }
+    }
 
     fn blob(aspect: f64) -> Blob {
-        Blob { position: DVec3::ZERO, sigma: 2.0, aspect, kappa: 0.5 }
+        of_shape(Shape::upright(aspect))
+    }
+
+    fn turned(aspect: f64, aspect_z: f64) -> Shape {
+        let axis = DVec3::new(0.36, 0.48, -0.8);
+        Shape { aspect, aspect_z, turn: Turn::new(DQuat::from_axis_angle(axis, 1.3)) }
     }
 
     #[test]
@@ -135,15 +153,17 @@ mod tests {
             };
             (-20_000..=20_000).map(|k| step * rho(step * f64::from(k))).sum::<f64>()
         };
-        for (aspect, c, d) in [
-            (1.0, DVec3::new(0.5, 1.0, 9.0), DVec3::Z),
-            (0.1, DVec3::new(1.0, 0.1, 5.0), DVec3::new(0.1, 0.05, 3.0)),
-            (0.05, DVec3::new(0.3, 0.02, -1.0), DVec3::Y),
-            (3.0, DVec3::new(-1.0, 2.0, 4.0), DVec3::new(1.0, -2.0, 0.5)),
+        for (shape, c, d) in [
+            (Shape::upright(1.0), DVec3::new(0.5, 1.0, 9.0), DVec3::Z),
+            (Shape::upright(0.1), DVec3::new(1.0, 0.1, 5.0), DVec3::new(0.1, 0.05, 3.0)),
+            (Shape::upright(0.05), DVec3::new(0.3, 0.02, -1.0), DVec3::Y),
+            (Shape::upright(3.0), DVec3::new(-1.0, 2.0, 4.0), DVec3::new(1.0, -2.0, 0.5)),
+            (turned(0.3, 0.05), DVec3::new(0.2, -0.1, 5.0), DVec3::new(0.1, 0.05, 3.0)),
+            (turned(1.0, 0.2), DVec3::new(-0.4, 0.3, 2.0), DVec3::new(1.0, -2.0, 0.5)),
         ] {
-            let blob = blob(aspect);
+            let blob = of_shape(shape);
             let line = blob.along(c, d);
-            assert!((line.tau() / integral(&blob, c, d) - 1.0).abs() < 1e-10, "{aspect} {line:?}");
+            assert!((line.tau() / integral(&blob, c, d) - 1.0).abs() < 1e-10, "{shape:?} {line:?}");
             assert!(line.depth <= blob.deepest() * (1.0 + 1e-15));
         }
         // Along y it is a times as deep as across.
@@ -157,8 +177,9 @@ mod tests {
     #[test]
     fn slopes_touch_the_silhouette() {
         let axes = [DVec3::new(0.6, 0.8, 0.0), DVec3::new(0.8, -0.6, 0.0)];
-        for aspect in [0.2, 0.999_999_999, 1.0, 4.0] {
-            let (blob, c) = (blob(aspect), 40.0 * axes[1] + 7.0 * axes[0] + DVec3::Z);
+        let upright = [0.2, 0.999_999_999, 1.0, 4.0].map(Shape::upright);
+        for shape in upright.into_iter().chain([turned(0.3, 0.05), turned(1.0, 0.2)]) {
+            let (blob, c) = (of_shape(shape), 40.0 * axes[1] + 7.0 * axes[0] + DVec3::Z);
             let (low, high) = blob.slopes(c, axes, 3.0);
             for (slope, name) in [(low, "low"), (high, "high")] {
                 // Of all lines with that slope, whatever the third coordinate, the nearest passes
@@ -167,7 +188,7 @@ mod tests {
                 let off = (-40_000..40_000)
                     .map(|k| blob.along(c, ray(2.5e-5 * f64::from(k))).off)
                     .fold(f64::INFINITY, f64::min);
-                assert!((off - 3.0).abs() < 1e-5, "{aspect} {name} {off}");
+                assert!((off - 3.0).abs() < 1e-5, "{shape:?} {name} {off}");
             }
         }
         // A flat blob above the eye's height, beside, around and behind the eye.

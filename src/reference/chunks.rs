@@ -52,7 +52,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::model::cloud::SQRT_TAU;
+    use crate::model::cloud::{SQRT_TAU, Shape};
     use crate::reference::Blob;
     use crate::reference::composite::Rounding;
     use crate::reference::sprites::{Sprites, render_over as far_to_near};
@@ -62,7 +62,7 @@ mod tests {
 
     fn layer(z: f64, tau: f64) -> Blob {
         Blob {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position: DVec3::new(0.0, 0.0, -z),
             sigma: 0.5,
             kappa: tau / (SQRT_TAU * 0.5),

@@ -80,6 +80,7 @@ fn shows(view: &View, blob: &Blob, slack: &CullTolerance) -> bool {
 mod tests {
     use super::*;
     use crate::model::camera::Pose;
+    use crate::model::cloud::Shape;
     use crate::model::edge::Edge;
 
     /// Four columns and two rows of slopes ½ wide: centres at ±¼, ±¾ and ±¼.
@@ -100,7 +101,7 @@ mod tests {
     fn of(x: f64, y: f64, z: f64, sigma: f64) -> CullOutcome {
         outcome(
             &VIEW,
-            &Blob { aspect: 1.0, position: DVec3::new(x, y, -z), sigma, kappa: 1.0 },
+            &Blob { shape: Shape::BALL, position: DVec3::new(x, y, -z), sigma, kappa: 1.0 },
             &CullTolerance::NONE,
         )
     }
@@ -133,8 +134,12 @@ mod tests {
 
     #[test]
     fn thin_and_small_blobs_are_culled_and_near_decisions_are_uncertain() {
-        let blob =
-            Blob { aspect: 1.0, position: DVec3::new(2.5, 2.5, -10.0), sigma: 1.0, kappa: 1.0 };
+        let blob = Blob {
+            shape: Shape::BALL,
+            position: DVec3::new(2.5, 2.5, -10.0),
+            sigma: 1.0,
+            kappa: 1.0,
+        };
         let of = |view: View, slack: f64| {
             outcome(
                 &view,

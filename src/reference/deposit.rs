@@ -1,17 +1,19 @@
 //! The deposit of the blobs' mass in the density grid, model.md §8 and passes.md "grid". It is
-//! conservative and separable. Wide blobs are deposited on wide cells, which are spread to the
-//! finest ones.
+//! conservative, and separable where blobs are upright. Wide blobs are deposited on wide cells,
+//! which are spread to the finest ones.
 //!
 //! Densities are extinction per unit length. Cell (x, y, z) is at index x + n_x (y + n_y z).
 
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::ops::RangeInclusive;
 
-use glam::UVec3;
+use glam::{DVec3, UVec3};
 use libm::{erf, erfc};
 
 use super::Blob;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, given_by_coarser};
+
+mod turned;
 
 /// Returns the blobs that have extinction.
 pub(super) fn dense(blobs: &[Blob]) -> impl Iterator<Item = &Blob> {
@@ -36,7 +38,7 @@ pub fn deposit(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
 pub fn deposit_by_levels(spec: &GridSpec, blobs: &[Blob], n_levels: u32) -> Vec<f64> {
     let mut of_level = vec![Vec::new(); n_levels as usize];
     for blob in dense(blobs) {
-        of_level[spec.level_of(blob.sigma * blob.axes(), n_levels) as usize].push(*blob);
+        of_level[level_of(spec, blob, n_levels) as usize].push(*blob);
     }
     let n_used = of_level.iter().rposition(|blobs| !blobs.is_empty()).map_or(1, |last| last + 1);
     let mut coarser: Option<Vec<f64>> = None;
@@ -57,10 +59,14 @@ pub fn deposit_on(spec: &GridSpec, level: u32, blobs: &[Blob]) -> Vec<f64> {
     let mut cells = vec![0.0; n.x * n.y * n.z];
     let (edges, volume) = (of_level.edges(), of_level.cell_volume());
     for blob in dense(blobs) {
-        let sigma = spec.deposited(blob.sigma * blob.axes(), level);
+        let density = blob.mass() / volume;
+        if !blob.shape.is_upright() {
+            turned::each_share(spec, blob, level, |cell, share| cells[cell] += density * share);
+            continue;
+        }
+        let sigma = spec.deposited(blob.extents(), level);
         let axis = |i: usize| axis_weights(blob.position[i], sigma[i], spec.low[i], edges[i], n[i]);
         let ((x0, wx), (y0, wy), (z0, wz)) = (axis(0), axis(1), axis(2));
-        let density = blob.mass() / volume;
         for (z, wz) in (z0..).zip(&wz) {
             for (y, wy) in (y0..).zip(&wy) {
                 let row = n.x * (y + n.y * z);
@@ -71,6 +77,14 @@ pub fn deposit_on(spec: &GridSpec, level: u32, blobs: &[Blob]) -> Vec<f64> {
         }
     }
     cells
+}
+
+/// Returns the level, of `n_levels`, that a blob is deposited on. What spreading adds to its
+/// variance must be less than it has in any direction.
+fn level_of(spec: &GridSpec, blob: &Blob, n_levels: u32) -> u32 {
+    let sigma =
+        if blob.shape.is_upright() { blob.extents() } else { DVec3::splat(blob.narrowest()) };
+    spec.level_of(sigma, n_levels)
 }
 
 /// Adds to the cells of a level what the cells of the next, `coarser`, give them.
@@ -95,9 +109,13 @@ pub fn spread(level: &GridSpec, coarser: &[f64], cells: &mut [f64]) {
 pub fn n_deposited(spec: &GridSpec, blobs: &[Blob]) -> f64 {
     let n_levels = spec.n_levels(blobs.len() as u64);
     let of_blob = |blob: &Blob| {
-        let sigma = blob.sigma * blob.axes();
-        let level = spec.level_of(sigma, n_levels);
-        let (sigma, of_level) = (spec.deposited(sigma, level), spec.level(level));
+        let level = level_of(spec, blob, n_levels);
+        if !blob.shape.is_upright() {
+            let mut n = 0.0;
+            turned::each_share(spec, blob, level, |_, _| n += 1.0);
+            return n;
+        }
+        let (sigma, of_level) = (spec.deposited(blob.extents(), level), spec.level(level));
         let (n, edges) = (of_level.n_cells.as_usizevec3(), of_level.edges());
         let axis = |i: usize| {
             reached(blob.position[i], sigma[i], spec.low[i], edges[i], n[i])
@@ -147,7 +165,7 @@ pub(super) fn normal_share(a: f64, b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::cloud::SQRT_TAU;
+    use crate::model::cloud::{SQRT_TAU, Shape};
     use crate::model::grid::MAX_LEVELS;
     use glam::DVec3;
 
@@ -156,14 +174,14 @@ mod tests {
     }
 
     fn blob(x: f64, sigma: f64, kappa: f64) -> Blob {
-        Blob { aspect: 1.0, position: DVec3::new(x, 0.3, -0.2), sigma, kappa }
+        Blob { shape: Shape::BALL, position: DVec3::new(x, 0.3, -0.2), sigma, kappa }
     }
 
     #[test]
     fn cells_that_blobs_meet_by_hand() {
         let spec = spec(20, 0.5, -5.0);
         let at = |x: f64, sigma: f64, kappa: f64| Blob {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position: DVec3::splat(x),
             sigma,
             kappa,
@@ -178,7 +196,10 @@ mod tests {
         // Blobs without mass update no cell.
         assert_eq!(n_deposited(&spec, &[at(0.1, 0.0, 1.0), at(0.1, 0.5, 0.0)]), 0.0);
         // Twice as high, twice as many along y: ±3 is 4 to 16.
-        assert_eq!(n_deposited(&spec, &[Blob { aspect: 2.0, ..blobs[0] }]), 7.0 * 13.0 * 7.0);
+        assert_eq!(
+            n_deposited(&spec, &[Blob { shape: Shape::upright(2.0), ..blobs[0] }]),
+            7.0 * 13.0 * 7.0
+        );
         let met = deposit(&spec, &blobs[..1]).iter().filter(|density| **density > 0.0).count();
         assert_eq!(met, 343);
     }
@@ -227,7 +248,7 @@ mod tests {
             let n = (7.0 * sigma).ceil() as u32 + i % 3;
             let spec = spec(n, 1.0, 0.0);
             let position = 0.5 * f64::from(n) + DVec3::new(a - 0.5, b - 0.5, 0.5 - a) * 0.8 * sigma;
-            let blob = Blob { aspect: 1.0, position, sigma, kappa: 0.7 };
+            let blob = Blob { shape: Shape::BALL, position, sigma, kappa: 0.7 };
             let wide = deposit_by_levels(&spec, &[blob], MAX_LEVELS);
             let exact = deposit_by_levels(&spec, &[blob], 1);
             let mass = |cells: &[f64]| cells.iter().sum::<f64>();
@@ -246,7 +267,7 @@ mod tests {
         for n in [29, 30, 31, 101] {
             let sigma = (f64::from(n) - 4.0) / 6.0;
             let position = DVec3::splat(0.5 * f64::from(n));
-            let blob = Blob { aspect: 1.0, position, sigma, kappa: 0.7 };
+            let blob = Blob { shape: Shape::BALL, position, sigma, kappa: 0.7 };
             let spec = spec(n, 1.0, 0.0);
             assert!(spec.level_of(DVec3::splat(sigma), MAX_LEVELS) >= 1);
             let mass: f64 = deposit_by_levels(&spec, &[blob], MAX_LEVELS).iter().sum();
@@ -257,7 +278,7 @@ mod tests {
     #[test]
     fn a_small_blob_lies_in_its_cell_or_is_halved_by_a_face() {
         // m = κ(√(2π)σ)³, by hand for κ = 2, σ = 0.1: 2·0.0157496… in one cell of volume 8.
-        let one = Blob { aspect: 1.0, position: DVec3::splat(1.0), sigma: 0.1, kappa: 2.0 };
+        let one = Blob { shape: Shape::BALL, position: DVec3::splat(1.0), sigma: 0.1, kappa: 2.0 };
         let cells = deposit(&spec(3, 2.0, -2.0), &[one]);
         assert!((cells[13] * 8.0 - 2.0 * 0.015_749_609_945_722_4).abs() < 1e-13);
         assert_eq!(cells.iter().filter(|&&c| c > 0.0).count(), 1);

@@ -9,19 +9,20 @@ use glam::DVec3;
 use super::Blob;
 use super::facets::{Facet, FacetSources, area, facet_at};
 use super::grid::sample;
-use crate::model::cloud::MIN_ASPECT;
+use crate::model::cloud::{MIN_ASPECT, Shape};
 use crate::model::grid::GridSpec;
 
 /// A run of particles merged to one blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MergedBlob {
-    /// p̄ = Σ m p/Σ m, m = κσ³a.
+    /// p̄ = Σ m p/Σ m, m the masses.
     pub position: DVec3,
-    /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m). If some blobs are ellipsoids: √(Σ m (σ² + (x² +
-    /// z²)/2)/Σ m) of p − p̄.
+    /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m). If some blobs are ellipsoids: √(Σ m (σ_w² + (x² +
+    /// z²)/2)/Σ m) of p − p̄, σ_w² a blob's mean variance along x and z.
     pub sigma: f64,
-    /// √(Σ m (a²σ² + y²)/Σ m) over σ_g; 1 if all blobs are balls.
-    pub aspect: f64,
+    /// Upright, with √(Σ m (σ_y² + y²)/Σ m) along y; a ball if all blobs are balls. A run of one
+    /// blob has its shape.
+    pub shape: Shape,
     /// Mean σ̄ of the particles' groups, by mass.
     pub sigma_mean: f64,
     /// Sum of the particles' facet areas.
@@ -53,19 +54,21 @@ pub fn merged(m: &FacetSources<'_>, run: &[u32], ellipsoids: bool) -> MergedBlob
             .sum::<f64>()
             .sqrt()
     };
-    let (sigma, aspect) = match (run, ellipsoids) {
-        ([one], _) => (at(one).sigma, at(one).aspect),
-        (_, false) => (spread(&|b, d| b.sigma.powi(2) + d.length_squared() / 3.0), 1.0),
+    let (sigma, shape) = match (run, ellipsoids) {
+        ([one], _) => (at(one).sigma, at(one).shape),
+        (_, false) => (spread(&|b, d| b.sigma.powi(2) + d.length_squared() / 3.0), Shape::BALL),
         (_, true) => {
-            let wide = spread(&|b, d| b.sigma.powi(2) + 0.5 * (d.x * d.x + d.z * d.z));
-            let high = spread(&|b, d| (b.aspect * b.sigma).powi(2) + d.y * d.y);
-            (wide, if wide > 0.0 { (high / wide).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT) } else { 1.0 })
+            let own = |b: Blob| (b.sigma * b.shape.extents()).powf(2.0);
+            let wide = spread(&|b, d| 0.5 * (own(b).x + own(b).z) + 0.5 * (d.x * d.x + d.z * d.z));
+            let high = spread(&|b, d| own(b).y + d.y * d.y);
+            let aspect = (high / wide).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT);
+            (wide, if wide > 0.0 { Shape::upright(aspect) } else { Shape::BALL })
         }
     };
     MergedBlob {
         position,
         sigma,
-        aspect,
+        shape,
         sigma_mean: run.iter().zip(&by_mass).map(|(i, w)| w * m.sigma_means[*i as usize]).sum(),
         area: areas.iter().sum(),
         color: run.iter().zip(&by_area).map(|(i, w)| *w * m.colors[*i as usize]).sum(),
@@ -82,13 +85,13 @@ pub fn grouped(
     order: &[u32],
     runs: &[(u64, u64)],
 ) -> Vec<(Facet, DVec3)> {
-    let ellipsoids = sources.blobs.iter().any(|b| b.aspect != 1.0);
+    let ellipsoids = sources.blobs.iter().any(|b| b.shape != Shape::BALL);
     let of = |&(first, end): &(u64, u64)| {
         let run = &order[first as usize..end as usize];
         let b = merged(sources, run, ellipsoids);
         let region = sources.regions[run[0] as usize];
         let (shape, center) =
-            ([b.sigma.max(b.sigma_mean), b.aspect], cloud_centers[region as usize]);
+            ((b.sigma.max(b.sigma_mean), b.shape), cloud_centers[region as usize]);
         let density = |x| sample(spec, cells, x);
         let facet = facet_at(sources.place, b.position, shape, b.area, region, center, density);
         (Facet { sigma: b.sigma, ..facet }, b.color)
@@ -109,8 +112,12 @@ mod tests {
 
     #[test]
     fn a_run_is_one_blob_of_its_members() {
-        let blob =
-            |x: f64, sigma, kappa| Blob { aspect: 1.0, position: DVec3::X * x, sigma, kappa };
+        let blob = |x: f64, sigma, kappa| Blob {
+            shape: Shape::BALL,
+            position: DVec3::X * x,
+            sigma,
+            kappa,
+        };
         // Masses 2·1³ and 1·2³, 1 to 4: p̄ = 4, σ_g² = ((1 + 16/3) + 4 (4 + 1/3))/5 = 71/15.
         let blobs =
             [blob(0.0, 1.0, 2.0), blob(5.0, 2.0, 1.0), blob(1.0, 0.0, 1.0), blob(3.0, 1.0, 0.0)];
@@ -142,10 +149,10 @@ mod tests {
 
     #[test]
     fn runs_of_one_are_the_particles_facets() {
-        let ball = Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 };
+        let ball = Blob { shape: Shape::BALL, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 };
         let cells = deposit(&SPEC, &[ball]);
         let blob = |x: f64| Blob {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position: DVec3::new(x, 0.4, -0.3),
             sigma: 0.3 + 0.1 * x,
             kappa: 1.0,

@@ -12,7 +12,7 @@ use glam::DVec3;
 use super::Blob;
 use super::grid::{density, sample};
 use super::parallel::parallel_map;
-use crate::model::cloud::{SIGMA_PER_RADIUS, SQRT_TAU};
+use crate::model::cloud::{SIGMA_PER_RADIUS, SQRT_TAU, Shape};
 use crate::model::grid::GridSpec;
 
 /// Radius of the quadrature's sphere, σ: points at √5 s integrate a Gaussian of standard deviation
@@ -58,24 +58,28 @@ pub fn directions() -> [(DVec3, f64); 14] {
 }
 
 /// Returns G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of the density ρ smoothed by a
-/// Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ A d). A = diag(1, a, 1) gives the sphere the blob's
-/// shape, so that the gradient is one in the space where the blob is a ball (§14).
-pub fn gradient(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
-    let axes = DVec3::new(1.0, aspect, 1.0);
+/// Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ A d). A = M⁻¹ gives the sphere the blob's shape,
+/// so that the gradient is one in the space where the blob is a ball (§14).
+pub fn gradient(
+    density: impl Fn(DVec3) -> f64,
+    p: DVec3,
+    sigma: f64,
+    shape: &Shape,
+) -> (DVec3, f64) {
     directions().iter().fold((DVec3::ZERO, 0.0), |(g, s), &(d, w)| {
-        let density = w * density(p + GRADIENT_RADIUS_SIGMA * sigma * axes * d);
+        let density = w * density(p + GRADIENT_RADIUS_SIGMA * sigma * shape.stretch(d));
         (g + density * d, s + density)
     })
 }
 
 /// Returns the unit normal of a blob at `p` in a cloud about `center`, from the gradient G and the
 /// sum S, and the conditioning q.
-fn blended_normal((g, s): (DVec3, f64), aspect: f64, p: DVec3, center: DVec3) -> (DVec3, f64) {
+fn blended_normal((g, s): (DVec3, f64), shape: &Shape, p: DVec3, center: DVec3) -> (DVec3, f64) {
     let away = (p - center).try_normalize().unwrap_or(DVec3::Y);
     let q = if s > 0.0 { g.length() / s } else { 0.0 };
     let t = smoothstep(CONDITIONING, q);
     // t > 0 only where q > 0, hence |G| > 0.
-    let down = if t > 0.0 { -(g / DVec3::new(1.0, aspect, 1.0)).normalize() } else { DVec3::ZERO };
+    let down = if t > 0.0 { -shape.whiten(g).normalize() } else { DVec3::ZERO };
     ((t * down + (1.0 - t) * away).try_normalize().unwrap_or(away), q)
 }
 
@@ -85,22 +89,23 @@ pub fn smoothstep(ends: (f64, f64), x: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Returns the area of a facet: π R² w (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ a/w.
+/// Returns the area of a facet: π R² w (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ a b/w.
 ///
-/// w is an ellipsoid's projected area, averaged over all directions, over that of a ball of R. It
-/// is taken from Thomsen's formula ((1 + 2 a^p)/3)^{1/p}, p = 1.6075, which is within 1.1 % of a
-/// quarter of the surface.
+/// 1, a and b are the lengths of the axes over σ. w is an ellipsoid's projected area, averaged over
+/// all directions, over that of a ball of R. It is taken from Thomsen's formula
+/// ((a^p + b^p + (ab)^p)/3)^{1/p}, p = 1.6075, which is within 1.1 % of a quarter of the surface.
 pub fn area(blob: &Blob) -> f64 {
     const P: f64 = 1.6075;
     let radius = blob.sigma / SIGMA_PER_RADIUS;
-    let wider = ((1.0 + 2.0 * blob.aspect.powf(P)) / 3.0).powf(1.0 / P);
-    let depth = SQRT_TAU * blob.kappa * blob.sigma * blob.aspect / wider;
+    let Shape { aspect: a, aspect_z: b, .. } = blob.shape;
+    let wider = ((a.powf(P) + b.powf(P) + (a * b).powf(P)) / 3.0).powf(1.0 / P);
+    let depth = SQRT_TAU * blob.kappa * blob.sigma * blob.shape.volume() / wider;
     -PI * radius * radius * wider * libm::expm1(-depth)
 }
 
 /// Returns the point of a blob's shell of 1.5 σ where the normal is `n`.
-fn shell(p: DVec3, [sigma, aspect]: [f64; 2], n: DVec3) -> DVec3 {
-    let to = DVec3::new(n.x, aspect * aspect * n.y, n.z);
+fn shell(p: DVec3, (sigma, shape): (f64, Shape), n: DVec3) -> DVec3 {
+    let to = shape.stretch(shape.stretch(n));
     p + SHELL_SIGMA * sigma / n.dot(to).sqrt() * to
 }
 
@@ -155,17 +160,17 @@ fn facet_of(
     density: impl Fn(DVec3) -> f64,
 ) -> Facet {
     let (blob, region) = (&sources.blobs[i], sources.regions[i]);
-    let shape = [blob.sigma.max(sources.sigma_means[i]), blob.aspect];
+    let shape = (blob.sigma.max(sources.sigma_means[i]), blob.shape);
     let center = cloud_centers[region as usize];
     let facet = facet_at(sources.place, blob.position, shape, area(blob), region, center, density);
     Facet { sigma: blob.sigma, ..facet }
 }
 
-/// Returns the facet of a blob of shape (σ, aspect) at `p`, on its shell or at its centre.
+/// Returns the facet of a blob of σ and shape at `p`, on its shell or at its centre.
 pub(super) fn facet_at(
     place: FacetPlace,
     p: DVec3,
-    shape: [f64; 2],
+    shape: (f64, Shape),
     area: f64,
     region: u32,
     center: DVec3,
@@ -181,8 +186,8 @@ pub(super) fn facet_at(
             conditioning: 1.0,
         };
     }
-    let gradient = gradient(density, p, shape[0], shape[1]);
-    let (normal, conditioning) = blended_normal(gradient, shape[1], p, center);
+    let gradient = gradient(density, p, shape.0, &shape.1);
+    let (normal, conditioning) = blended_normal(gradient, &shape.1, p, center);
     Facet { position: shell(p, shape, normal), normal, area, region, sigma: 0.0, conditioning }
 }
 
@@ -204,12 +209,16 @@ mod tests {
     }
 
     fn ball() -> Vec<f64> {
-        deposit(&SPEC, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 }])
+        deposit(
+            &SPEC,
+            &[Blob { shape: Shape::BALL, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 }],
+        )
     }
 
     /// The unit normal and q of a blob of shape (σ, aspect) at `p` in a cloud about `center`.
     fn normal(cells: &[f64], p: DVec3, [sigma, aspect]: [f64; 2], center: DVec3) -> (DVec3, f64) {
-        blended_normal(gradient(|x| sample(&SPEC, cells, x), p, sigma, aspect), aspect, p, center)
+        let shape = Shape::upright(aspect);
+        blended_normal(gradient(|x| sample(&SPEC, cells, x), p, sigma, &shape), &shape, p, center)
     }
 
     #[test]
@@ -237,7 +246,7 @@ mod tests {
         let at = |i: usize, axis: u32| -4.9 + 0.2 * (i / 50usize.pow(axis) % 50) as f64;
         let cells: Vec<f64> = (0..125_000).map(|i| 3.0 + 0.2 * at(i, 0) - 0.1 * at(i, 2)).collect();
         let p = DVec3::new(0.33, -0.71, 0.52);
-        let (g, s) = gradient(|x| sample(&SPEC, &cells, x), p, 0.6, 1.0);
+        let (g, s) = gradient(|x| sample(&SPEC, &cells, x), p, 0.6, &Shape::BALL);
         let r = 2.0 * 5f64.sqrt() * 0.6;
         assert!((g - r / 3.0 * DVec3::new(0.2, 0.0, -0.1)).length() < 1e-13);
         assert!((s - (3.0 + 0.066 - 0.052)).abs() < 1e-13);
@@ -263,8 +272,8 @@ mod tests {
         // For one blob the quadrature's points lie at p + r d: along −∇ρ up to its degree, and
         // exactly so by symmetry on an axis. Far from all blobs only the cloud's centre counts.
         let blobs = [
-            Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 },
-            Blob { aspect: 1.0, sigma: 0.4, position: DVec3::X, kappa: 0.0 },
+            Blob { shape: Shape::BALL, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 },
+            Blob { shape: Shape::BALL, sigma: 0.4, position: DVec3::X, kappa: 0.0 },
         ];
         let facets =
             from_density(&sources(&blobs, &[0.4, 0.4], &[0, 0]), &[DVec3::new(0.0, 9.0, 0.0)]);
@@ -303,7 +312,7 @@ mod tests {
 
     #[test]
     fn a_facet_lies_on_its_shell_and_without_direction_faces_up() {
-        let blob = Blob { aspect: 1.0, position: DVec3::ONE, sigma: 0.5, kappa: 2.0 };
+        let blob = Blob { shape: Shape::BALL, position: DVec3::ONE, sigma: 0.5, kappa: 2.0 };
         let empty = vec![0.0; 125_000];
         let facets = facets(
             &SPEC,

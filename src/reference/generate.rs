@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::DVec3;
 
 use crate::model::boxes::{BoxLaw, CloudBox, Form, MAX_ATTEMPTS, radius_factor, radius_shape};
-use crate::model::cloud::{SIGMA_PER_RADIUS, box_kappa};
+use crate::model::cloud::{SIGMA_PER_RADIUS, Shape, box_kappa};
 use crate::model::philox::{philox4x32_10, uniform};
 
 /// A particle relative to its group.
@@ -21,10 +21,10 @@ pub struct Generated {
     pub position: DVec3,
     /// R of P (11), before `radius_scale`.
     pub radius: f64,
-    /// σ along x and z.
+    /// σ along the first axis of its shape.
     pub sigma: f64,
-    /// σ along y over σ along x and z.
-    pub aspect: f64,
+    /// Its shape.
+    pub shape: Shape,
     /// Peak extinction per unit length.
     pub kappa: f64,
     /// Number of attempts, the accepted one included; 0 for a particle that was given.
@@ -37,12 +37,12 @@ pub struct Generated {
 
 impl Generated {
     /// A particle that no box generates, `position` relative to its group's centre.
-    pub(super) fn given(position: DVec3, sigma: f64, aspect: f64, kappa: f64) -> Generated {
+    pub(super) fn given(position: DVec3, sigma: f64, shape: Shape, kappa: f64) -> Generated {
         Generated {
             position,
             radius: sigma / SIGMA_PER_RADIUS,
             sigma,
-            aspect,
+            shape,
             kappa,
             n_attempts: 0,
             folded: false,
@@ -163,7 +163,7 @@ pub fn generate_particle(
         position,
         radius,
         sigma: radius * law.radius_scale * SIGMA_PER_RADIUS,
-        aspect: 1.0,
+        shape: Shape::BALL,
         kappa: box_kappa(b, law),
         n_attempts,
         folded,

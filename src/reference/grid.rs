@@ -70,7 +70,7 @@ mod tests {
     use glam::UVec3;
     use libm::erf;
 
-    use crate::model::cloud::SQRT_TAU;
+    use crate::model::cloud::{SQRT_TAU, Shape};
     use crate::reference::deposit::{deposit, deposit_on};
     use crate::reference::{facets, transmit};
 
@@ -94,7 +94,12 @@ mod tests {
 
     #[test]
     fn optical_depth_through_blobs() {
-        let b = Blob { aspect: 1.0, position: DVec3::new(1.0, 2.0, 3.0), sigma: 0.5, kappa: 1.2 };
+        let b = Blob {
+            shape: Shape::BALL,
+            position: DVec3::new(1.0, 2.0, 3.0),
+            sigma: 0.5,
+            kappa: 1.2,
+        };
         let through = SQRT_TAU * 1.2 * 0.5;
         let tau = |p: DVec3, d, length| optical_depth_exact(&[b], p, d, length);
         // Relative errors of erf and exp: a few 1e-16.
@@ -124,7 +129,7 @@ mod tests {
                 cell,
                 low: DVec3::splat(-0.5 * cell * f64::from(n)),
             };
-            let blob = Blob { aspect: 1.0, position: DVec3::ZERO, sigma, kappa };
+            let blob = Blob { shape: Shape::BALL, position: DVec3::ZERO, sigma, kappa };
             // On the finest cells: wider ones have an error of their own (deposit.rs).
             let cells = deposit_on(&spec, 0, &[blob]);
             let start = DVec3::X * spec.low.x;
@@ -150,13 +155,15 @@ mod tests {
     #[test]
     fn far_from_the_grid_there_is_no_density() {
         let spec = GridSpec::fit(DVec3::splat(-3.0), DVec3::splat(3.0), 32, 1.0);
-        let cells =
-            deposit(&spec, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.0, kappa: 1.0 }]);
+        let cells = deposit(
+            &spec,
+            &[Blob { shape: Shape::BALL, position: DVec3::ZERO, sigma: 1.0, kappa: 1.0 }],
+        );
         let density = cells.iter().sum::<f64>() * spec.cell.powi(3);
         assert!((density / SQRT_TAU.powi(3) - 1.0).abs() < 1e-12);
         assert_eq!(sample(&spec, &cells, DVec3::splat(9.0)), 0.0);
         // Along the grid's diagonal density falls from the centre, so that no facet turns inward.
-        let q = facets::gradient(|x| sample(&spec, &cells, x), DVec3::ONE, 0.5, 1.0).0;
+        let q = facets::gradient(|x| sample(&spec, &cells, x), DVec3::ONE, 0.5, &Shape::BALL).0;
         assert!(q.x < 0.0 && (q.x - q.y).abs() < 1e-12);
     }
 }

@@ -40,6 +40,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
+    use crate::model::cloud::Shape;
 
     const VIEW: View = View::ONE_PIXEL;
 
@@ -48,7 +49,7 @@ mod tests {
         // 9 by 7 pixels; a blob in the middle, one to the lower right, one behind the eye.
         let view = View { width: 9, height: 7, ..VIEW };
         let at = |x: f64, y: f64, z: f64| Blob {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position: DVec3::new(x, y, -z),
             sigma: 0.05,
             kappa: 1.0,

@@ -6,7 +6,7 @@
 use glam::DVec3;
 
 use super::generate::{self, Generated};
-use crate::model::cloud::{Cloud, CloudSource, Particle, SIGMA_PER_RADIUS};
+use crate::model::cloud::{Cloud, CloudSource, Particle, SIGMA_PER_RADIUS, Shape};
 use crate::model::disc::{Dilution, Disc};
 use crate::model::philox::{philox4x32_10, uniform};
 
@@ -115,7 +115,7 @@ fn smoothstep(v: f64) -> f64 {
 /// it before.
 pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
     let center = cloud.groups(0, 0).first().map_or(DVec3::ZERO, |g| g.center);
-    let given = |p: &Particle| Generated::given(p.position - center, p.sigma, p.aspect, p.kappa);
+    let given = |p: &Particle| Generated::given(p.position - center, p.sigma, p.shape, p.kappa);
     match &cloud.source {
         CloudSource::Boxes { boxes, law } => {
             let of = |(b, i): (_, u32)| generate::generate_box(b, i, cloud.seed, law);
@@ -128,7 +128,7 @@ pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
         CloudSource::Disc(disc) => {
             let of = |i| {
                 let p = alive(disc, cloud.seed, cloud.wind, i, time_s);
-                Generated::given(p.position - center, p.sigmas[1], 1.0, p.kappa)
+                Generated::given(p.position - center, p.sigmas[1], Shape::BALL, p.kappa)
             };
             (0..disc.n_particles).map(of).collect()
         }

@@ -117,14 +117,14 @@ pub fn blobs(generated: &[Generated], placed: &[DVec3]) -> Vec<Blob> {
     generated
         .iter()
         .zip(placed)
-        .map(|(g, &position)| Blob { position, sigma: g.sigma, aspect: g.aspect, kappa: g.kappa })
+        .map(|(g, &position)| Blob { position, sigma: g.sigma, shape: g.shape, kappa: g.kappa })
         .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::cloud::{CloudSource, Particle};
+    use crate::model::cloud::{CloudSource, Particle, Shape};
     use crate::model::growth::Growth;
     use crate::model::gust::Gust;
     use crate::model::texture::Texture;
@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn groups_are_placed_by_wind_centre_and_origin() {
         let particle = |x| Particle {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position: DVec3::X * x,
             sigma: 1.0,
             kappa: 1.0,
@@ -176,14 +176,14 @@ mod tests {
         assert_eq!(cloud_centers(&clouds, 10.0, origin)[0], offsets[0]);
         assert_eq!(
             blobs(&generated, &placed)[1],
-            Blob { aspect: 1.0, position: placed[1], sigma: 1.0, kappa: 1.0 }
+            Blob { shape: Shape::BALL, position: placed[1], sigma: 1.0, kappa: 1.0 }
         );
     }
 
     #[test]
     fn a_cloud_grows_about_its_own_centre() {
         let particle = |x| Particle {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position: DVec3::X * x,
             sigma: 0.5,
             kappa: 1.0,

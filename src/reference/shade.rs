@@ -131,11 +131,12 @@ fn density(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::cloud::Shape;
 
     /// A view along −z with the blob's centre off the axis.
     fn seen(aspect: f64, slope: DVec3) -> (SeenShade, Blob, DVec3) {
         let c = DVec3::new(30.0, -20.0, -100.0);
-        let blob = Blob { position: c, sigma: 0.5, aspect, kappa: 1.0 };
+        let blob = Blob { position: c, sigma: 0.5, shape: Shape::upright(aspect), kappa: 1.0 };
         let shade = Shade { base: 0.5, slope };
         (SeenShade::new(&View::ONE_PIXEL, &blob, c, &shade), blob, c)
     }

@@ -17,6 +17,7 @@ use super::composed::{Composed, U};
 use super::composite::{OpaquePixel, Rounding};
 use super::shade::below;
 use super::view::View;
+use crate::model::cloud::Shape;
 
 /// Pixels of a row between whose first and last the light of cells is linear.
 const LIGHT_RUN: u32 = 8;
@@ -184,7 +185,7 @@ impl Ray<'_> {
         let distance = c.length();
         // Along the ray, a ball lies as along the one through its centre.
         let white = blob.whiten(self.direction);
-        let (foot, width) = match blob.aspect == 1.0 {
+        let (foot, width) = match blob.shape == Shape::BALL {
             true => (distance, blob.sigma),
             false => {
                 (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length())

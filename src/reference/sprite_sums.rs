@@ -104,14 +104,14 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::model::cloud::SQRT_TAU;
+    use crate::model::cloud::{SQRT_TAU, Shape};
     use crate::reference::Blob;
 
     const VIEW: View = View::ONE_PIXEL;
 
     fn blob(z: f64, tau: f64) -> Blob {
         let kappa = tau / (SQRT_TAU * 0.25);
-        Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma: 0.25, kappa }
+        Blob { shape: Shape::BALL, position: DVec3::NEG_Z * z, sigma: 0.25, kappa }
     }
 
     fn sums(blobs: &[Blob], behind: OpaquePixel, rounding: &Rounding) -> SpriteSums {

@@ -119,7 +119,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::model::cloud::SQRT_TAU;
+    use crate::model::cloud::{SQRT_TAU, Shape};
     use crate::reference::Blob;
 
     const VIEW: View = View::ONE_PIXEL;
@@ -129,7 +129,8 @@ mod tests {
         // α = ½ of both blobs: the near one has ½, the far one ½ of what is left, the background
         // the rest.
         let kappa = std::f64::consts::LN_2 / (SQRT_TAU * 0.25);
-        let at = |z: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
+        let at =
+            |z: f64| Blob { shape: Shape::BALL, position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
         let blobs = [at(2.0), at(4.0)];
         let sprites = Sprites {
             blobs: &blobs,
@@ -160,7 +161,8 @@ mod tests {
         // α = 1 − e^{−ln 2} = ½ through the centres; colours (1, 0, 0) at depth 2 and (0, 1, 0) at
         // depth 4.
         let kappa = std::f64::consts::LN_2 / (SQRT_TAU * 0.25);
-        let at = |z: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
+        let at =
+            |z: f64| Blob { shape: Shape::BALL, position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
         let (blobs, colors) = ([at(2.0), at(4.0)], [DVec3::X, DVec3::Y]);
         let over = |depth: f64, depth_bound: f64| {
             let behind = OpaquePixel {

@@ -73,7 +73,7 @@ pub fn omitted(
 mod tests {
     use super::*;
     use crate::model::camera::Pose;
-    use crate::model::cloud::SQRT_TAU;
+    use crate::model::cloud::{SQRT_TAU, Shape};
     use glam::{DVec2, DVec3};
 
     #[test]
@@ -97,7 +97,7 @@ mod tests {
         };
         // From a centre at depth 2 the outer rays pass at b = √2: b²/2σ² = 1 at σ = 1.
         let blob = |tau: f64| Blob {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position: DVec3::NEG_Z * 2.0,
             sigma: 1.0,
             kappa: tau / SQRT_TAU,

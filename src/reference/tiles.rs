@@ -88,7 +88,7 @@ mod tests {
 
     use super::*;
     use crate::model::camera::Pose;
-    use crate::model::cloud::SQRT_TAU;
+    use crate::model::cloud::{SQRT_TAU, Shape};
     use crate::model::edge::Edge;
     use crate::reference::{Blob, sprites};
 
@@ -109,7 +109,7 @@ mod tests {
             shift: glam::DVec2::ZERO,
         };
         let at = |x: f64, z: f64, tau: f64| Blob {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position: DVec3::new(x, 0.1, -z),
             sigma: 0.5,
             kappa: tau / (SQRT_TAU * 0.5),

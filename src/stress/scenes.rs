@@ -8,7 +8,7 @@ use super::context::{DeviceFrame, StressContext};
 use crate::error::Result;
 use crate::io::scene_file::parse;
 use crate::model::boxes::{BoxLaw, CloudBox, Form};
-use crate::model::cloud::{Cloud, CloudSource, Facing, Particle, SQRT_TAU};
+use crate::model::cloud::{Cloud, CloudSource, Facing, Particle, SQRT_TAU, Shape};
 use crate::model::growth::Growth;
 use crate::model::gust::Gust;
 use crate::model::scene::Scene;
@@ -126,7 +126,7 @@ pub fn centred_box(n_particles: u32, extent: [f64; 3], radius_max: f64) -> Cloud
 /// Returns a white particle whose optical depth through the centre is `tau`.
 pub fn blob(position: [f64; 3], sigma: f64, tau: f64) -> Particle {
     Particle {
-        aspect: 1.0,
+        shape: Shape::BALL,
         position: DVec3::from_array(position),
         sigma,
         kappa: tau / (SQRT_TAU * sigma),

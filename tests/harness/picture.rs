@@ -16,7 +16,7 @@ use nimbus::layout::facet::{LitRecord, SlopeRecord};
 use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
 use nimbus::model::camera::{Camera, CameraKey};
-use nimbus::model::cloud::SQRT_TAU;
+use nimbus::model::cloud::{SQRT_TAU, Shape};
 use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
 use nimbus::model::grid::GridSpec;
@@ -165,7 +165,7 @@ impl Picture {
         let blob = |(p, q): (&PlacedRecord, &ParticleRecord)| Blob {
             position: double(p.position),
             sigma: f64::from(p.sigma),
-            aspect: f64::from(q.aspect),
+            shape: Shape::upright(f64::from(q.aspect)),
             kappa: f64::from(q.kappa),
         };
         let blobs = self.placed.iter().zip(&self.particles).map(blob);
@@ -199,7 +199,7 @@ impl Picture {
                 Some(_) => blob.position - double(position),
                 None => DVec3::ZERO,
             };
-            Shade::new(double(relative), apart, blob.sigma * blob.axes())
+            Shade::new(double(relative), apart, blob.sigma, &blob.shape)
         };
         Some(self.blobs().into_iter().zip(self.facets()).map(of).collect())
     }
@@ -446,7 +446,7 @@ impl Picture {
         let tau = if self.drawn.is_some() { tau.times(one).times(one) } else { tau };
         let ellipsoid = self
             .has_ellipsoids()
-            .then(|| Ellipsoid::new(blob.aspect, [pose.right.y, pose.up.y, pose.forward.y]));
+            .then(|| Ellipsoid::new(blob.shape.aspect, [pose.right.y, pose.up.y, pose.forward.y]));
         Sprite {
             s: [slope(pose.right), slope(pose.up)],
             z: z_sigmas.squared().scaled(0.5),

@@ -96,7 +96,7 @@ impl Picture {
         let of = |blob: &Blob| Extent {
             center: blob.position,
             half: DVec3::ZERO,
-            sigma_max: blob.sigma * blob.aspect.max(1.0),
+            sigma_max: blob.widest(),
             sigma_mean: blob.sigma,
             reach: self.view.edge.radius,
             n_particles: 1,

@@ -18,6 +18,7 @@ use nimbus::reference::grid::sample;
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
 
 use crate::harness::Gpu;
+use nimbus::model::cloud::Shape;
 
 pub const U: f64 = U_F32;
 /// Mean σ of the groups' particles: some are smaller, some larger.
@@ -81,7 +82,12 @@ impl Scene {
             } else {
                 f64::from((aspect * (1.0 - 2.0 / 3.0 * c)) as f32)
             };
-            Blob { aspect, position: f32_of(position), sigma, kappa: f64::from((0.02 + d) as f32) }
+            Blob {
+                shape: Shape::upright(aspect),
+                position: f32_of(position),
+                sigma,
+                kappa: f64::from((0.02 + d) as f32),
+            }
         };
         let mut blobs: Vec<Blob> = (0..3000).map(blob).collect();
         // In the middle of their cloud, without size, without extinction, far outside.
@@ -102,7 +108,7 @@ impl Scene {
     }
 
     pub fn has_ellipsoids(&self) -> bool {
-        self.blobs.iter().any(|b| b.aspect != 1.0)
+        self.blobs.iter().any(|b| b.shape != Shape::BALL)
     }
 
     /// The GPU's density and facets.
@@ -130,7 +136,7 @@ impl Scene {
         let particle = |b: &Blob| ParticleRecord {
             kappa: b.kappa as f32,
             color: color(b),
-            aspect: b.aspect as f32,
+            aspect: b.shape.aspect as f32,
             ..ParticleRecord::default()
         };
         let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
@@ -246,7 +252,7 @@ impl Scene {
             p_error: 0.0,
             scale,
             scale_error: 0.0,
-            aspect: blob.aspect,
+            aspect: blob.shape.aspect,
             aspect_error: 0.0,
         };
         let normal = self.normal_bound(cells, &around, facet);
@@ -258,7 +264,7 @@ impl Scene {
         let center = self.centers()[facet.region as usize];
         let axes = DVec3::new(1.0, at.aspect, 1.0);
         let density = |x| sample(&self.spec, cells, x);
-        let (g, s) = gradient(density, at.p, at.scale, at.aspect);
+        let (g, s) = gradient(density, at.p, at.scale, &Shape::upright(at.aspect));
         // The sample's offset.
         let scale_error = at.scale_error * at.aspect.max(1.0) + at.scale * at.aspect_error;
         let astray = at.p_error + GRADIENT_RADIUS_SIGMA * scale_error;

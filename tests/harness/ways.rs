@@ -21,6 +21,7 @@ use crate::lights::{self, double, near_light};
 use crate::march::March;
 use crate::occlusion::{Verdict, verdict};
 use crate::sums::PLAIN;
+use nimbus::model::cloud::Shape;
 
 /// All inputs are f32 numbers, equal on both sides.
 pub struct Case {
@@ -49,7 +50,7 @@ pub fn case_of_cells(aspect: f64) -> Case {
     let mut r = Random(21);
     let blobs: Vec<Blob> = (0..25)
         .map(|_| Blob {
-            aspect,
+            shape: Shape::upright(aspect),
             position: DVec3::new(
                 f64::from(r.within(-3.0, 3.0)),
                 f64::from(r.within(-1.0, 1.0)),

@@ -11,7 +11,7 @@ use nimbus::layout::cull::KeptRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::camera::Pose;
-use nimbus::model::cloud::SQRT_TAU;
+use nimbus::model::cloud::{SQRT_TAU, Shape};
 use nimbus::model::edge::Edge;
 use nimbus::passes::blobs::{BlobVariant, BlobView, DepthFrom, Depths};
 use nimbus::passes::cull::{Cull, CullBuffers, CullView, Order};
@@ -178,7 +178,7 @@ impl Scene {
             if self.weighted { f64::from(group.kappa_scale) * f64::from(last) } else { 1.0 };
         let position = DVec3::from(p.position.map(f64::from));
         Blob {
-            aspect: f64::from(q.aspect),
+            shape: Shape::upright(f64::from(q.aspect)),
             position,
             sigma: f64::from(p.sigma),
             kappa: weight * f64::from(q.kappa),

@@ -262,11 +262,12 @@ fn run_bounds(
         root(sigma, square(sigma) - (1.0 - share) * (2.0 * far * d + d * d))
     };
     let spread = of(b.sigma, share);
-    let high = b.sigma * b.aspect;
+    let high = b.sigma * b.shape.aspect;
     let aspect_error = match (run.len(), ellipsoids) {
         (1, _) | (_, false) => 0.0,
         _ => {
-            (of(high, 1.0) + b.aspect * spread) / (b.sigma - spread) + DIVISION_ERROR * U * b.aspect
+            (of(high, 1.0) + b.shape.aspect * spread) / (b.sigma - spread)
+                + DIVISION_ERROR * U * b.shape.aspect
         }
     };
     let means = greatest(&|i| (m.sigma_means[i] - m.sigma_means[first]).abs());
@@ -274,7 +275,7 @@ fn run_bounds(
         if run.len() == 1 { 0.0 } else { spread.max(mean(by_mass, means, b.sigma_mean)) };
     let scale = b.sigma.max(b.sigma_mean);
     let around =
-        Around { p: b.position, p_error, scale, scale_error, aspect: b.aspect, aspect_error };
+        Around { p: b.position, p_error, scale, scale_error, aspect: b.shape.aspect, aspect_error };
     let normal = scene.normal_bound(cells, &around, facet);
     let position = around.shell_bound(normal, facet).max_element();
     let colors = greatest(&|i| (m.colors[i] - m.colors[first]).length());

@@ -11,6 +11,7 @@ use crate::harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
 use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{ParticleRecord, PlacedRecord};
+use nimbus::model::cloud::Shape;
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use nimbus::passes::grid::{Deposit, Grid};
 use nimbus::reference::Blob;
@@ -35,7 +36,7 @@ impl Scene {
         let spec = GridSpec { n_cells: spec.n_cells, cell, aspect, low };
         let f32 = |b: &Blob| Blob {
             position: b.position.as_vec3().as_dvec3(),
-            aspect: f64::from(b.aspect as f32),
+            shape: Shape::upright(f64::from(b.shape.aspect as f32)),
             sigma: f64::from(b.sigma as f32),
             kappa: f64::from(b.kappa as f32),
         };
@@ -45,10 +46,10 @@ impl Scene {
     }
 
     fn fitted(blobs: &[Blob], n: u32) -> Scene {
-        let reach = |b: &Blob| DEPOSIT_CUT_SIGMA * b.sigma * b.axes();
+        let reach = |b: &Blob| DEPOSIT_CUT_SIGMA * b.extents();
         let low = blobs.iter().map(|b| b.position - reach(b)).reduce(DVec3::min).unwrap();
         let high = blobs.iter().map(|b| b.position + reach(b)).reduce(DVec3::max).unwrap();
-        let aspect = blobs.iter().map(|b| b.aspect).sum::<f64>() / blobs.len() as f64;
+        let aspect = blobs.iter().map(|b| b.shape.aspect).sum::<f64>() / blobs.len() as f64;
         Scene::new(&GridSpec::fit(low, high, n, aspect), blobs)
     }
 
@@ -62,7 +63,7 @@ impl Scene {
         };
         let particle = |b: &Blob| ParticleRecord {
             kappa: b.kappa as f32,
-            aspect: b.aspect as f32,
+            aspect: b.shape.aspect as f32,
             ..ParticleRecord::default()
         };
         let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
@@ -88,7 +89,7 @@ impl Scene {
     /// Bound of every cell's density.
     fn bounds(&self) -> Vec<f64> {
         let n_levels = self.n_levels();
-        let level_of = |b: &Blob| self.spec.level_of(b.sigma * b.axes(), n_levels);
+        let level_of = |b: &Blob| self.spec.level_of(b.extents(), n_levels);
         let mut wider: Option<[Vec<f64>; 2]> = None;
         for level in (0..n_levels).rev() {
             let of = |b: &&Blob| b.sigma > 0.0 && b.kappa > 0.0 && level_of(b) == level;
@@ -139,7 +140,7 @@ impl Scene {
 
     /// (cell, weight, its bound) of the cells that a blob can meet along an axis.
     fn axis(&self, blob: &Blob, level: u32, k: usize, n: usize) -> Vec<(usize, f64, f64)> {
-        let (p, of) = (blob.position[k], blob.sigma * blob.axes());
+        let (p, of) = (blob.position[k], blob.extents());
         let sigma = self.spec.deposited(of, level)[k];
         let (low, cell) = (self.spec.low[k], self.spec.level(level).edges()[k]);
         // On wider cells σ is the root of a difference that is at least 7/9 of σ². The square has a
@@ -150,7 +151,7 @@ impl Scene {
         let face = |i: usize| (cell * i as f64 - x) / sigma;
         // A face in σ: i·cell and x are rounded, their difference, and the quotient errs by a
         // division's error. Of ellipsoids σ and the cell are products themselves.
-        let of_shape = if blob.aspect != 1.0 || self.spec.aspect != 1.0 { 1.0 } else { 0.0 };
+        let of_shape = if blob.shape != Shape::BALL || self.spec.aspect != 1.0 { 1.0 } else { 0.0 };
         let face_error = |i: usize| {
             let at = cell * i as f64;
             (U * ((1.0 + of_shape) * at.abs() + x.abs() + (at - x).abs()) / sigma
@@ -215,7 +216,8 @@ fn compiler() -> Compiler {
 }
 
 fn scenes() -> Vec<(&'static str, Scene)> {
-    let at = |x: f64, sigma, kappa| Blob { aspect: 1.0, position: DVec3::splat(x), sigma, kappa };
+    let at =
+        |x: f64, sigma, kappa| Blob { shape: Shape::BALL, position: DVec3::splat(x), sigma, kappa };
     let cells = GridSpec { aspect: 1.0, n_cells: UVec3::splat(9), cell: 1.0, low: DVec3::ZERO };
     vec![
         ("scattered", Scene::fitted(&scattered(3000), 48)),
@@ -290,7 +292,7 @@ fn two_words_hold_what_overflows_one() {
     let cells = GridSpec { aspect: 1.0, n_cells: UVec3::splat(3), cell: 1.0, low: DVec3::ZERO };
     let scene = Scene::new(
         &cells,
-        &[Blob { aspect: 1.0, position: DVec3::splat(1.5), sigma: 0.1, kappa: 2.0 }; 100],
+        &[Blob { shape: Shape::BALL, position: DVec3::splat(1.5), sigma: 0.1, kappa: 2.0 }; 100],
     );
     let values = scene.run(&mut gpu, &compiler());
     let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());

@@ -4,7 +4,7 @@ use crate::harness::{Gpu, assert_within_and_say, check_within};
 use glam::DVec3;
 use nimbus::gpu::Compiler;
 use nimbus::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
-use nimbus::model::cloud::{Cloud, CloudSource, Group, Particle};
+use nimbus::model::cloud::{Cloud, CloudSource, Group, Particle, Shape};
 use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
 use nimbus::model::texture::Texture;
@@ -23,7 +23,7 @@ fn clouds(gust: Gust, growth: Growth) -> Vec<Cloud> {
     let particle = |i: u32, spread: f64| {
         let [a, b, c, d] = uniforms(0x91ace, 0, i, 0);
         let position = spread * (DVec3::new(a, b, c) - 0.5) + 1e4;
-        Particle { aspect: 1.0, position, sigma: 0.1 + d, kappa: 1.0, color: DVec3::ONE }
+        Particle { shape: Shape::BALL, position, sigma: 0.1 + d, kappa: 1.0, color: DVec3::ONE }
     };
     let cloud = |n: u32, spread: f64, position, wind| Cloud {
         facing: nimbus::model::cloud::Facing::Outward,

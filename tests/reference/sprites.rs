@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use half::f16;
 use nimbus::model::boxes::{BoxLaw, Form};
 use nimbus::model::camera::Pose;
-use nimbus::model::cloud::{SQRT_TAU, box_kappa};
+use nimbus::model::cloud::{SQRT_TAU, Shape, box_kappa};
 use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
@@ -53,7 +53,7 @@ fn scattered(n: u32, nearest: f64) -> (Vec<Blob>, Vec<DVec3>) {
         let [a, b, c, d] = lots(2 * i);
         let depth = nearest + 8.0 * f64::from(n - i) / f64::from(n);
         let position = DVec3::new((2.0 * a - 1.0) * depth, (2.0 * b - 1.0) * depth, -depth);
-        Blob { aspect: 1.0, position, sigma: 0.1 + c, kappa: 0.4 * d }
+        Blob { shape: Shape::BALL, position, sigma: 0.1 + c, kappa: 0.4 * d }
     };
     let color = |i: u32| DVec3::from_slice(&lots(2 * i + 1)[..3]);
     ((0..n).map(blob).collect(), (0..n).map(color).collect())
@@ -61,7 +61,7 @@ fn scattered(n: u32, nearest: f64) -> (Vec<Blob>, Vec<DVec3>) {
 
 #[test]
 fn one_blob_at_two_pixels() {
-    let blob = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.6 };
+    let blob = Blob { shape: Shape::BALL, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.6 };
     let color = DVec3::new(0.2, 0.5, 2.0);
     let image = render(&view(5, 3), &plain(&[blob], &[color], &[0]));
     // Centre pixel: b = 0, τ = √(2π)κσ. Column 3 of the middle row: direction (2·3.5/5 − 1)·5/3 =
@@ -83,7 +83,7 @@ fn one_blob_at_two_pixels() {
 #[test]
 fn what_is_behind_near_or_absent_is_not_drawn() {
     let zeros = vec![[0.0; 4]; 15];
-    let at = |z| Blob { aspect: 1.0, position: DVec3::Z * z, sigma: 1.0, kappa: 0.6 };
+    let at = |z| Blob { shape: Shape::BALL, position: DVec3::Z * z, sigma: 1.0, kappa: 0.6 };
     for z in [3.0, 0.0, -0.0999, f64::NAN] {
         assert_eq!(render(&view(5, 3), &plain(&[at(z)], &[DVec3::ONE], &[0])), zeros);
     }
@@ -112,7 +112,7 @@ fn equal_colors_hide_the_order_and_equal_layers_multiply() {
     for (a, b) in a.iter().zip(&b) {
         assert!((0..4).all(|k| (a[k] - b[k]).abs() < 1e-13) && (a[2] - 0.9 * a[3]).abs() < 1e-13);
     }
-    let layer = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.1 };
+    let layer = Blob { shape: Shape::BALL, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.1 };
     let image = render(&view, &plain(&[layer; 7], &[color; 7], &[0, 1, 2, 3, 4, 5, 6]));
     let one = render(&view, &plain(&[layer], &[color], &[0]));
     assert!(
@@ -193,7 +193,7 @@ fn half_float_targets_stay_within_their_bound() {
 fn a_sprites_edge_may_fall_either_way() {
     // b = 2.4 at column 4 (see above): the cut at 3σ lies 1e-7 inside, then outside.
     for sigma in [0.8 * (1.0 - 1e-7), 0.8 * (1.0 + 1e-7)] {
-        let blob = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma, kappa: 0.6 };
+        let blob = Blob { shape: Shape::BALL, position: DVec3::NEG_Z * 3.0, sigma, kappa: 0.6 };
         let bound = |edge| {
             let rounding = Rounding::of(FilmFormat::Rgba32f, 0.0, edge);
             over_nothing(&view(5, 3), &plain(&[blob], &[DVec3::ONE], &[0]), &rounding).1[9][3]

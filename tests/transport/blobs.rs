@@ -96,6 +96,7 @@ fn a_flight_ends_at_its_end() {
 /// Many blobs, some of them far away, one in the other: the tree finds what a search of all finds.
 #[test]
 fn a_tree_of_many_blobs_finds_them_all() {
+    use nimbus::model::cloud::Shape;
     use nimbus::reference::Blob;
     use nimbus::reference::transport::{BlobMedium, Scatterer};
     let mut stream = Stream::new(1, 1);
@@ -104,10 +105,15 @@ fn a_tree_of_many_blobs_finds_them_all() {
         .map(|i| Blob {
             position: DVec3::new(number(-5.0, 5.0), number(-1.0, 1.0), number(-5.0, 5.0)),
             sigma: if i % 97 == 0 { 1.5 } else { number(0.02, 0.2) },
-            aspect: if i % 5 == 0 { number(0.1, 3.0) } else { 1.0 },
+            shape: Shape::upright(if i % 5 == 0 { number(0.1, 3.0) } else { 1.0 }),
             kappa: number(0.0, 2.0),
         })
-        .chain((0..200).map(|_| Blob { position: DVec3::ONE, sigma: 0.1, aspect: 1.0, kappa: 0.1 }))
+        .chain((0..200).map(|_| Blob {
+            position: DVec3::ONE,
+            sigma: 0.1,
+            shape: Shape::BALL,
+            kappa: 0.1,
+        }))
         .collect();
     let scatterer = Scatterer { albedo: DVec3::ONE, phase: isotropic() };
     let all = BlobMedium::new(&blobs, &vec![0; blobs.len()], vec![scatterer]);

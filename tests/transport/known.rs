@@ -12,13 +12,14 @@ use nimbus::reference::transport::{
 };
 
 use crate::{Mean, paths, radiance, ray};
+use nimbus::model::cloud::Shape;
 
 /// Blobs of different sizes, shapes and depths in one another.
 pub fn crowd() -> Vec<Blob> {
     let blob = |x: f64, y: f64, z: f64, sigma: f64, aspect: f64, kappa: f64| Blob {
         position: DVec3::new(x, y, z),
         sigma,
-        aspect,
+        shape: Shape::upright(aspect),
         kappa,
     };
     vec![

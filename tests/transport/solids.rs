@@ -9,6 +9,7 @@ use nimbus::model::phase::Phase;
 use nimbus::reference::transport::{Lights, Ray, Solids, TransportScene};
 
 use crate::{Vacuum, radiance, ray};
+use nimbus::model::cloud::Shape;
 
 fn diffuse(kd: f64) -> Brdf {
     Brdf { kd: DVec3::splat(kd), ks: DVec3::ZERO, ns: 1.0 }
@@ -110,8 +111,12 @@ fn a_cloud_in_a_room_takes_nothing_away() {
     let rho = 0.5;
     let lamp = Light::Point { position: DVec3::Y * 0.8, intensity: DVec3::ONE, radius: 0.01 };
     let of = |kappa: f64| {
-        let blob =
-            nimbus::reference::Blob { position: DVec3::ZERO, sigma: 0.15, aspect: 1.0, kappa };
+        let blob = nimbus::reference::Blob {
+            position: DVec3::ZERO,
+            sigma: 0.15,
+            shape: Shape::BALL,
+            kappa,
+        };
         let scatterer = nimbus::reference::transport::Scatterer {
             albedo: DVec3::ONE,
             phase: Phase::HenyeyGreenstein { g: 0.5 },

@@ -38,7 +38,7 @@ fn list(scene: &Scene) -> &[Particle] {
 /// κ (2π)^{3/2} σ² σ_y of all.
 fn mass(list: &[Particle]) -> f64 {
     let of = |p: &Particle| {
-        p.kappa * (2.0 * std::f64::consts::PI).powf(1.5) * p.sigma.powi(3) * p.aspect
+        p.kappa * (2.0 * std::f64::consts::PI).powf(1.5) * p.sigma.powi(3) * p.shape.aspect
     };
     list.iter().map(of).sum()
 }
@@ -62,7 +62,9 @@ fn particles_hold_the_files_extinction_whatever_the_exaggeration() {
         assert!((found / truth - 1.0).abs() < 1e-9, "{exaggeration}: {found:e} of {truth:e}");
         assert!(list(&scene).len() <= 5000 && list(&scene).len() > 4000);
         assert!(
-            list(&scene).iter().all(|p| p.position.is_finite() && p.sigma > 0.0 && p.aspect > 0.0)
+            list(&scene)
+                .iter()
+                .all(|p| p.position.is_finite() && p.sigma > 0.0 && p.shape.aspect > 0.0)
         );
         assert_eq!(scene.clouds[0].facing, Facing::Up);
         assert!(scene.has_ellipsoids());
@@ -125,7 +127,7 @@ fn between_steps_mass_is_linear_and_particles_keep_their_numbers() {
             );
             assert!(
                 p.sigma <= group.sigma_max * (1.0 + 1e-12)
-                    && p.sigma * p.aspect <= group.sigma_y_max * (1.0 + 1e-12)
+                    && p.sigma * p.shape.aspect <= group.sigma_y_max * (1.0 + 1e-12)
             );
         }
     }

@@ -2,7 +2,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::model::boxes::{BoxLaw, CloudBox, Form};
-use crate::model::cloud::{Facing, Particle};
+use crate::model::cloud::{Facing, Particle, Shape};
 use crate::model::growth::Growth;
 use crate::model::gust::Gust;
 use crate::model::texture::Texture;
@@ -36,8 +36,13 @@ fn of_boxes(counts: &[u32]) -> Cloud {
 }
 
 fn of_list(n: usize) -> Cloud {
-    let p =
-        Particle { position: DVec3::ZERO, sigma: 1.0, aspect: 1.0, kappa: 1.0, color: DVec3::ONE };
+    let p = Particle {
+        position: DVec3::ZERO,
+        sigma: 1.0,
+        shape: Shape::BALL,
+        kappa: 1.0,
+        color: DVec3::ONE,
+    };
     cloud(CloudSource::Particles(vec![p; n].into()))
 }
 

@@ -39,7 +39,7 @@ pub(super) fn reach(blob: &Blob) -> f64 {
 /// Returns low and high corner of blobs.
 fn bounds(blobs: &[Blob], shown: &[usize]) -> [DVec3; 2] {
     let of = |&i: &usize| {
-        let extent = reach(&blobs[i]) * blobs[i].sigma * blobs[i].axes();
+        let extent = reach(&blobs[i]) * blobs[i].extents();
         [blobs[i].position - extent, blobs[i].position + extent]
     };
     let all = shown.iter().map(of).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
@@ -63,7 +63,8 @@ pub(super) fn usual_step(blobs: &[Blob], shown: &[usize]) -> f64 {
     (narrow / CELLS_A_SIGMA).max((volume / USUAL_CELLS).cbrt())
 }
 
-/// Returns the extinction and the mean albedo of the cells. A blob has its whole mass on the grid.
+/// Returns the extinction and the mean albedo of the cells. An upright blob has its whole mass on
+/// the grid; one that lies askew has its density at the cells' centres.
 pub(super) fn extinction(
     parts: &TransportParts,
     shown: &[usize],
@@ -107,7 +108,8 @@ fn layer(
     for &i in shown {
         let blob = &parts.blobs[i];
         let albedo = parts.scatterers[parts.i_scatterer[i] as usize].albedo;
-        let (extent, at) = (reach(blob) * blob.sigma * blob.axes(), blob.position - low);
+        let extents = blob.extents();
+        let (extent, at) = (reach(blob) * extents, blob.position - low);
         let range = |axis: usize| {
             let first = ((at[axis] - extent[axis]) / step).floor().max(0.0) as u32;
             let end = ((at[axis] + extent[axis]) / step).ceil();
@@ -116,10 +118,24 @@ fn layer(
         if !range(2).contains(&k) {
             continue;
         }
+        if !blob.shape.is_upright() {
+            let whiten = blob.white_matrix();
+            for j in range(1) {
+                for i in range(0) {
+                    let x = DVec3::new(center(i), center(j), center(k)) - at;
+                    let density = blob.kappa * (-0.5 * (whiten * x).length_squared()).exp();
+                    let cell = &mut cells[(j * n[0] + i) as usize];
+                    for (c, a) in cell.iter_mut().zip([albedo.x, albedo.y, albedo.z, 1.0]) {
+                        *c += a * density;
+                    }
+                }
+            }
+            continue;
+        }
         // Shares of the mass along an axis. Of a blob that is narrow against the cells, the samples
         // would not add up to its mass.
         let shares = |axis: usize| -> Vec<f64> {
-            let sigma = blob.sigma * blob.axes()[axis];
+            let sigma = extents[axis];
             let value = |k: u32| (-0.5 * ((center(k) - at[axis]) / sigma).powi(2)).exp();
             let sum: f64 = range(axis).map(value).sum();
             let nearest = ((at[axis] / step) as u32).min(n[axis] - 1);

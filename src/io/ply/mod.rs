@@ -19,7 +19,7 @@ pub use write::{ENDING, write};
 
 use super::memory;
 use crate::error::{Error, Place, Result};
-use crate::model::cloud::Particle;
+use crate::model::cloud::{Particle, Shape};
 
 /// The element whose rows are particles.
 const ELEMENT: &str = "vertex";
@@ -55,7 +55,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Read> {
     let rows = Rows::new(&header, bytes, i, path)?;
     let n_bytes = element.n.saturating_mul(size_of::<Particle>() as u64);
     memory::check(n_bytes, || format!("{}: {} particles", path.display(), element.n))?;
-    let blank = Particle { sigma: 0.0, aspect: 1.0, ..Particle::default() };
+    let blank = Particle { sigma: 0.0, shape: Shape::BALL, ..Particle::default() };
     let particles = rows.map(blank, &columns)?;
     let notes = columns.notes(particles.len());
     Ok(Read { particles, notes })

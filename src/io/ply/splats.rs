@@ -10,7 +10,7 @@ use super::rows::{Fault, Made, OfRow};
 use crate::io::bounds::{AMOUNT, DIVISOR, GREATEST, LEAST, wrong_coordinate, wrong_size};
 use crate::io::document::suggest::list;
 use crate::io::particle_file::wrong_height;
-use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, SQRT_TAU};
+use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, SQRT_TAU, Shape};
 
 /// Greatest opacity of a splat, as in the rasterizer of Kerbl et al.: no splat hides all behind it.
 const MOST_OPACITY: f64 = 0.99;
@@ -251,7 +251,7 @@ impl OfRow<Particle> for Columns {
                 DVec3::new(r?, g?, b?)
             }
         };
-        Ok(Particle { position, sigma, aspect, kappa, color })
+        Ok(Particle { position, sigma, shape: Shape::upright(aspect), kappa, color })
     }
 }
 

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::io::mapped_file::MappedFile;
+use crate::model::cloud::Shape;
 
 const PATH: &str = "a.ply";
 /// √(2π).
@@ -63,7 +64,7 @@ fn every_format_has_the_same_particles() {
     let expected = Particle {
         position: DVec3::new(1.5, -2.0, 3.0),
         sigma: 2.0,
-        aspect: 1.0,
+        shape: Shape::BALL,
         kappa: 0.25,
         color: DVec3::new(1.0, 0.2, 0.0),
     };
@@ -101,7 +102,7 @@ fn a_splat_has_its_opacity_through_the_middle() {
         "x y z scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 opacity f_dc_0 f_dc_1 f_dc_2";
     let found = one(names, &format!("1 2 3 {LN_2} {LN_2} {LN_2} 0.3 0.1 -2 0.5 0 0 1 -3"));
     let p = found.particles[0];
-    assert_eq!((p.position, p.aspect), (DVec3::new(1.0, 2.0, 3.0), 1.0));
+    assert_eq!((p.position, p.shape), (DVec3::new(1.0, 2.0, 3.0), Shape::BALL));
     assert!(is_near(p.sigma, 2.0) && is_near(p.kappa, LN_2 / (ROOT * 2.0)), "{p:?}");
     // ½ + f/(2√π), not below 0.
     assert!(is_near(p.color.y, 0.5 + 0.5 / std::f64::consts::PI.sqrt()));
@@ -119,13 +120,19 @@ fn ellipsoids_keep_mass_height_and_mean_width() {
     // Turned about x by a right angle, z becomes the height.
     let upright = one(names, &format!("0 0 0 0 0 {ln3} {FRAC_1_SQRT_2} {FRAC_1_SQRT_2} 0 0 2"));
     let p = upright.particles[0];
-    assert!(is_near(p.sigma, 1.0) && is_near(p.aspect, 3.0) && is_near(p.kappa, 2.0), "{p:?}");
+    assert!(
+        is_near(p.sigma, 1.0) && is_near(p.shape.aspect, 3.0) && is_near(p.kappa, 2.0),
+        "{p:?}"
+    );
     assert_eq!(upright.notes, [""; 0]);
     // By half of that, variances along y and z are (1 + 9)/2.
     let (cos, sin) = (std::f64::consts::FRAC_PI_8.cos(), std::f64::consts::FRAC_PI_8.sin());
     let askew = one(names, &format!("0 0 0 0 0 {ln3} {cos} {sin} 0 0 2"));
     let p = askew.particles[0];
-    assert!(is_near(p.sigma, 3f64.sqrt()) && is_near(p.sigma * p.aspect, 5f64.sqrt()), "{p:?}");
+    assert!(
+        is_near(p.sigma, 3f64.sqrt()) && is_near(p.sigma * p.shape.aspect, 5f64.sqrt()),
+        "{p:?}"
+    );
     assert!(is_near(p.kappa * 3.0 * 5f64.sqrt(), 2.0 * 3.0), "mass: {p:?}");
     assert!(askew.notes[0].starts_with("1 of 1 ellipsoids lie askew"), "{:?}", askew.notes);
     // A splat of any shape: its opacity times its area, in the mean over directions.
@@ -198,7 +205,7 @@ fn what_is_written_is_read_again() {
     let particle = |i: u32| Particle {
         position: DVec3::new(f64::from(i), 0.1, -1e9),
         sigma: 0.3,
-        aspect: 1.0,
+        shape: Shape::BALL,
         kappa: 1.0 / 3.0,
         color: DVec3::new(0.1, 0.2, 1.0),
     };

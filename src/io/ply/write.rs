@@ -24,7 +24,7 @@ pub fn write(path: &Path, particles: &[Particle]) -> Result<()> {
         writeln!(out, "end_header")?;
         for p in particles {
             let ([x, y, z], [r, g, b]) = (p.position.to_array(), p.color.to_array());
-            for v in [x, y, z, p.sigma, p.sigma * p.aspect, p.kappa, r, g, b] {
+            for v in [x, y, z, p.sigma, p.sigma * p.shape.aspect, p.kappa, r, g, b] {
                 out.write_all(&v.to_le_bytes())?;
             }
         }

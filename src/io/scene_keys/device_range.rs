@@ -90,7 +90,9 @@ pub fn out_of_range_when_grown(cloud: &Cloud) -> Option<String> {
 /// infinite where all are 0.
 fn least_sigma(cloud: &Cloud) -> f64 {
     let sigmas: Vec<f64> = match &cloud.source {
-        CloudSource::Particles(list) => list.iter().map(|p| p.sigma * p.aspect.min(1.0)).collect(),
+        CloudSource::Particles(list) => {
+            list.iter().map(|p| p.sigma * p.shape.narrowest()).collect()
+        }
         _ => cloud.groups(0, 0).iter().map(|g| g.sigma_max).collect(),
     };
     sigmas.into_iter().filter(|sigma| *sigma > 0.0).fold(f64::INFINITY, f64::min)

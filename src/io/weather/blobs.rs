@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 use super::wrf::{Clouds, WeatherFile};
 use crate::error::Result;
 use crate::io::bounds::GREATEST;
-use crate::model::cloud::{MIN_ASPECT, Particle};
+use crate::model::cloud::{MIN_ASPECT, Particle, Shape};
 use crate::model::terrain::Terrain;
 use crate::model::weather::particles::{Layout, WeatherBlob};
 
@@ -55,7 +55,7 @@ pub fn particle(blob: &WeatherBlob, exaggeration: f64) -> Particle {
     Particle {
         position: (blob.position * shape).clamp(DVec3::splat(-GREATEST), DVec3::splat(GREATEST)),
         sigma: blob.sigma_xy,
-        aspect,
+        shape: Shape::upright(aspect),
         kappa,
         color: DVec3::ONE,
     }
@@ -82,12 +82,13 @@ mod tests {
         };
         for (exaggeration, aspect) in [(1.0, 0.025), (10.0, 0.25), (0.01, 1e-3)] {
             let p = particle(&blob, exaggeration);
-            assert!((p.aspect / aspect - 1.0).abs() < 1e-12, "{p:?}");
+            assert!((p.shape.aspect / aspect - 1.0).abs() < 1e-12, "{p:?}");
             assert!((p.position - DVec3::new(7.0, 300.0 * exaggeration, -2.0)).length() < 1e-9);
             // κ σ_y is the optical depth of the vertical line through its centre, but for a
             // constant.
             assert!(
-                (p.kappa * p.aspect * p.sigma / (blob.kappa * blob.sigma_z) - 1.0).abs() < 1e-12
+                (p.kappa * p.shape.aspect * p.sigma / (blob.kappa * blob.sigma_z) - 1.0).abs()
+                    < 1e-12
             );
         }
     }

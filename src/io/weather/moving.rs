@@ -11,7 +11,7 @@ use super::spans::{MOST_TOGETHER, Spans};
 use super::wrf::{Step, WeatherFile};
 use crate::error::Result;
 use crate::model::animated::{AnimatedParticles, Animation};
-use crate::model::cloud::{MIN_ASPECT, Particle, mass};
+use crate::model::cloud::{MIN_ASPECT, Particle, Shape, mass};
 use crate::model::weather::particles::Layout;
 use crate::model::weather::steps::between;
 
@@ -73,9 +73,9 @@ fn moving_by(
         sigma_max: bounds.sigma,
         sigma_y_max: bounds.sigma_y,
         sigma_mean: mean(&|p| p.sigma),
-        aspect_mean: mean(&|p| p.aspect),
+        aspect_mean: mean(&|p| p.shape.aspect),
         kappa_max: greatest(&|p| p.kappa),
-        mass_max: greatest(&|p| mass(p.kappa, p.sigma) * p.aspect),
+        mass_max: greatest(&|p| mass(p.kappa, p.sigma) * p.shape.aspect),
         animation: Arc::new(steps),
     })
 }
@@ -141,12 +141,12 @@ impl Steps {
     /// Clamps a particle to the bounds and keeps its mass.
     fn kept_to(&self, p: Particle) -> Particle {
         let sigma = p.sigma.min(self.bounds.sigma);
-        let aspect = p.aspect.min(self.bounds.sigma_y / sigma).max(MIN_ASPECT);
-        let thinner = mass(p.kappa, p.sigma) * p.aspect / (mass(1.0, sigma) * aspect);
+        let aspect = p.shape.aspect.min(self.bounds.sigma_y / sigma).max(MIN_ASPECT);
+        let thinner = mass(p.kappa, p.sigma) * p.shape.aspect / (mass(1.0, sigma) * aspect);
         Particle {
             position: p.position.clamp(self.bounds.low, self.bounds.high),
             sigma,
-            aspect,
+            shape: Shape::upright(aspect),
             kappa: thinner,
             ..p
         }
@@ -157,7 +157,7 @@ impl Steps {
         Particle {
             position: 0.5 * (self.bounds.low + self.bounds.high),
             sigma: self.bounds.sigma,
-            aspect: 1.0,
+            shape: Shape::BALL,
             kappa: 0.0,
             color: DVec3::ONE,
         }
@@ -181,8 +181,9 @@ mod tests {
             moving_by(wrf::open(&path).unwrap(), settings, 3, most_together).unwrap()
         };
         let (many, few) = (of(0), of(MOST_TOGETHER));
-        let mass_of =
-            |all: &[Particle]| all.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).sum::<f64>();
+        let mass_of = |all: &[Particle]| {
+            all.iter().map(|p| mass(p.kappa, p.sigma) * p.shape.aspect).sum::<f64>()
+        };
         // Steps of 120 s: at 0, 2 and 4 s.
         for t in [-1.0, 0.0, 0.7, 2.0, 3.1, 4.0, 9.0] {
             let (a, b) = (many.animation.at(t).unwrap(), few.animation.at(t).unwrap());
@@ -193,14 +194,14 @@ mod tests {
             };
             assert!(a.iter().all(|p| within(p)
                 && p.sigma <= many.sigma_max
-                && p.sigma * p.aspect <= many.sigma_y_max * 1.000001));
+                && p.sigma * p.shape.aspect <= many.sigma_y_max * 1.000001));
         }
         // A particle that jumps has no mass at that moment.
         for (t, is_all) in [(0.5, false), (2.0, false), (4.0, true)] {
             let [a, b] = [t - 1e-6, t + 1e-6].map(|t| many.animation.at(t).unwrap());
             let whole = mass_of(&a);
             for (p, q) in a.iter().zip(b.iter()) {
-                let of = |p: &Particle| mass(p.kappa, p.sigma) * p.aspect;
+                let of = |p: &Particle| mass(p.kappa, p.sigma) * p.shape.aspect;
                 let changed = if p.position.distance(q.position) > 1.0 {
                     of(p).max(of(q))
                 } else {

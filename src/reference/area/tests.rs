@@ -7,6 +7,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use mean::Window;
 
+use crate::model::cloud::Shape;
 use crate::model::light::Light;
 use crate::model::material::Brdf;
 use crate::model::surface::Surface;
@@ -198,7 +199,7 @@ fn blockers_and_blobs_attenuate() {
     // A wide blob that every ray to a small lamp crosses near its centre: e^{−τ}, with τ nearly
     // constant.
     let small = rect(at(0.0, 200.0, 0.0), 0.1 * DVec3::X, 0.1 * DVec3::Z);
-    let blob = Blob { aspect: 1.0, position: at(0.0, 100.0, 0.0), sigma: 5.0, kappa: 0.2 };
+    let blob = Blob { shape: Shape::BALL, position: at(0.0, 100.0, 0.0), sigma: 5.0, kappa: 0.2 };
     let ratio = second(&[small], &[blob]).irradiance.x / second(&[small], &[]).irradiance.x;
     // b ≤ 0.07 at the blob: b²/2σ² < 1e-4.
     assert!((ratio / (-2.506_628_274_631f64).exp() - 1.0).abs() < 2.6e-4, "{ratio}");

@@ -43,6 +43,7 @@ pub fn transmittance(blobs: &[Blob], forward: f64, p: DVec3, source: Source) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::cloud::Shape;
     use crate::model::light::Light;
     use crate::model::material::Brdf;
     use crate::model::surface::Surface;
@@ -95,7 +96,7 @@ mod tests {
 
     #[test]
     fn blobs_by_hand() {
-        let blob = Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 2.0, kappa: 0.5 };
+        let blob = Blob { shape: Shape::BALL, position: DVec3::ZERO, sigma: 2.0, kappa: 0.5 };
         let depth = |p: DVec3, s| -transmittance(&[blob], 0.0, p, s).ln();
         // Through the centre √(2π)κσ = √(2π); from the centre on half of it.
         let whole = 2.506_628_274_631_000_5;

@@ -1,6 +1,7 @@
 use glam::{DVec3, UVec3};
 
 use super::{DiffuseLight, DiffusionMedium, Multigrid, Sources, System, solve};
+use crate::model::cloud::Shape;
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 use crate::model::medium::MeanMedium;
@@ -22,7 +23,7 @@ fn spec(n: [u32; 3], aspect: f64) -> GridSpec {
 
 fn blobs() -> Vec<Blob> {
     let blob = |x: f64, y: f64, z: f64, sigma, kappa| Blob {
-        aspect: 1.0,
+        shape: Shape::BALL,
         position: DVec3::new(x, y, z),
         sigma,
         kappa,

@@ -41,7 +41,7 @@ impl FrameReference {
         let shade = |(blob, i): (&Blob, u32)| {
             let FacetSlope { relative, position } = self.slopes[i as usize];
             let apart = if scene.groups_facets() { blob.position - position } else { DVec3::ZERO };
-            Shade::new(relative, apart, blob.sigma * blob.axes())
+            Shade::new(relative, apart, blob.sigma, &blob.shape)
         };
         let shades = || self.blobs.iter().zip(self.particle_facets(scene)).map(shade).collect();
         (!self.slopes.is_empty()).then(shades)

@@ -206,7 +206,7 @@ const NARROWER: f64 = 0.01;
 /// its σ moves the distance of a ray by that share: τ changes by up to b/σ at the blob's end times
 /// the share.
 pub(super) fn rounding(scene: &Scene, view: &View, blobs: &[Blob]) -> Rounding {
-    let mut sigmas: Vec<f64> = blobs.iter().map(|b| b.sigma * b.aspect.min(1.0)).collect();
+    let mut sigmas: Vec<f64> = blobs.iter().map(|b| b.narrowest()).collect();
     sigmas.retain(|sigma| *sigma > 0.0);
     sigmas.sort_by(f64::total_cmp);
     let narrow = sigmas.get((NARROWER * sigmas.len() as f64) as usize).copied();

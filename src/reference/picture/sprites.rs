@@ -78,7 +78,7 @@ pub(super) fn set_order(scene: &Scene, frame: &FrameReference, blobs: &[Blob]) -
     let (_, exact) = drawn_blobs(scene, frame);
     let FrameState { radius, time_s, .. } = frame.state;
     let sigmas = place::sigma_means(&frame.groups, &scene.clouds, time_s);
-    let sigmas = sigmas.iter().zip(blobs).map(|(sigma, blob)| sigma * blob.aspect.min(1.0));
+    let sigmas = sigmas.iter().zip(blobs).map(|(sigma, blob)| sigma * blob.shape.narrowest());
     let sigma = sigmas.fold(f64::INFINITY, f64::min);
     if scene.draw.sort_bits.of(radius, sigma) > 16 {
         return exact;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::model::cloud::SQRT_TAU;
+use crate::model::cloud::{SQRT_TAU, Shape};
 use crate::reference::Blob;
 use crate::reference::sprites::{render_over, shares_at};
 use crate::reference::volume::Volume;
@@ -8,7 +8,7 @@ const VIEW: View = View { slice: 1.0, ..View::ONE_PIXEL };
 
 fn at(z: f64, sigma: f64, tau: f64) -> Blob {
     let kappa = tau / (SQRT_TAU * sigma);
-    Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma, kappa }
+    Blob { shape: Shape::BALL, position: DVec3::NEG_Z * z, sigma, kappa }
 }
 
 fn drawn(view: &View, blobs: &[Blob], behind: OpaquePixel) -> [f64; 4] {

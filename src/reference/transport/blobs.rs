@@ -3,7 +3,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use statrs::function::erf::erfc_inv;
 
 use super::bvh::{Bounds, Bvh};
@@ -22,8 +22,8 @@ const WHOLE: f64 = 8.2;
 #[derive(Debug, Clone, Copy)]
 struct White {
     center: DVec3,
-    /// 1/σ along each axis.
-    inverse: DVec3,
+    /// Takes the blob to the unit ball.
+    whiten: DMat3,
     /// √(2π) κ: optical depth of a line through the centre on which σ is 1.
     depth: f64,
     /// b²/2 at which lines leave it out.
@@ -64,7 +64,7 @@ impl BlobMedium {
         let boxes: Vec<Bounds> = shown
             .iter()
             .map(|&(i, cut)| {
-                let reach = (2.0 * cut).sqrt() * blobs[i].sigma * blobs[i].axes();
+                let reach = (2.0 * cut).sqrt() * blobs[i].extents();
                 Bounds { low: blobs[i].position - reach, high: blobs[i].position + reach }
             })
             .collect();
@@ -73,7 +73,7 @@ impl BlobMedium {
             let (i, cut) = shown[k as usize];
             White {
                 center: blobs[i].position,
-                inverse: (blobs[i].sigma * blobs[i].axes()).recip(),
+                whiten: blobs[i].white_matrix(),
                 depth: SQRT_TAU * blobs[i].kappa,
                 cut,
                 i_scatterer: i_scatterer[i],
@@ -86,8 +86,8 @@ impl BlobMedium {
 impl White {
     /// Returns the line of `ray` in the blob; `None` if it passes beyond the blob's end.
     fn passage(&self, ray: &Ray) -> Option<Passage> {
-        let from = (ray.origin - self.center) * self.inverse;
-        let along = ray.direction * self.inverse;
+        let from = self.whiten * (ray.origin - self.center);
+        let along = self.whiten * ray.direction;
         let square = along.length_squared();
         let middle = -from.dot(along) / square;
         let off = 0.5 * (from + middle * along).length_squared();

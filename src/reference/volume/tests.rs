@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::model::camera::Pose;
-use crate::model::cloud::SQRT_TAU;
+use crate::model::cloud::{SQRT_TAU, Shape};
 use crate::model::edge::Edge;
 use crate::reference::sprites::{self, Sprites};
 
@@ -34,7 +34,7 @@ fn view(n: u32) -> View {
 
 /// A blob at depth `z` on the axis whose optical depth through the centre is `tau`.
 fn blob(z: f64, sigma: f64, tau: f64) -> Blob {
-    Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma, kappa: tau / (SQRT_TAU * sigma) }
+    Blob { shape: Shape::BALL, position: DVec3::NEG_Z * z, sigma, kappa: tau / (SQRT_TAU * sigma) }
 }
 
 fn one_pixel(blobs: &[Blob], colors: &[DVec3], behind: OpaquePixel) -> Pixel {
@@ -181,7 +181,7 @@ fn crowd(n: u32, scale: f64) -> (Vec<Blob>, Vec<DVec3>) {
         let sigma = 0.03 + 0.5 * lot(k, 3) * lot(k, 3);
         let kappa = scale * lot(k, 4) / (SQRT_TAU * sigma);
         (
-            Blob { aspect: 1.0, position, sigma, kappa },
+            Blob { shape: Shape::BALL, position, sigma, kappa },
             3.0 * DVec3::new(lot(k, 5), lot(k, 6), lot(k, 5) * lot(k, 2)),
         )
     };

@@ -8,7 +8,7 @@ use nimbus::frame::DeviceChoice;
 use nimbus::frame::serial;
 use nimbus::io::scene_file::parse;
 use nimbus::model::boxes::{BoxLaw, CloudBox, Form};
-use nimbus::model::cloud::{Cloud, CloudSource, Particle};
+use nimbus::model::cloud::{Cloud, CloudSource, Particle, Shape};
 use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
 use nimbus::model::scene::Scene;
@@ -28,7 +28,13 @@ fn blob() -> impl Strategy<Value = Particle> {
     let place = [-4.0..4.0, -3.0..3.0, -4.0..4.0].prop_map(DVec3::from_array);
     let color = [0.0..1.0, 0.0..1.0, 0.0..1.0].prop_map(DVec3::from_array);
     (place, 0.01..1.5, prop_oneof![Just(0.0), 0.01..50.0], color).prop_map(
-        |(position, sigma, kappa, color)| Particle { aspect: 1.0, position, sigma, kappa, color },
+        |(position, sigma, kappa, color)| Particle {
+            shape: Shape::BALL,
+            position,
+            sigma,
+            kappa,
+            color,
+        },
     )
 }
 

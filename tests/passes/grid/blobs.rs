@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use nimbus::model::boxes::{BoxLaw, Form};
+use nimbus::model::cloud::Shape;
 use nimbus::reference::Blob;
 use nimbus::reference::generate::{generate_box, uniforms};
 
@@ -15,7 +16,7 @@ pub fn scattered(n: u32) -> Vec<Blob> {
         let ([a, b, c, d], [e, ..]) = (uniforms(0x64123, 0, i, 0), uniforms(0x64123, 1, i, 0));
         let position = DVec3::new(20.0 * a - 8.0, 12.0 * b, 9.0 * c - 40.0);
         Blob {
-            aspect: 1.0,
+            shape: Shape::BALL,
             position,
             sigma: 0.004 * 500f64.powf(d),
             kappa: 10f64.powf(3.0 * e - 2.0),
@@ -27,7 +28,7 @@ pub fn scattered(n: u32) -> Vec<Blob> {
 /// The same, from a fiftieth to five times as high as wide.
 pub fn ellipsoids(n: u32) -> Vec<Blob> {
     let shaped = |(b, i): (Blob, u32)| Blob {
-        aspect: 0.02 * 250f64.powf(uniforms(0x64124, 0, i, 0)[0]),
+        shape: Shape::upright(0.02 * 250f64.powf(uniforms(0x64124, 0, i, 0)[0])),
         ..b
     };
     scattered(n).into_iter().zip(0..).map(shaped).collect()
@@ -41,8 +42,10 @@ pub fn wide(n: u32) -> Vec<Blob> {
 
 /// The same, from half to twice as high as wide.
 pub fn wide_ellipsoids(n: u32) -> Vec<Blob> {
-    let shaped =
-        |(b, i): (Blob, u32)| Blob { aspect: 0.5 * 4f64.powf(uniforms(0x64126, 0, i, 0)[0]), ..b };
+    let shaped = |(b, i): (Blob, u32)| Blob {
+        shape: Shape::upright(0.5 * 4f64.powf(uniforms(0x64126, 0, i, 0)[0])),
+        ..b
+    };
     wide(n).into_iter().zip(0..).map(shaped).collect()
 }
 
@@ -54,7 +57,7 @@ pub fn paper() -> Vec<Blob> {
         generate_box(b, i, 1, &LAW)
             .into_iter()
             .map(move |g| Blob {
-                aspect: g.aspect,
+                shape: g.shape,
                 position: center + g.position,
                 sigma: g.sigma,
                 kappa: g.kappa,
@@ -72,7 +75,12 @@ pub fn at_the_cut() -> Vec<Blob> {
         let sigma = 0.02 + 0.1 * a;
         // Cells of 1 from 0 on: the face at 5 lies 3σ(1 ± 1e-6) away.
         let x = 5.0 - 3.0 * sigma * (1.0 + 2e-6 * (b - 0.5));
-        Blob { aspect: 1.0, position: DVec3::new(x, 4.5, 3.5), sigma, kappa: 1.0 / sigma.powi(3) }
+        Blob {
+            shape: Shape::BALL,
+            position: DVec3::new(x, 4.5, 3.5),
+            sigma,
+            kappa: 1.0 / sigma.powi(3),
+        }
     };
     (0..4000).map(blob).collect()
 }

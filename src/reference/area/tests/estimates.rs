@@ -1,6 +1,7 @@
 //! Error estimates of the law, and agreement with paths in random scenes.
 
 use super::*;
+use crate::model::cloud::Shape;
 use crate::model::philox::{philox4x32_10, uniform};
 use crate::reference::parallel::parallel_map;
 
@@ -40,8 +41,8 @@ fn random_scene(seed: u32) -> (Vec<Surface>, Vec<Brdf>, Vec<Light>) {
 #[test]
 fn quadrature_and_paths_agree_in_random_scenes() {
     let blobs = [
-        Blob { aspect: 1.0, position: at(0.2, 0.3, -0.4), sigma: 0.4, kappa: 1.5 },
-        Blob { aspect: 1.0, position: at(-1.0, 0.0, 0.7), sigma: 0.25, kappa: 2.0 },
+        Blob { shape: Shape::BALL, position: at(0.2, 0.3, -0.4), sigma: 0.4, kappa: 1.5 },
+        Blob { shape: Shape::BALL, position: at(-1.0, 0.0, 0.7), sigma: 0.25, kappa: 2.0 },
     ];
     let discs = [
         DiscFacet {

@@ -1,0 +1,267 @@
+//! The shape of a Gaussian blob, model.md §14: a ball, or an ellipsoid whose axes are turned.
+
+use glam::{DMat3, DQuat, DVec3};
+
+/// Least aspect of a blob; the greatest is its inverse.
+pub const MIN_ASPECT: f64 = 1e-3;
+
+/// A rotation in 64 bits, as records hold it: of a unit quaternion, the three components other than
+/// the greatest, in steps of 1.35e-6. All bits are 0 without a rotation.
+///
+/// Error: 4.7e-6 radians, 2√3 steps. Three components are rounded by half a step, √3/2 together.
+/// The fourth at most doubles their distance, and the angle is twice that of quaternions.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Turn([u32; 2]);
+
+/// Components are stored as whole multiples of this; the greatest of 20 bits is 1/√2.
+const STEP: f64 = std::f64::consts::FRAC_1_SQRT_2 / 524_287.0;
+/// The bits of a component.
+const BITS: u32 = 20;
+
+impl Turn {
+    /// No rotation.
+    pub const NONE: Turn = Turn([0; 2]);
+
+    /// Returns the stored rotation next to a unit quaternion.
+    pub fn new(rotation: DQuat) -> Turn {
+        // w counts first, so that 0 is no rotation.
+        let [x, y, z, w] = rotation.to_array();
+        let of = [w, x, y, z];
+        let greatest =
+            (1..4).fold(0, |most, i| if of[i].abs() > of[most].abs() { i } else { most });
+        let sign = if of[greatest] < 0.0 { -1.0 } else { 1.0 };
+        let others = [[x, y, z], [w, y, z], [w, x, z], [w, x, y]][greatest];
+        let bits = others.map(|v| (sign * v / STEP).round() as i32 as u32 & ((1 << BITS) - 1));
+        Turn([
+            bits[0] | bits[2] << BITS,
+            bits[1] | (bits[2] >> 12) << BITS | (greatest as u32) << 28,
+        ])
+    }
+
+    /// Returns the rotation of these words of a record.
+    pub fn of_words(words: [u32; 2]) -> Turn {
+        Turn(words)
+    }
+
+    /// Returns the words of a record.
+    pub fn words(self) -> [u32; 2] {
+        self.0
+    }
+
+    /// Returns the rotation as a unit quaternion.
+    pub fn rotation(self) -> DQuat {
+        let [low, high] = self.0;
+        let component = |bits: u32| f64::from((bits << (32 - BITS)).cast_signed() >> (32 - BITS));
+        let thirds = low >> BITS | (high >> BITS & 0xff) << 12;
+        let [a, b, c] = [low, high, thirds].map(|bits| STEP * component(bits));
+        let rest = (1.0 - (a * a + b * b + c * c)).max(0.0).sqrt();
+        let [w, x, y, z] = match high >> 28 & 3 {
+            0 => [rest, a, b, c],
+            1 => [a, rest, b, c],
+            2 => [a, b, rest, c],
+            _ => [a, b, c, rest],
+        };
+        DQuat::from_xyzw(x, y, z, w).normalize()
+    }
+}
+
+/// The shape of a blob: its half axes over σ, and their directions. Its first axis is σ long.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    /// Length of the second axis over that of the first. Without a turn the second lies along y.
+    pub aspect: f64,
+    /// Length of the third axis over that of the first.
+    pub aspect_z: f64,
+    /// Turns the axes from x, y and z.
+    pub turn: Turn,
+}
+
+impl Default for Shape {
+    fn default() -> Shape {
+        Shape::BALL
+    }
+}
+
+impl Shape {
+    /// A ball.
+    pub const BALL: Shape = Shape::upright(1.0);
+
+    /// Returns the shape of σ along x and z and `aspect` σ along y.
+    pub const fn upright(aspect: f64) -> Shape {
+        Shape { aspect, aspect_z: 1.0, turn: Turn::NONE }
+    }
+
+    /// Returns whether one axis lies along y, and the others are equal.
+    pub fn is_upright(&self) -> bool {
+        self.aspect_z == 1.0 && self.turn == Turn::NONE
+    }
+
+    /// Returns σ and the shape of an ellipsoid that has these σ along x, y and z before it is
+    /// `turned`. σ is the greatest of them, unless one axis lies along y and the others are equal.
+    /// Aspects below [`MIN_ASPECT`] count as that.
+    pub fn of(scales: DVec3, turned: DQuat) -> (f64, Shape) {
+        let within =
+            |v: f64| if v > 0.0 { v.clamp(MIN_ASPECT, 1.0 / MIN_ASPECT) } else { MIN_ASPECT };
+        let turn = Turn::new(turned);
+        if scales.max_element() <= 0.0 {
+            return (0.0, Shape::BALL);
+        }
+        let is_ball = scales.x == scales.y && scales.y == scales.z;
+        if scales.x == scales.z && scales.x > 0.0 && (is_ball || turn == Turn::NONE) {
+            return (scales.x, Shape::upright(within(scales.y / scales.x)));
+        }
+        // The axes change places in a circle, which is a turn by a third about their diagonal.
+        let first = (1..3).fold(0, |most, i| if scales[i] > scales[most] { i } else { most });
+        let third =
+            DQuat::from_axis_angle(DVec3::splat(3f64.sqrt().recip()), std::f64::consts::TAU / 3.0);
+        let of = [scales.x, scales.y, scales.z];
+        let sigma = of[first];
+        let turned = (0..first).fold(turned, |turned, _| turned * third);
+        let shape = Shape {
+            aspect: within(of[(first + 1) % 3] / sigma),
+            aspect_z: within(of[(first + 2) % 3] / sigma),
+            turn: Turn::new(turned),
+        };
+        (sigma, shape)
+    }
+
+    /// Returns the lengths of the axes over σ.
+    pub fn lengths(&self) -> DVec3 {
+        DVec3::new(1.0, self.aspect, self.aspect_z)
+    }
+
+    /// Returns the axes, unit vectors, as columns.
+    pub fn axes(&self) -> DMat3 {
+        if self.turn == Turn::NONE {
+            return DMat3::IDENTITY;
+        }
+        DMat3::from_quat(self.turn.rotation())
+    }
+
+    /// Returns M v, which is as long across the blob as along it: M divides by the lengths of the
+    /// axes.
+    pub fn whiten(&self, v: DVec3) -> DVec3 {
+        self.along_axes(v, |of, length| of / length)
+    }
+
+    /// Returns M⁻¹ v: from the unit sphere to the blob's.
+    pub fn stretch(&self, v: DVec3) -> DVec3 {
+        self.along_axes(v, |of, length| of * length)
+    }
+
+    fn along_axes(&self, v: DVec3, change: impl Fn(DVec3, DVec3) -> DVec3) -> DVec3 {
+        if self.turn == Turn::NONE {
+            return change(v, self.lengths());
+        }
+        let axes = self.axes();
+        axes * change(axes.transpose() * v, self.lengths())
+    }
+
+    /// Returns S = M⁻²: the covariance over σ².
+    pub fn covariance(&self) -> DMat3 {
+        let lengths = DMat3::from_diagonal(self.lengths() * self.lengths());
+        let axes = self.axes();
+        axes * lengths * axes.transpose()
+    }
+
+    /// Returns the standard deviations along x, y and z over σ.
+    pub fn extents(&self) -> DVec3 {
+        if self.turn == Turn::NONE {
+            return self.lengths();
+        }
+        let axes = self.axes();
+        let stretched = DMat3::from_diagonal(self.lengths()) * axes.transpose();
+        DVec3::from([0, 1, 2].map(|i| stretched.col(i).length()))
+    }
+
+    /// Returns the greatest length of an axis over σ.
+    pub fn widest(&self) -> f64 {
+        self.lengths().max_element()
+    }
+
+    /// Returns the least length of an axis over σ.
+    pub fn narrowest(&self) -> f64 {
+        self.lengths().min_element()
+    }
+
+    /// Returns the standard deviation along y over that across y, in the mean over x and z by its
+    /// square.
+    pub fn aspect_upright(&self) -> f64 {
+        if self.is_upright() {
+            return self.aspect;
+        }
+        let extents = self.extents();
+        extents.y / (0.5 * (extents.x * extents.x + extents.z * extents.z)).sqrt()
+    }
+
+    /// Returns the volume over that of the ball of σ.
+    pub fn volume(&self) -> f64 {
+        self.aspect * self.aspect_z
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rotations() -> Vec<DQuat> {
+        let mut all = vec![DQuat::IDENTITY];
+        for k in 1..60 {
+            let k = f64::from(k);
+            let axis = DVec3::new((1.7 * k).sin(), (2.9 * k).cos(), (0.3 * k * k).sin());
+            all.push(DQuat::from_axis_angle(axis.normalize(), 0.37 * k));
+        }
+        // Two or more components are greatest at once.
+        all.extend(
+            [[0.5; 4], [-0.5, 0.5, -0.5, 0.5], [0.0, 0.0, -1.0, 0.0]].map(DQuat::from_array),
+        );
+        all
+    }
+
+    #[test]
+    fn turns_are_within_their_rounding() {
+        assert_eq!(Turn::new(DQuat::IDENTITY).words(), [0, 0]);
+        for of in rotations() {
+            let turn = Turn::new(of);
+            let off = (of.inverse() * turn.rotation()).normalize();
+            let angle = 2.0 * off.xyz().length();
+            assert!(angle <= 2.0 * 3f64.sqrt() * STEP, "{of} {angle:e}");
+            assert_eq!(Turn::of_words(turn.words()), turn);
+        }
+    }
+
+    #[test]
+    fn shapes_are_the_same_from_every_order_of_axes() {
+        for turned in rotations() {
+            for scales in [
+                DVec3::new(0.2, 1.0, 0.5),
+                DVec3::new(3.0, 0.1, 0.5),
+                DVec3::new(0.3, 0.1, 5.0),
+                DVec3::new(0.3, 2.0, 0.3),
+            ] {
+                let (sigma, shape) = Shape::of(scales, turned);
+                let axes = DMat3::from_quat(turned);
+                let expected = axes * DMat3::from_diagonal(scales * scales) * axes.transpose();
+                let found = sigma * sigma * shape.covariance();
+                assert!(found.abs_diff_eq(expected, 4e-6 * scales.max_element().powi(2)));
+                assert!(
+                    (sigma.powi(3) * shape.volume() / scales.element_product() - 1.0).abs() < 1e-12
+                );
+                for axis in 0..3 {
+                    let extent = sigma * shape.extents()[axis];
+                    assert!((extent - found.col(axis)[axis].sqrt()).abs() < 1e-12 * sigma);
+                }
+                let v = DVec3::new(0.3, -2.0, 1.0);
+                assert!(shape.stretch(shape.whiten(v)).abs_diff_eq(v, 1e-12));
+                let square = shape.whiten(v).length_squared();
+                assert!((v.dot(shape.covariance().inverse() * v) / square - 1.0).abs() < 1e-9);
+            }
+        }
+        let upright = Shape::of(DVec3::new(2.0, 0.5, 2.0), DQuat::IDENTITY);
+        assert_eq!(upright, (2.0, Shape::upright(0.25)));
+        assert!(upright.1.is_upright());
+        assert_eq!(Shape::of(DVec3::splat(2.0), rotations()[7]), (2.0, Shape::BALL));
+        assert_eq!(Shape::of(DVec3::ZERO, rotations()[7]), (0.0, Shape::BALL));
+        assert_eq!(Shape::of(DVec3::new(0.0, 1.0, 1.0), DQuat::IDENTITY).1.narrowest(), MIN_ASPECT);
+    }
+}

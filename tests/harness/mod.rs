@@ -130,7 +130,8 @@ impl Gpu {
     pub fn wrong_compiler(file: &str, from: &str, to: &str) -> Compiler {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{file} does not hold {from}");
-        Compiler::new(sources, None).expect("shaderc")
+        // Most shaders of a pass are as they were, and the cache has them.
+        Compiler::new(sources, Compiler::default_cache()).expect("shaderc")
     }
 }
 

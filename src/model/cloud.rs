@@ -144,7 +144,7 @@ impl Cloud {
             sigma_mean: 0.0,
             sigma_by_area: 0.0,
             aspects: [1.0; 3],
-            is_turned: false,
+            turned_max: 0.0,
             kappa_max: 0.0,
             mass_max: 0.0,
             gust_reach: self.gust.reach(),
@@ -201,7 +201,7 @@ fn list_group(list: &ParticleList, at_rest: Group) -> Group {
         sigma_mean: of.sigma_mean,
         sigma_by_area: of.sigma_by_area,
         aspects: of.aspects,
-        is_turned: of.is_turned,
+        turned_max: of.turned_max,
         kappa_max: of.kappa_max,
         mass_max: of.mass_max,
         ..at_rest.between(of.low, of.high)
@@ -229,7 +229,7 @@ fn animated_group(m: &AnimatedParticles, at_rest: Group) -> Group {
         sigma_mean: m.sigma_mean,
         sigma_by_area: m.sigma_mean,
         aspects: [MIN_ASPECT, m.aspect_mean, 1.0 / MIN_ASPECT],
-        is_turned: false,
+        turned_max: 0.0,
         kappa_max: m.kappa_max,
         mass_max: m.mass_max,
         ..at_rest.between(m.low, m.high)

@@ -34,8 +34,8 @@ pub struct Group {
     /// Least, mean and greatest aspect: σ along y over σ along x and z. Of turned ellipsoids, the
     /// least counts as that of the shortest axis over σ.
     pub aspects: [f64; 3],
-    /// Whether some ellipsoid is not upright.
-    pub is_turned: bool,
+    /// Greatest σ in any direction of the ellipsoids that are not upright; 0 without any.
+    pub turned_max: f64,
     /// Greatest peak extinction.
     pub kappa_max: f64,
     /// Greatest mass κ (2π)^{3/2} σ² σ_y of a blob.
@@ -57,7 +57,7 @@ impl Group {
 
     /// Returns a bound on σ in every direction.
     pub fn sigma_widest(&self) -> f64 {
-        self.sigma_bounds().max_element()
+        self.sigma_bounds().max_element().max(self.turned_max)
     }
 
     /// Returns whether some blob is not a ball.
@@ -80,6 +80,7 @@ impl Group {
             sigma_y_max: scale * self.sigma_y_max,
             sigma_mean: scale * self.sigma_mean,
             sigma_by_area: scale * self.sigma_by_area,
+            turned_max: scale * self.turned_max,
             mass_max: scale.powi(3) * self.mass_max,
             ..*self
         }

@@ -72,7 +72,7 @@ mod tests {
             sigma_mean: sigma,
             sigma_by_area: sigma,
             aspects: [aspect; 3],
-            is_turned: false,
+            turned_max: 0.0,
             kappa_max: 1.0,
             mass_max: 1.0,
             gust_reach: 0.0,

@@ -38,8 +38,8 @@ pub struct Summary {
     /// Least, mean and greatest aspect: σ along y over σ along x and z. Of turned ellipsoids, the
     /// least counts as that of the shortest axis over σ.
     pub aspects: [f64; 3],
-    /// Whether some ellipsoid is not upright.
-    pub is_turned: bool,
+    /// Greatest σ in any direction of the ellipsoids that are not upright; 0 without any.
+    pub turned_max: f64,
     /// Greatest κ.
     pub kappa_max: f64,
     /// Greatest integral of extinction of a particle.
@@ -57,7 +57,7 @@ impl Summary {
         let (mut sigma_max, mut sigma_y_max, mut sums) = (0.0_f64, 0.0_f64, [0.0; 3]);
         let (mut least, mut aspects, mut greatest) = (f64::INFINITY, 0.0, 0.0_f64);
         let (mut kappa_max, mut mass_max, mut i_heaviest) = (0.0_f64, 0.0_f64, 0);
-        let (mut is_grey, mut is_turned) = (true, false);
+        let (mut is_grey, mut turned_max) = (true, 0.0_f64);
         for (i, p) in list.iter().enumerate() {
             (low, high, center) = (low.min(p.position), high.max(p.position), center + p.position);
             let extents = p.shape.extents();
@@ -68,7 +68,9 @@ impl Summary {
             let own = if p.shape.is_upright() { aspect } else { p.shape.narrowest() };
             (least, greatest) = (least.min(own), greatest.max(aspect));
             aspects += aspect;
-            is_turned |= !p.shape.is_upright();
+            if !p.shape.is_upright() {
+                turned_max = turned_max.max(p.sigma * p.shape.widest());
+            }
             kappa_max = kappa_max.max(p.kappa);
             let mass = mass(p.kappa, p.sigma) * p.shape.volume();
             if mass >= mass_max {
@@ -97,7 +99,7 @@ impl Summary {
             mass_max,
             i_heaviest,
             is_grey,
-            is_turned,
+            turned_max,
         }
     }
 }

@@ -82,8 +82,8 @@ pub fn deposit_on(spec: &GridSpec, level: u32, blobs: &[Blob]) -> Vec<f64> {
     cells
 }
 
-/// Returns the level, of `n_levels`, that a blob is deposited on. What spreading adds to its
-/// variance must be less than it has in any direction.
+/// Returns the level, of `n_levels`, that a blob is deposited on. Spreading adds variance along all
+/// axes, so that the level follows from the blob's least variance in any direction.
 fn level_of(spec: &GridSpec, blob: &Blob, n_levels: u32) -> u32 {
     let sigma =
         if blob.shape.is_upright() { blob.extents() } else { DVec3::splat(blob.narrowest()) };

@@ -80,7 +80,7 @@ fn record(n: u32, drawn: &DrawnCount) -> (u32, f64, f64) {
     let group = Group {
         facing_from: DVec3::ZERO,
         aspects: [1.0; 3],
-        is_turned: false,
+        turned_max: 0.0,
         i_cloud: 0,
         i_first: 0,
         n_particles: n,

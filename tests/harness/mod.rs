@@ -130,7 +130,7 @@ impl Gpu {
     pub fn wrong_compiler(file: &str, from: &str, to: &str) -> Compiler {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{file} does not hold {from}");
-        // Most shaders of a pass are as they were, and the cache has them.
+        // The change leaves most shaders of a pass alone, and the cache holds their SPIR-V.
         Compiler::new(sources, Compiler::default_cache()).expect("shaderc")
     }
 }

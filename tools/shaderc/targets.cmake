@@ -1,5 +1,5 @@
-# Changes targets of shaderc's projects at the end of the configuration, when all of them are there.
-# Parsing headers takes three quarters of a file's compilation: many files in one unit share it.
+# Changes the targets of shaderc's projects when CMake has configured all of them. Parsing headers
+# takes three quarters of a file's compilation, and the files of a unit share that.
 
 # Compiles files of `target` alone, since they define names that other files define too.
 function(compile_alone target)
@@ -16,8 +16,8 @@ function(change_targets)
       set_target_properties(SPIRV-Tools-${tool} PROPERTIES EXCLUDE_FROM_ALL ON)
     endif()
   endforeach()
-  # All files of a target compile as one unit but for those named below. 14 of them in a unit leave
-  # work for several cores.
+  # A unit has 14 files, so that several units remain for several cores. The files named below
+  # compile alone.
   set_target_properties(
     SPIRV-Tools-opt SPIRV-Tools-static glslang
     PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 14)

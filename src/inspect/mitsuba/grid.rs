@@ -63,8 +63,7 @@ pub(super) fn usual_step(blobs: &[Blob], shown: &[usize]) -> f64 {
     (narrow / CELLS_A_SIGMA).max((volume / USUAL_CELLS).cbrt())
 }
 
-/// Returns the extinction and the mean albedo of the cells. An upright blob has its whole mass on
-/// the grid; one that lies askew has its density at the cells' centres.
+/// Returns the extinction and the mean albedo of the cells. A blob has its whole mass on the grid.
 pub(super) fn extinction(
     parts: &TransportParts,
     shown: &[usize],
@@ -116,20 +115,6 @@ fn layer(
             first..(end.max(0.0) as u32).min(n[axis])
         };
         if !range(2).contains(&k) {
-            continue;
-        }
-        if !blob.shape.is_upright() {
-            let whiten = blob.white_matrix();
-            for j in range(1) {
-                for i in range(0) {
-                    let x = DVec3::new(center(i), center(j), center(k)) - at;
-                    let density = blob.kappa * (-0.5 * (whiten * x).length_squared()).exp();
-                    let cell = &mut cells[(j * n[0] + i) as usize];
-                    for (c, a) in cell.iter_mut().zip([albedo.x, albedo.y, albedo.z, 1.0]) {
-                        *c += a * density;
-                    }
-                }
-            }
             continue;
         }
         // Shares of the mass along an axis. Of a blob that is narrow against the cells, the samples

@@ -210,25 +210,24 @@ mod turned {
     #[test]
     fn mass_place_and_spread_are_kept() {
         for turned in turns() {
-            for (scales, cell) in [
-                (DVec3::new(0.6, 0.2, 0.4), 0.1),
-                (DVec3::new(0.9, 0.05, 0.5), 0.15),
-                (DVec3::new(0.05, 0.9, 0.05), 0.2),
-                (DVec3::new(0.03, 0.02, 0.01), 0.4),
+            // The mean is kept where slabs and rows are narrow against the blob. A blob that is
+            // narrow against a cell has the place of its cells, up to half of one off on each axis.
+            for (scales, cell, most_off) in [
+                (DVec3::new(0.6, 0.2, 0.4), 0.1, 1e-3),
+                (DVec3::new(0.9, 0.05, 0.5), 0.15, 1e-3),
+                (DVec3::new(0.05, 0.9, 0.05), 0.2, 0.5),
+                (DVec3::new(0.03, 0.02, 0.01), 0.4, 0.87),
             ] {
                 let (spec, blob) = (spec(61, cell), blob(scales, turned));
                 let (mass, mean, found) = moments(&spec, &deposit_on(&spec, 0, &[blob]));
                 assert!((mass / blob.mass() - 1.0).abs() < 1e-12, "{mass}");
-                // Cutting at 3 sigma takes 2.7 % of a variance, each time it is cut.
+                assert!((mean - blob.position).length() < most_off * cell, "{mean}");
+                // A cut at 3σ takes 2.7 % of a variance, and an axis is cut in up to two ways. Cells
+                // add a quarter of their edge's square at most, where two cells share a narrow blob.
                 let expected = blob.sigma * blob.sigma * blob.shape.covariance();
-                let wide = blob.sigma + cell;
-                assert!((mean - blob.position).length() < 0.5 * cell.min(wide), "{mean}");
-                // A cell's own spread is a twelfth of its edge's square, or what the place in a
-                // single cell makes.
-                let rest = found - expected;
-                let most = 0.06 * blob.sigma * blob.sigma + 0.3 * cell * cell;
-                let greatest =
-                    rest.to_cols_array().into_iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+                let most = 2.0 * 0.027 * blob.sigma * blob.sigma + 0.25 * cell * cell;
+                let rest = (found - expected).to_cols_array();
+                let greatest = rest.into_iter().fold(0.0, |m: f64, v| m.max(v.abs()));
                 assert!(greatest < most, "{turned} {scales} {found} {expected}");
             }
         }
@@ -265,7 +264,7 @@ mod turned {
     #[test]
     fn along_the_axes_it_is_the_separable_deposit() {
         let quarter = DQuat::from_axis_angle(DVec3::Z, std::f64::consts::FRAC_PI_2);
-        // Flat along y, turned to be flat along x; and the same by its own axes.
+        // Flat along y, and then turned to be flat along x.
         let spec = spec(40, 0.1);
         let turned = blob(DVec3::new(0.3, 0.1, 0.3), quarter);
         assert!(!turned.shape.is_upright());
@@ -280,7 +279,8 @@ mod turned {
             };
             let share = weight(0, 0.1) * weight(1, 0.3) * weight(2, 0.3);
             let expected = turned.mass() / spec.cell_volume() * share;
-            assert!((found - expected).abs() < 2e-5 * turned.kappa, "{at} {found} {expected}");
+            // The stored quarter turn is exact but for roundings of f64.
+            assert!((found - expected).abs() < 1e-12 * turned.kappa, "{at} {found} {expected}");
         }
     }
 
@@ -292,6 +292,7 @@ mod turned {
         spread_to(&spec, &deposit_on(&spec, 1, &[blob]), &mut cells);
         let fine = deposit_on(&spec, 0, &[blob]);
         let off = cells.iter().zip(&fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(off < 0.02 * blob.kappa && off > 1e-5, "{}", off / blob.kappa);
+        // The bound of deposit_by_levels.
+        assert!(off < 9e-3 * blob.kappa && off > 1e-5, "{}", off / blob.kappa);
     }
 }

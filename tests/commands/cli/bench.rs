@@ -175,8 +175,8 @@ fn bench_json_is_json_and_nothing_else() {
 /// Ctrl-C ends a long bench, keeps what was finished, and says so by exit code 130.
 #[test]
 fn an_interrupted_bench_keeps_its_finished_part() {
-    // The signal comes later until it finds a frame finished. What is before the first frame takes
-    // as much of the processor as the machine needs for it.
+    // Machines differ in how long a bench takes to finish its first frame. Each try sends the
+    // signal later, until the bench has finished a frame.
     let tries = (0..8).map(|k| 2f64.powi(k) - 1.0);
     let (dir, stderr) = tries
         .map(interrupted_bench)
@@ -193,8 +193,8 @@ fn an_interrupted_bench_keeps_its_finished_part() {
     assert!(json["cases"][0]["modes"][0]["frames"].as_u64().is_some_and(|n| n > 0));
 }
 
-/// Interrupts a bench when it has used the processor for so many seconds and has its folder.
-/// Returns the folder around that, and what the bench said.
+/// Interrupts a bench that has made its results folder and has used `used_s` seconds of the
+/// processor. Returns the parent of the results folder, and the text of stderr.
 fn interrupted_bench(used_s: f64) -> (tempfile::TempDir, String) {
     let dir = temp();
     let out = path(&dir, "run");

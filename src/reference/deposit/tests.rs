@@ -222,8 +222,8 @@ mod turned {
                 let (mass, mean, found) = moments(&spec, &deposit_on(&spec, 0, &[blob]));
                 assert!((mass / blob.mass() - 1.0).abs() < 1e-12, "{mass}");
                 assert!((mean - blob.position).length() < most_off * cell, "{mean}");
-                // A cut at 3σ takes 2.7 % of a variance, and an axis is cut in up to two ways. Cells
-                // add a quarter of their edge's square at most, where two cells share a narrow blob.
+                // A cut at 3σ takes 2.7 % of a variance, and an axis is cut in up to two ways.
+                // Cells add at most a quarter of their edge's square: two share a narrow blob.
                 let expected = blob.sigma * blob.sigma * blob.shape.covariance();
                 let most = 2.0 * 0.027 * blob.sigma * blob.sigma + 0.25 * cell * cell;
                 let rest = (found - expected).to_cols_array();

@@ -286,6 +286,38 @@ fn work_beyond_the_limit_of_a_submission_is_submitted_in_parts() {
     }
 }
 
+/// The workgroups of an indirect dispatch count from 0, wherever those of the dispatch before it
+/// began. At some of the limits, a dispatch's last part and the indirect one are submitted together.
+#[test]
+fn indirect_dispatches_after_a_dispatch_in_parts_begin_at_the_first_workgroup() {
+    let mut n_parts = vec![];
+    for max_submit_ms in (0..20).map(|k| Some(1e-3 * f64::from(1 << k))) {
+        let mut gpu = Gpu::with_options(|options| options.max_submit_ms = max_submit_ms);
+        let fields = grid::ResolvePush::FIELDS;
+        let kernel = Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", fields).unwrap();
+        let a_group = kernel.local_size_x();
+        let n = 512 * a_group;
+        let sums = gpu.upload(&(0..n).map(|i| [i + 1, 0]).collect::<Vec<_>>());
+        let [first, second] = [0, 1].map(|_| gpu.buffer::<f32>(n as usize));
+        let groups = gpu.upload(&[1u32, 1, 1]);
+        let push = grid::ResolvePush { n_cells: n, density_per_quantum: 1.0 };
+        // From the second time on the rates are known.
+        for _ in 0..3 {
+            gpu.run(|rec| {
+                rec.fill(&second, 0);
+                rec.dispatch(&kernel, &[&sums, &first], &push, n)?;
+                rec.dispatch_indirect(&kernel, &[&sums, &second], &push, (&groups, 0))
+            });
+            n_parts.push(gpu.commands.n_parts());
+            let found = gpu.download::<f32>(&second, n as usize);
+            let expected = |i: u32| if i < a_group { (i + 1) as f32 } else { 0.0 };
+            let wrong = (0..n).find(|i| found[*i as usize] != expected(*i));
+            assert_eq!(wrong, None, "{max_submit_ms:?} ms, parts {n_parts:?}");
+        }
+    }
+    println!("parts {n_parts:?}");
+}
+
 #[test]
 fn host_access_is_checked_against_the_buffers_size() {
     let gpu = Gpu::new();

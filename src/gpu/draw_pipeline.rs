@@ -6,7 +6,6 @@ use super::call::Call;
 use super::device::Device;
 use super::image::{TargetFormat, depth_format};
 use super::interface::{Constants, Field, Interface, Pipeline, Stage};
-use super::rate::Rate;
 use super::shader::Compiler;
 use crate::error::Result;
 
@@ -139,8 +138,9 @@ impl DrawPipeline {
         };
         device.shared().report(raw, name, macros)?;
         let point = vk::PipelineBindPoint::GRAPHICS;
-        let (name, rate) = (name.to_owned(), Rate::default());
-        let pipeline = Pipeline { handle, point, interface, name, rate };
+        let (rate, indirect_rate) = Default::default();
+        let name = name.to_owned();
+        let pipeline = Pipeline { handle, point, interface, name, rate, indirect_rate };
         Ok(DrawPipeline { pipeline, primitives, has_depth: mode.has_depth() })
     }
 }

@@ -7,6 +7,7 @@ use super::barriers::Scope;
 use super::buffer::Buffer;
 use super::draw_pipeline::{DrawPipeline, Primitives};
 use super::image::Image;
+use super::pacing::Units;
 use super::recorder::Recorder;
 use crate::error::{Error, Result};
 
@@ -85,7 +86,7 @@ impl Recorder<'_> {
         };
         let Target { color, mut depth } = target;
         let n_rows = color.extent.height;
-        self.paced(&pipeline.pipeline, (n_rows, true), |rec, first, n| {
+        self.paced(&pipeline.pipeline, Units::Apart(n_rows), |rec, first, n| {
             rec.bind(&pipeline.pipeline, buffers, push, counts)?;
             let load = if first == 0 { load } else { LoadOp::Load };
             let target = Target { color: &mut *color, depth: depth.as_deref_mut() };

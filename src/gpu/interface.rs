@@ -191,8 +191,10 @@ pub(super) struct Pipeline {
     pub point: vk::PipelineBindPoint,
     pub interface: Interface,
     pub name: String,
-    /// The time that its work takes.
+    /// The time that a workgroup takes, or a row of the picture.
     pub rate: Rate,
+    /// The time that an indirect dispatch takes.
+    pub indirect_rate: Rate,
 }
 
 /// Map entries and data of 32-bit specialization constants, by id.

@@ -5,7 +5,6 @@ use ash::vk;
 use super::call::Call;
 use super::device::Device;
 use super::interface::{Constants, Field, Interface, Pipeline, Stage};
-use super::rate::Rate;
 use super::reflect::Reflection;
 use super::shader::Compiler;
 use crate::error::{Error, Result};
@@ -71,8 +70,9 @@ impl Kernel {
         let handle = shared.own(raw, name, ash::Device::destroy_pipeline);
         shared.report(raw, name, macros)?;
         let point = vk::PipelineBindPoint::COMPUTE;
-        let (name, rate) = (name.to_owned(), Rate::default());
-        let pipeline = Pipeline { handle, point, interface, name, rate };
+        let (rate, indirect_rate) = Default::default();
+        let name = name.to_owned();
+        let pipeline = Pipeline { handle, point, interface, name, rate, indirect_rate };
         Ok(Kernel { pipeline, local_size_x })
     }
 

@@ -19,24 +19,39 @@ const TELLING: f64 = 1.0 / 64.0;
 /// takes less than eight minutes, and ten more parts, each as long as all before it, do the rest.
 const FIRST_PART: u32 = 1024;
 
+/// The work of one dispatch or draw.
+#[derive(Clone, Copy)]
+pub(super) enum Units {
+    /// Workgroups, or rows of workgroups or of the picture, that can be run apart.
+    Apart(u32),
+    /// Workgroups that are run together.
+    Together(u32),
+    /// An indirect dispatch, of which only the device knows the number of workgroups.
+    Indirect,
+}
+
 impl Recorder<'_> {
-    /// Records work of `n_units` of `pipeline` by calls of `record` with first unit and number of
-    /// units: one call, or several whose parts are submitted one after another. `is_divisible`:
-    /// units can be run apart.
+    /// Records `units` of work of `pipeline` by calls of `record` with first unit and number of
+    /// units: one call, or several whose parts are submitted one after another.
     ///
     /// # Errors
     /// `record` fails, or the device is lost.
     pub(super) fn paced(
         &mut self,
         pipeline: &Pipeline,
-        (n_units, is_divisible): (u32, bool),
+        units: Units,
         mut record: impl FnMut(&mut Self, u32, u32) -> Result<()>,
     ) -> Result<()> {
+        let Pipeline { rate, indirect_rate, .. } = pipeline;
+        let (rate, n_units, is_divisible) = match units {
+            Units::Apart(n) => (rate, n, true),
+            Units::Together(n) => (rate, n, false),
+            Units::Indirect => (indirect_rate, 1, false),
+        };
         let limit_ns = match self.commands.shared.max_submit_ns {
             Some(limit) if self.commands.is_divisible => limit,
             _ => return record(self, 0, n_units),
         };
-        let rate = &pipeline.rate;
         let mut first = 0;
         while first < n_units {
             let rest = n_units - first;

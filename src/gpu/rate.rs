@@ -8,8 +8,7 @@ use super::timer::ScopeTime;
 /// The most by which one frame corrects a rate: one odd time, of a busy machine, does not spoil it.
 const MAX_CORRECTION: f64 = 4.0;
 
-/// Nanoseconds that a pipeline takes for a unit of its work: a workgroup, a row of the picture, or
-/// an indirect dispatch. 0: unknown.
+/// Nanoseconds that a pipeline takes for a unit of its work. 0: unknown.
 #[derive(Clone, Default)]
 pub(super) struct Rate(Arc<AtomicU64>);
 

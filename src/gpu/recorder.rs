@@ -13,6 +13,7 @@ use super::commands::Commands;
 use super::image::Image;
 use super::interface::Pipeline;
 use super::kernel::Kernel;
+use super::pacing::Units;
 use super::reflect::BindingKind;
 use super::timer::ScopeTime;
 use crate::error::{Error, Result};
@@ -207,9 +208,9 @@ impl Recorder<'_> {
             return Ok(());
         }
         // Shaders number workgroups by the length of a row, so that only whole rows are apart.
-        let units = if y > 1 { y } else { x };
-        let work = (units, is_divisible);
-        self.paced(&kernel.pipeline, work, |rec, first, n| {
+        let n_units = if y > 1 { y } else { x };
+        let units = if is_divisible { Units::Apart(n_units) } else { Units::Together(n_units) };
+        self.paced(&kernel.pipeline, units, |rec, first, n| {
             rec.bind(&kernel.pipeline, buffers, push, None)?;
             let (device, commands) = rec.raw();
             let ([x0, y0], [nx, ny]) =
@@ -217,7 +218,12 @@ impl Recorder<'_> {
             // Only pipelines of devices with a limit take a base other than 0.
             match first {
                 0 => unsafe { device.cmd_dispatch(commands, nx, ny, 1) },
-                _ => unsafe { device.cmd_dispatch_base(commands, x0, y0, 0, nx, ny, 1) },
+                _ => unsafe {
+                    device.cmd_dispatch_base(commands, x0, y0, 0, nx, ny, 1);
+                    // Lavapipe adds the last base to the workgroups of an indirect dispatch. A
+                    // direct one sets it to 0, even if it has no workgroups.
+                    device.cmd_dispatch(commands, 0, 1, 1);
+                },
             }
             Ok(())
         })
@@ -234,7 +240,7 @@ impl Recorder<'_> {
         push: &P,
         (counts, i): (&Buffer, u32),
     ) -> Result<()> {
-        self.paced(&kernel.pipeline, (1, false), |rec, _, _| {
+        self.paced(&kernel.pipeline, Units::Indirect, |rec, _, _| {
             rec.bind(&kernel.pipeline, buffers, push, Some(counts))?;
             let (device, commands) = rec.raw();
             let offset = u64::from(i) * size_of::<u32>() as u64;

@@ -14,7 +14,7 @@ use nimbus::gpu::{
     Barriers, Buffer, Compiler, Device, DeviceInfo, Image, Instance, Kernel, MemoryUsage, Sources,
 };
 use nimbus::layout::frame::GridRecord;
-use nimbus::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use nimbus::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, Shapes};
 use nimbus::model::grid::GridSpec;
 use nimbus::passes;
 use nimbus::passes::{grid, place};
@@ -25,7 +25,8 @@ use sha2::{Digest, Sha256};
 fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
     let spec = GridSpec { aspect: 1.0, n_cells: UVec3::splat(8), cell: 1.0, low: DVec3::ZERO };
     let place = place::Place::new(&gpu.device, &gpu.compiler).unwrap();
-    let grid = grid::Grid::new(&gpu.device, &gpu.compiler, spec.n_total(), false).unwrap();
+    let grid =
+        grid::Grid::new(&gpu.device, &gpu.compiler, spec.n_total(), false, Shapes::Balls).unwrap();
     let (particles, i_group) = (gpu.buffer::<ParticleRecord>(64), gpu.buffer::<u32>(64));
     let (groups, placed) = (gpu.buffer::<GroupRecord>(1), gpu.buffer::<PlacedRecord>(64));
     let (density, modes) = (gpu.buffer::<f32>(512), gpu.buffer::<ModeRecord>(1));

@@ -7,7 +7,7 @@ use super::barriers::Scope;
 use super::buffer::Buffer;
 use super::draw_pipeline::{DrawPipeline, Primitives};
 use super::image::Image;
-use super::pacing::Units;
+use super::rate::Units;
 use super::recorder::Recorder;
 use crate::error::{Error, Result};
 

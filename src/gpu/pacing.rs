@@ -7,7 +7,7 @@
 use std::time::Instant;
 
 use super::interface::Pipeline;
-use super::rate::Work;
+use super::rate::{Units, Work};
 use super::recorder::Recorder;
 use crate::error::Result;
 
@@ -18,17 +18,6 @@ const TELLING: f64 = 1.0 / 64.0;
 /// The first part is the work divided by this. It is within a limit of 500 ms if the whole work
 /// takes less than eight minutes, and ten more parts, each as long as all before it, do the rest.
 const FIRST_PART: u32 = 1024;
-
-/// The work of one dispatch or draw.
-#[derive(Clone, Copy)]
-pub(super) enum Units {
-    /// Workgroups, or rows of workgroups or of the picture, that can be run apart.
-    Apart(u32),
-    /// Workgroups that are run together.
-    Together(u32),
-    /// An indirect dispatch, of which only the device knows the number of workgroups.
-    Indirect,
-}
 
 impl Recorder<'_> {
     /// Records `units` of work of `pipeline` by calls of `record` with first unit and number of

@@ -8,6 +8,17 @@ use super::timer::ScopeTime;
 /// The most by which one frame corrects a rate: one odd time, of a busy machine, does not spoil it.
 const MAX_CORRECTION: f64 = 4.0;
 
+/// The work of one dispatch or draw.
+#[derive(Clone, Copy)]
+pub(super) enum Units {
+    /// Workgroups, or rows of workgroups or of the picture, that can be run apart.
+    Apart(u32),
+    /// Workgroups that are run together.
+    Together(u32),
+    /// An indirect dispatch, of which only the device knows the number of workgroups.
+    Indirect,
+}
+
 /// Nanoseconds that a pipeline takes for a unit of its work. 0: unknown.
 #[derive(Clone, Default)]
 pub(super) struct Rate(Arc<AtomicU64>);

@@ -13,7 +13,7 @@ use super::commands::Commands;
 use super::image::Image;
 use super::interface::Pipeline;
 use super::kernel::Kernel;
-use super::pacing::Units;
+use super::rate::Units;
 use super::reflect::BindingKind;
 use super::timer::ScopeTime;
 use crate::error::{Error, Result};

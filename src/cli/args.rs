@@ -115,8 +115,8 @@ pub enum Command {
     ///
     /// Intervals compare blocks of frames where there are eight or more (bench --precision, or
     /// --repeat 8), and else runs of √n neighbouring frames (block bootstrap). They cover the noise
-    /// within the runs. They do not cover what changes from one start to the next, such as other
-    /// programs on the machine. To see that, time A twice and compare the two.
+    /// within the runs. They cover what changes from one start to the next, such as other programs
+    /// on the machine, only where both have several starts (bench --starts).
     ///
     /// For two pictures of one size and kind (.exr or .png), A being the reference: RMSE, greatest
     /// difference, relMSE and PSNR of the stored numbers (linear in an EXR, sRGB in 0..1 in a PNG),

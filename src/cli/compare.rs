@@ -96,7 +96,8 @@ fn text(
             out += &format!("{} frame: {}\n", mode.name, sentence(headline));
         }
     }
-    out + &foot(&found.modes, margin)
+    let n_starts = sides.map(|(_, run)| run.n_starts());
+    out + &foot(&found.modes, margin, n_starts[0].min(n_starts[1]))
 }
 
 fn mib(bytes: f64) -> String {
@@ -152,8 +153,9 @@ fn sentence(m: &MeasureComparison) -> String {
     }
 }
 
-/// Returns the note on how the intervals were computed and what they do not cover.
-fn foot(modes: &[ModeComparison], margin: f64) -> String {
+/// Returns the note on how the intervals were computed and what they cover. `n_starts`: the lesser
+/// number of starts of the two runs.
+fn foot(modes: &[ModeComparison], margin: f64, n_starts: usize) -> String {
     let lens: BTreeSet<Option<usize>> =
         modes.iter().filter_map(|m| Some(m.headline()?.block_len)).collect();
     let neighbours: Vec<String> = lens.iter().flatten().map(usize::to_string).collect();
@@ -168,10 +170,13 @@ fn foot(modes: &[ModeComparison], margin: f64) -> String {
             neighbours.join(" and ")
         ));
     }
+    let covered = match n_starts {
+        0 | 1 => "the noise within the runs, not the changes from one start to the next",
+        _ => "the changes from one start to the next",
+    };
     format!(
-        "\nMargin: {}. Intervals: {}.\nThey cover the noise within the runs, not the changes from \
-         one start to the next. frame decides; the other\nrows are not corrected for many \
-         comparisons: of twenty, one will be beyond its interval.\n",
+        "\nMargin: {}. Intervals: {}.\nThey cover {covered}. frame decides; the other\nrows are \
+         not corrected for many comparisons: of twenty, one will be beyond its interval.\n",
         percent(margin),
         how.join("; ")
     )

@@ -48,14 +48,24 @@ fn benches(a: &BenchResults, b: &BenchResults, folders: [&Path; 2]) -> Result<Ma
             p {
                 "The verdict is that of the measure " (HEADLINE) ". Ratios within a margin of 1 % \
                 are the same. The intervals of the other measures are not corrected for multiple \
-                comparisons: of twenty about one is beyond its interval. The intervals include the \
-                noise within the runs, not the variation between starts of the program."
+                comparisons: of twenty about one is beyond its interval. " (covered(a, b))
             }
         }
         @if !errors.is_empty() { (sizes_table("RMSE against f64, and its ratio", &errors)) }
         @if !memory.is_empty() { (sizes_table("Most device memory, bytes", &memory)) }
         (pictures_of(a, b, folders)?)
     })
+}
+
+/// Says what the intervals include.
+fn covered(a: &BenchResults, b: &BenchResults) -> &'static str {
+    match a.run.n_starts().min(b.run.n_starts()) {
+        0 | 1 => {
+            "The intervals include the noise within the runs, not the variation between starts of \
+             the program."
+        }
+        _ => "The intervals include the variation between starts of the program.",
+    }
 }
 
 fn differing(found: &[Difference]) -> Markup {

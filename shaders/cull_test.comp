@@ -50,7 +50,12 @@ bool is_kept(uint i) {
     if (WEIGHTED != 0) {
         tau *= weight_of(group, i);
     }
-    Shape shape = shape_of(push.camera, ELLIPSOIDS != 0 ? particles[i].aspect : 1.0);
+    Shape shape = upright_shape(push.camera, 1.0);
+    if (ELLIPSOIDS != 0) {
+        shape = shape_of(
+            push.camera, particles[i].aspect, particles[i].aspect_z, particles[i].turn
+        );
+    }
     if (ELLIPSOIDS != 0) {
         tau *= shape.wider;
     }

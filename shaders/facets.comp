@@ -20,10 +20,10 @@ void main() {
         // Small blobs take the group's scale: on their own scale the normal is that of their
         // neighbours' noise, and they would show as specks.
         float scale = max(sigma, group.sigma_mean);
-        float aspect = particles[i].aspect;
-        vec3 n = normal_at(p, scale, aspect, group.cloud_center);
-        float area = area_of(sigma, aspect, particles[i].kappa);
-        vec3 place = shell_at(p, scale, aspect, n);
+        Form form = form_of(i);
+        vec3 n = normal_at(p, scale, form, group.cloud_center);
+        float area = area_of(sigma, form, particles[i].kappa);
+        vec3 place = shell_at(p, scale, form, n);
         facets[push.i_first_facet + i] =
             Facet(place, area, n, group.i_region, particles[i].color, sigma);
     }

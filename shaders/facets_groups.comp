@@ -33,14 +33,19 @@ struct Sums {
 
 float mass_of(uint i) {
     float sigma = placed[i].sigma;
-    return particles[i].kappa * sigma * sigma * sigma * particles[i].aspect;
+    float ball = particles[i].kappa * sigma * sigma * sigma;
+#if ELLIPSOIDS == 2
+    return ball * particles[i].aspect * particles[i].aspect_z;
+#else
+    return ball * particles[i].aspect;
+#endif
 }
 
 Sums sums_of(Run run, uint first, float sigma_first) {
     Sums s = Sums(0.0, vec3(0.0), 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
     for (uint k = run.i_first; k < run.i_first + run.n_particles; ++k) {
         uint i = order[k];
-        float m = mass_of(i), a = area_of(placed[i].sigma, particles[i].aspect, particles[i].kappa);
+        float m = mass_of(i), a = area_of(placed[i].sigma, form_of(i), particles[i].kappa);
         vec3 p = placed[i].position - placed[first].position;
         vec3 c = particles[i].color - particles[first].color;
         float sigma = groups[i_group[i]].sigma_mean - sigma_first;
@@ -66,7 +71,14 @@ vec2 spread_of(Run run, vec3 p, bool by_mass) {
         float m = by_mass ? mass_of(i) : 1.0;
         float sigma = placed[i].sigma;
         vec3 d = placed[i].position - p;
-#if ELLIPSOIDS
+#if ELLIPSOIDS == 2
+        Form form = form_of(i);
+        vec3 squares = sigma * sigma * form.lengths * form.lengths;
+        vec3 upward = vec3(form.axes[0].y, form.axes[1].y, form.axes[2].y);
+        float high = dot(squares, upward * upward);
+        float wide = 0.5 * dot(squares, 1.0 - upward * upward);
+        sum += m * vec2(wide + 0.5 * (d.x * d.x + d.z * d.z), high + d.y * d.y);
+#elif ELLIPSOIDS
         float high = particles[i].aspect * sigma;
         sum += m * vec2(sigma * sigma + 0.5 * (d.x * d.x + d.z * d.z), high * high + d.y * d.y);
 #else
@@ -95,18 +107,18 @@ void main() {
         vec2 spread = run.n_particles > 1u ? sqrt(spread_of(run, p, by_mass))
                                            : vec2(placed[first].sigma, 0.0);
         float sigma = spread.x;
+        Form form = upright_form(1.0);
 #if ELLIPSOIDS
-        float aspect =
-            run.n_particles > 1u
-                ? (sigma > 0.0 ? clamp(spread.y / sigma, MIN_ASPECT, 1.0 / MIN_ASPECT) : 1.0)
-                : particles[first].aspect;
-#else
-        float aspect = 1.0;
+        if (run.n_particles == 1u) {
+            form = form_of(first);
+        } else if (sigma > 0.0) {
+            form = upright_form(clamp(spread.y / sigma, MIN_ASPECT, 1.0 / MIN_ASPECT));
+        }
 #endif
         float scale = max(sigma, sigma_mean);
-        vec3 n = normal_at(p, scale, aspect, group.cloud_center);
+        vec3 n = normal_at(p, scale, form, group.cloud_center);
         uint facet = push.i_first_facet + g;
-        vec3 place = shell_at(p, scale, aspect, n);
+        vec3 place = shell_at(p, scale, form, n);
         facets[facet] = Facet(place, s.area, n, group.i_region, color, sigma);
         for (uint k = run.i_first; k < run.i_first + run.n_particles; ++k) {
             i_facet[order[k]] = facet;

@@ -85,8 +85,8 @@ void make(Box b, uint begin, uint end, uint hop) {
         float r = u.w * b.radius_max;
         float radius = r + 0.5 * PI * sine(r);
         particles[i] = Particle(
-            inside ? v : fold(v, h), b.sigma_factor * radius, vec3(1.0), b.kappa, 1.0, 0.0,
-            vec2(0.0)
+            inside ? v : fold(v, h), b.sigma_factor * radius, vec3(1.0), b.kappa, 1.0, 1.0,
+            uvec2(0)
         );
         status[i] = n_attempts | (inside ? 0u : 0x80000000u);
     }

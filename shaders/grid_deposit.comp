@@ -14,6 +14,10 @@
 #ifndef WORKGROUP
 #define WORKGROUP 32
 #endif
+// 1: some ellipsoids are turned, and grid_turned.comp deposits them.
+#ifndef TURNED
+#define TURNED 0
+#endif
 layout(local_size_x = WORKGROUP) in;
 
 const uint MAX_CELLS = 512;
@@ -58,6 +62,10 @@ void main() {
         float aspect = particles[p].aspect;
         float mass =
             particles[p].kappa * MASS_FACTOR * blob.sigma * blob.sigma * blob.sigma * aspect;
+#if TURNED
+        bool is_turned = particles[p].aspect_z != 1.0 || particles[p].turn != uvec2(0);
+        mass = is_turned ? 0.0 : mass;
+#endif
         vec3 sigma = blob.sigma * vec3(1.0, aspect, 1.0);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 inv_edges = push.grid.inv_cell * vec3(1.0, push.grid.inv_aspect, 1.0);

@@ -66,8 +66,8 @@ void main() {
         float above = position.y - d.base - d.lift * warm * (1.0 - cooled);
         float condensed = d.inv_over > 0.0 ? smooth_rise(above * d.inv_over) : 1.0;
         particles[d.i_first + slot] = Particle(
-            position - d.center, sigma, vec3(1.0), d.kappa * diluted * faded * condensed, 1.0, 0.0,
-            vec2(0.0)
+            position - d.center, sigma, vec3(1.0), d.kappa * diluted * faded * condensed, 1.0, 1.0,
+            uvec2(0)
         );
     }
 }

@@ -32,6 +32,7 @@ layout(location = 5) flat in float in_lowest;
 layout(location = 6) flat in vec4 in_conic;
 layout(location = 7) flat in vec4 in_screen;
 layout(location = 8) flat in vec3 in_shade;
+layout(location = 9) flat in vec2 in_lean;
 layout(location = 0) out vec4 out_color;
 
 const float LOG2_E = 1.44269504089;
@@ -47,7 +48,14 @@ void main() {
     // -b^2/(2 sigma^2), in powers of two.
     float exponent = in_blob.z * (dot(delta, delta) + twist * twist) / (1.0 + dot(ray, ray));
     float lowest = in_lowest, tau = in_blob.w;
-    if (ELLIPSOIDS != 0) {
+    if (ELLIPSOIDS == 2) {
+        float across = in_conic.x * delta.x * delta.x + in_conic.y * delta.x * delta.y
+                       + in_conic.z * delta.y * delta.y;
+        float along = 1.0 + dot(in_lean, delta);
+        float white = in_conic.w * along * along + across / (in_blob.z * in_conic.w);
+        exponent = across / white;
+        tau *= sqrt((1.0 + dot(ray, ray)) / white);
+    } else if (ELLIPSOIDS != 0) {
         // |M d|^2, and |d|/|M d|: the ray's length in the scene over that in the ball's
         // coordinates.
         vec3 d = vec3(ray, 1.0),
@@ -59,10 +67,10 @@ void main() {
                     + in_conic.z * delta.y * delta.y)
                    / white;
         tau *= sqrt((rest + up * up) / white);
-        if (THRESHOLD != 0) {
-            float cut = max(log(tau * push.inv_threshold), push.least_cut);
-            lowest = max(lowest, -LOG2_E * cut);
-        }
+    }
+    if (ELLIPSOIDS != 0 && THRESHOLD != 0) {
+        float cut = max(log(tau * push.inv_threshold), push.least_cut);
+        lowest = max(lowest, -LOG2_E * cut);
     }
     float alpha = 0.0;
     vec3 radiance = in_radiance;

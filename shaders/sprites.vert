@@ -52,6 +52,7 @@ layout(location = 6) flat out vec4 out_conic;
 layout(location = 7) flat out vec4 out_screen;
 // Changes of the light; only where blobs are shaded.
 layout(location = 8) flat out vec3 out_shade;
+layout(location = 9) flat out vec2 out_lean;
 
 // Draws nothing: a place that is clipped.
 void draw_nothing() {
@@ -74,10 +75,19 @@ void main() {
     }
     float scale = -0.5 * LOG2_E * (v.z / sigma) * (v.z / sigma);
     out_blob = vec4(v.xy / v.z, scale, tau);
-    Shape shape = shape_of(push.camera, ELLIPSOIDS != 0 ? particles[i].aspect : 1.0);
+    Shape shape = upright_shape(push.camera, 1.0);
+    out_lean = vec2(0.0);
     if (ELLIPSOIDS != 0) {
+        shape = shape_of(
+            push.camera, particles[i].aspect, particles[i].aspect_z, particles[i].turn
+        );
         out_conic = vec4(conic_of(shape, v.xy / v.z, scale), shape.inverse);
         tau *= shape.wider;
+    }
+    if (ELLIPSOIDS == 2) {
+        Lean lean = lean_of(shape, v.xy / v.z);
+        out_conic.w = lean.white;
+        out_lean = lean.lean;
     }
     TextureSample texture_sample = TextureSample(vec4(0.0), uvec2(0), vec3(0.0));
     if (TEXTURED != 0) {

@@ -141,7 +141,7 @@ const bool HALVES = PIXEL_WORDS < 4 && SLICES == 0;
 
 // The invocation's row of pixels while it is composed.
 float x_of[RUN];
-#if ELLIPSOIDS
+#if ELLIPSOIDS == 1
 // |ray|^2 across the scene's y, and along it.
 float across[RUN];
 float along[RUN];
@@ -168,9 +168,8 @@ float alpha[RUN];
 float depth_of[RUN];
 #endif
 
-
 float length_of_ray(uint j) {
-#if ELLIPSOIDS
+#if ELLIPSOIDS == 1
     return sqrt(across[j] + along[j]);
 #else
     return inversesqrt(inv_norm[j]);
@@ -184,7 +183,11 @@ void find_depths(Loaded splat, float y, bool shows[RUN], out float tau[RUN]) {
     vec2 s = place.xy;
     float dy = y - s.y;
 #if ELLIPSOIDS
-    vec4 conic = uintBitsToFloat(splat.fours[N_FOURS - 1]);
+    vec4 conic = uintBitsToFloat(splat.fours[N_FOURS - ELLIPSOIDS]);
+#if ELLIPSOIDS == 2
+    vec2 lean = uintBitsToFloat(splat.fours[N_FOURS - 1].xy);
+    float along_row = 1.0 + lean.y * dy, inv_scale = 1.0 / (place.z * conic.w);
+#endif
     float a = -conic.x, b = -conic.y * dy, c = -conic.z * dy * dy;
     float lowest = min_exponent;
 #else
@@ -202,7 +205,12 @@ void find_depths(Loaded splat, float y, bool shows[RUN], out float tau[RUN]) {
     float dx[RUN], e[RUN], deep[RUN];
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         dx[j] = x_of[j] - s.x;
-#if ELLIPSOIDS
+#if ELLIPSOIDS == 2
+        float along = along_row + lean.x * dx[j], across = (a * dx[j] + b) * dx[j] + c;
+        float inv_white = 1.0 / (conic.w * along * along - across * inv_scale);
+        e[j] = across * inv_white;
+        deep[j] = place.w * sqrt(inv_white / inv_norm[j]);
+#elif ELLIPSOIDS
         float inv_white = 1.0 / (across[j] + conic.w * along[j]);
         e[j] = ((a * dx[j] + b) * dx[j] + c) * inv_white;
         // Optical depth of a ray through the centre.
@@ -296,7 +304,7 @@ void draw_tile(uvec4 range, uint i_tile) {
         float x = (float(at.x + j) + 0.5) * push.pixel.x - push.tangents.x;
         uint p = row + min(at.x + j, push.width - 1u);
         x_of[j] = x;
-#if ELLIPSOIDS
+#if ELLIPSOIDS == 1
         vec3 ray = vec3(x, y, 1.0), vertical = vec3(push.y_right, push.y_up, push.y_forward);
         float up = dot(vertical, ray);
         vec3 rest = ray - up * vertical;

@@ -60,7 +60,8 @@ WRITES(11, uint, n_pairs)
 WRITES(12, SplatTexture, splat_textures)
 
 READS(13, Kept, kept)
-// Ellipsoids' conics, in powers of two, and 1/a^2.
+// Ellipsoids' conics, in powers of two, and 1/a^2. Where they are turned: that and a Lean, the
+// number |M s|^2 first.
 WRITES(14, vec4, conics)
 // Slopes of the light by facet, and the changes of the splats' light; only where blobs are shaded.
 READS(15, Slope, slopes)
@@ -93,7 +94,8 @@ uint project(uint i, uint r) {
     float deepest = tau;
     Shape shape;
     if (ELLIPSOIDS != 0) {
-        shape = shape_of(push.camera, uintBitsToFloat(TEXEL(particles, int(3 * i + 2)).x));
+        uvec4 of = TEXEL(particles, int(3 * i + 2));
+        shape = shape_of(push.camera, uintBitsToFloat(of.x), uintBitsToFloat(of.y), of.zw);
         deepest *= shape.wider;
     }
     float reach_in_sigma = push.cutoff;
@@ -135,7 +137,12 @@ uint project(uint i, uint r) {
     splats[2 * r] = floatBitsToUint(vec4(s, scale, tau));
     splats[2 * r + 1] = floatBitsToUint(vec4(radiance, push.camera.near / v.z));
     if (ELLIPSOIDS != 0) {
-        conics[r] = vec4(conic_of(shape, s, scale), shape.inverse);
+        conics[ELLIPSOIDS * r] = vec4(conic_of(shape, s, scale), shape.inverse);
+    }
+    if (ELLIPSOIDS == 2) {
+        Lean lean = lean_of(shape, s);
+        conics[2 * r].w = lean.white;
+        conics[2 * r + 1] = vec4(lean.lean, 0.0, 0.0);
     }
     uvec2 tile = uvec2(push.tile_width, push.tile_height);
     if (TEXTURED != 0) {

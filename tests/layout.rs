@@ -254,6 +254,8 @@ fn shared_constants_have_one_value() {
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
         ("grid_deposit.comp", "LEVEL_SIGMA", LEVEL_SIGMA),
+        ("grid_turned.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
+        ("grid_turned.comp", "LEVEL_SIGMA", LEVEL_SIGMA),
         ("include/shell.glsl", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),
         ("include/shell.glsl", "SMOOTH_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
         ("include/shell.glsl", "CONDITION_LOW", nimbus::reference::facets::CONDITIONING.0),

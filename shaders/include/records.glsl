@@ -8,8 +8,8 @@ struct Particle {
     vec3 color;
     float kappa;
     float aspect;
-    float unused;
-    vec2 unused_too;
+    float aspect_z;
+    uvec2 turn;
 };
 struct Box {
     vec3 extent;

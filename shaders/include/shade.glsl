@@ -29,7 +29,16 @@ Shade shade_of(Camera camera, Slope facet, Shape shape, vec3 position, vec3 v, f
         float up = dot(shape.y, toward);
         w += (shape.inverse - 1.0) * up * shape.y;
         white_square += (shape.inverse - 1.0) * up * up;
-        steep += (shape.square - 1.0) * slope.y * slope.y;
+        if (ELLIPSOIDS == 2) {
+            vec3 along_axes = along_camera(camera, slope);
+            float side = dot(shape.z, toward);
+            w += (shape.inverse_z - 1.0) * side * shape.z;
+            white_square += (shape.inverse_z - 1.0) * side * side;
+            float of_y = dot(shape.y, along_axes), of_z = dot(shape.z, along_axes);
+            steep += (shape.square - 1.0) * of_y * of_y + (shape.square_z - 1.0) * of_z * of_z;
+        } else {
+            steep += (shape.square - 1.0) * slope.y * slope.y;
+        }
     }
     steep = sigma * sqrt(max(steep, 0.0));
     slope *= steep > STEEPEST ? STEEPEST / steep : 1.0;

@@ -15,7 +15,7 @@ WRITES(5, Facet, facets)
 
 #include "density.glsl"
 
-// 1: blobs may be ellipsoids (model.md §14).
+// 1: blobs may be upright ellipsoids, 2: any (model.md §14).
 #ifndef ELLIPSOIDS
 #define ELLIPSOIDS 0
 #endif
@@ -35,6 +35,36 @@ const float SQRT_TAU = 2.50662827463;
 // Least aspect of a blob, and least inverse of one.
 const float MIN_ASPECT = 1e-3;
 
+// The form of a blob.
+#if ELLIPSOIDS == 2
+#include "turn.glsl"
+struct Form {
+    // Lengths of its axes over sigma, and their directions.
+    vec3 lengths;
+    mat3 axes;
+};
+
+Form upright_form(float aspect) { return Form(vec3(1.0, aspect, 1.0), mat3(1.0)); }
+
+Form form_of(uint i) {
+    vec3 y, z;
+    axes_of(particles[i].turn, y, z);
+    return Form(vec3(1.0, particles[i].aspect, particles[i].aspect_z), mat3(cross(y, z), y, z));
+}
+
+float volume_of(Form form) { return form.lengths.y * form.lengths.z; }
+#else
+struct Form {
+    float aspect;
+};
+
+Form upright_form(float aspect) { return Form(aspect); }
+
+Form form_of(uint i) { return Form(particles[i].aspect); }
+
+float volume_of(Form form) { return form.aspect; }
+#endif
+
 vec3 unit_or(vec3 v, vec3 otherwise) {
     float l = length(v);
     return l > 1e-30 ? v / l : otherwise;
@@ -42,11 +72,15 @@ vec3 unit_or(vec3 v, vec3 otherwise) {
 
 // Returns the unit normal against the gradient of the density smoothed to 2 scale where that is
 // well conditioned, else away from the cloud's centre.
-vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
+vec3 normal_at(vec3 p, float scale, Form form, vec3 cloud_center) {
 #if !SHELL
     return vec3(0.0, 1.0, 0.0);
 #endif
-    vec3 axes = vec3(1.0, ELLIPSOIDS != 0 ? aspect : 1.0, 1.0);
+#if ELLIPSOIDS == 2
+    vec3 axes = form.lengths;
+#else
+    vec3 axes = vec3(1.0, ELLIPSOIDS != 0 ? form.aspect : 1.0, 1.0);
+#endif
     vec3 gradient = vec3(0.0);
     float sum = 0.0;
     // A quadrature of degree 5 on the sphere: 6 axes and 8 diagonals.
@@ -62,13 +96,20 @@ vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
                 * 0.57735026919;
             w = 3.0 / 40.0;
         }
-        float rho = w * density_at(p + SMOOTH_SIGMA * scale * (axes * d));
+        vec3 at = axes * d;
+#if ELLIPSOIDS == 2
+        at = form.axes * at;
+#endif
+        float rho = w * density_at(p + SMOOTH_SIGMA * scale * at);
         gradient += rho * d;
         sum += rho;
     }
     float condition = sum > 0.0 ? length(gradient) / sum : 0.0;
     // The gradient was taken in coordinates that make the ellipsoid a ball.
     gradient /= axes;
+#if ELLIPSOIDS == 2
+    gradient = form.axes * gradient;
+#endif
     float slope = length(gradient);
     vec3 outward = unit_or(p - cloud_center, vec3(0.0, 1.0, 0.0));
     float t = smoothstep(CONDITION_LOW, CONDITION_HIGH, condition);
@@ -76,11 +117,14 @@ vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
 }
 
 // Returns the place where the shell of a blob about p has the normal n.
-vec3 shell_at(vec3 p, float scale, float aspect, vec3 n) {
+vec3 shell_at(vec3 p, float scale, Form form, vec3 n) {
 #if !SHELL
     return p;
+#elif ELLIPSOIDS == 2
+    vec3 own = n * form.axes, to = form.lengths * form.lengths * own;
+    return p + SHELL_SIGMA * scale / sqrt(dot(own, to)) * (form.axes * to);
 #elif ELLIPSOIDS
-    vec3 to = vec3(n.x, aspect * aspect * n.y, n.z);
+    vec3 to = vec3(n.x, form.aspect * form.aspect * n.y, n.z);
     return p + SHELL_SIGMA * scale / sqrt(dot(n, to)) * to;
 #else
     return p + SHELL_SIGMA * scale * n;
@@ -89,14 +133,20 @@ vec3 shell_at(vec3 p, float scale, float aspect, vec3 n) {
 
 // Returns pi R^2 (1 - e^-tau) of a blob, R = 3 sigma; of an ellipsoid the mean over all directions
 // it is seen from.
-float area_of(float sigma, float aspect, float kappa) {
+float area_of(float sigma, Form form, float kappa) {
     float radius = 3.0 * sigma;
     float area = PI * radius * radius, tau = SQRT_TAU * kappa * sigma;
-#if ELLIPSOIDS
     // Knud Thomsen's formula for an ellipsoid's surface, a quarter of which is that mean.
-    float wider = exp2(log2((1.0 + 2.0 * exp2(1.6075 * log2(aspect))) / 3.0) / 1.6075);
+#if ELLIPSOIDS == 2
+    vec2 powers = exp2(1.6075 * log2(form.lengths.yz));
+    float wider =
+        exp2(log2((powers.x + powers.y + powers.x * powers.y) / 3.0) / 1.6075);
+#elif ELLIPSOIDS
+    float wider = exp2(log2((1.0 + 2.0 * exp2(1.6075 * log2(form.aspect))) / 3.0) / 1.6075);
+#endif
+#if ELLIPSOIDS
     area *= wider;
-    tau *= aspect / wider;
+    tau *= volume_of(form) / wider;
 #endif
     return area * one_minus_exp(tau);
 }

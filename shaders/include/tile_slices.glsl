@@ -205,15 +205,28 @@ void compose(Loaded splat, float y) {
 #if ELLIPSOIDS || BEHIND
     // Distance and size along the ray, where they differ from pixel to pixel.
     float distance = splat.distance, in_sigmas = splat.near_in_sigmas;
-#if ELLIPSOIDS
+#if ELLIPSOIDS == 2
+    vec4 conic = uintBitsToFloat(splat.fours[N_FOURS - 2]);
+    vec2 lean = uintBitsToFloat(splat.fours[N_FOURS - 1].xy);
+#elif ELLIPSOIDS
     vec3 vertical = vec3(push.y_right, push.y_up, push.y_forward);
     float inverse = uintBitsToFloat(splat.fours[N_FOURS - 1]).w;
     float flatness = (inverse - 1.0) * dot(vertical, vec3(s, 1.0));
+#endif
+#if ELLIPSOIDS
     float inv_depth = splat.distance / sqrt(1.0 + dot(s, s));
     float slice = 1.0 / push.near_in_slices;
 #endif
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
-#if ELLIPSOIDS
+#if ELLIPSOIDS == 2
+        float dx = x_of[j] - s.x, dy = y - s.y, norm = 1.0 / inv_norm[j];
+        float along = 1.0 + lean.x * dx + lean.y * dy;
+        float form = (conic.x * dx + conic.y * dy) * dx + conic.z * dy * dy;
+        float scale = uintBitsToFloat(splat.fours[0].z);
+        float white = conic.w * along * along + form / (scale * conic.w);
+        distance = inv_depth * sqrt(norm) * conic.w * along / white;
+        in_sigmas = splat.near_in_sigmas * sqrt(white / norm);
+#elif ELLIPSOIDS
         // A ball lies as along the ray through its centre.
         if (inverse != 1.0) {
             float norm = across[j] + along[j], white = across[j] + inverse * along[j];

@@ -3,7 +3,8 @@
 // tiles.comp.
 
 // A splat as it lies in the buffers, by fours: a Splat, a SplatTexture where splats have textures,
-// the changes of its light where it is shaded, and the conic of an ellipsoid.
+// the changes of its light where it is shaded, and the conic of an ellipsoid, in two fours where
+// ellipsoids are turned.
 const uint I_SHADE = 2 + 3 * TEXTURED;
 const uint N_FOURS = I_SHADE + SHADED + ELLIPSOIDS;
 // Slices that are open at once (tile_slices.glsl).
@@ -108,7 +109,9 @@ Loaded load_splat(int r) {
     splat.fours[I_SHADE] = TEXEL(shades, r);
 #endif
 #if ELLIPSOIDS
-    splat.fours[N_FOURS - 1] = TEXEL(conics, r);
+    [[unroll]] for (int k = 0; k < ELLIPSOIDS; ++k) {
+        splat.fours[N_FOURS - ELLIPSOIDS + k] = TEXEL(conics, ELLIPSOIDS * r + k);
+    }
 #endif
     return splat;
 }

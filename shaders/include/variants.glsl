@@ -12,7 +12,7 @@ layout(constant_id = 3) const uint WEIGHTED = 0;
 layout(constant_id = 4) const uint TEXTURED = 0;
 // 1: a sprite ends where its optical depth falls under a threshold.
 layout(constant_id = 5) const uint THRESHOLD = 0;
-// 1: some blobs are ellipsoids.
+// 1: some blobs are upright ellipsoids; 2: some ellipsoids are turned.
 layout(constant_id = 6) const uint ELLIPSOIDS = 0;
 // 1: no blob's optical depth is above 1/8, and none has a texture.
 layout(constant_id = 9) const uint THIN = 0;

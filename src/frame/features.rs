@@ -209,7 +209,7 @@ pub(super) fn blob_variant(scene: &Scene) -> BlobVariant {
         weighted: scene.draw.count.is_some(),
         textured: scene.is_textured(),
         threshold: scene.draw.edge().has_threshold(),
-        ellipsoids: scene.has_ellipsoids(),
+        shapes: scene.shapes(),
         thin: is_thin(scene) && !scene.is_textured(),
         shaded: has_slopes(scene) && !in_cells,
         in_cells,

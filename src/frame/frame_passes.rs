@@ -91,9 +91,9 @@ impl FramePasses {
             placed_uploads: is_moved_by_host
                 .then(|| PlacedUploads::new(device, scene))
                 .transpose()?,
-            grid: Grid::new(device, compiler, n_cells(scene), has_levels(scene))?,
+            grid: Grid::new(device, compiler, n_cells(scene), has_levels(scene), scene.shapes())?,
             runs,
-            facets: Facets::new(device, compiler, scene.has_ellipsoids(), is_medium(scene))?,
+            facets: Facets::new(device, compiler, scene.shapes(), is_medium(scene))?,
             transmit: Transmit::new(device, compiler, arriving(scene), &sums)?,
             first: First::new(device, compiler)?,
             diffusion: diffusion_room(scene)

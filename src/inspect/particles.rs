@@ -7,7 +7,7 @@ use super::stages::{cloud_of, draw};
 use crate::error::Result;
 use crate::frame::Stage;
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
-use crate::model::cloud::{Particle, SIGMA_PER_RADIUS, Shape};
+use crate::model::cloud::{Particle, SIGMA_PER_RADIUS};
 use crate::model::scene::Scene;
 use crate::reference::Blob;
 use crate::reference::picture::{FrameReference, colors};
@@ -50,7 +50,7 @@ pub fn list(stage: &mut Stage, i_frame: u32) -> Result<Vec<Particle>> {
     let of = |(p, r): (&PlacedRecord, &ParticleRecord)| Particle {
         position: Vec3::from(p.position).as_dvec3() + origin,
         sigma: f64::from(p.sigma),
-        shape: Shape::upright(f64::from(r.aspect)),
+        shape: r.shape(),
         kappa: f64::from(r.kappa),
         color: Vec3::from(r.color).as_dvec3(),
     };

@@ -12,6 +12,10 @@ pub fn digest(particles: &[Particle]) -> [u8; 32] {
         let ([x, y, z], [r, g, b]) = (p.position.to_array(), p.color.to_array());
         let all = [x, y, z, p.sigma, p.shape.aspect, p.kappa, r, g, b].map(f64::to_le_bytes);
         hash.update(all.as_flattened());
+        if !p.shape.is_upright() {
+            hash.update(p.shape.aspect_z.to_le_bytes());
+            hash.update(p.shape.turn.words().map(u32::to_le_bytes).as_flattened());
+        }
     }
     hash.finalize().into()
 }

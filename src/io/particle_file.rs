@@ -1,11 +1,12 @@
-//! Particle lists: CSV with the columns `x,y,z,sigma,kappa[,sigma_y][,r,g,b]` in any order. A
-//! column `radius` may stand for sigma = radius / 3. With `sigma_y`, sigma is the one along x and
-//! z.
+//! Particle lists: CSV with the columns `x,y,z,sigma,kappa` and, if given, `sigma_y`, `sigma_z`,
+//! `qw,qx,qy,qz` and `r,g,b`, in any order. A column `radius` may stand for sigma = radius / 3.
+//! With `sigma_y` alone, sigma is the one along x and z; with `sigma_z`, the one along x. The
+//! quaternion q turns these axes.
 
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 use super::bounds::{LEAST, rounded, wrong_coordinate, wrong_size};
 use super::document::suggest::{did_you_mean, list, shown};
@@ -13,13 +14,18 @@ use super::text_file::line_column;
 use crate::error::{Error, Place, Result};
 use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, Shape};
 
-const COLUMNS: [&str; 10] = ["x", "y", "z", "sigma", "radius", "sigma_y", "kappa", "r", "g", "b"];
+const COLUMNS: [&str; 15] = [
+    "x", "y", "z", "sigma", "radius", "sigma_y", "kappa", "r", "g", "b", "sigma_z", "qw", "qx",
+    "qy", "qz",
+];
 const POSITION: std::ops::Range<usize> = 0..3;
 const SIGMA: usize = 3;
 const RADIUS: usize = 4;
 const SIGMA_Y: usize = 5;
 const KAPPA: usize = 6;
 const COLOR: std::ops::Range<usize> = 7..10;
+const SIGMA_Z: usize = 10;
+const TURN: std::ops::Range<usize> = 11..15;
 
 /// Beginning of a particle list, for messages.
 pub const FIRST: &str = "a header x,y,z,sigma (or radius),kappa[,r,g,b]";
@@ -163,11 +169,13 @@ impl Columns {
             (None, None) => return fault(0, "missing column `sigma` (or `radius` = 3 sigma)"),
             _ => {}
         }
-        let colors = missing(COLOR);
-        if !colors.is_empty() && colors.len() < COLOR.len() {
-            let i = columns[COLOR].iter().flatten().min().copied().unwrap_or(0);
-            let missing = list(&colors);
-            return fault(i, &format!("expected all of `r`, `g`, `b` or none; missing {missing}"));
+        for (together, names) in [(COLOR, "`r`, `g`, `b`"), (TURN, "`qw`, `qx`, `qy`, `qz`")] {
+            let lacking = missing(together.clone());
+            if !lacking.is_empty() && lacking.len() < together.len() {
+                let i = columns[together].iter().flatten().min().copied().unwrap_or(0);
+                let missing = list(&lacking);
+                return fault(i, &format!("expected all of {names} or none; missing {missing}"));
+            }
         }
         match [missing(POSITION), missing(KAPPA..KAPPA + 1)].concat().first() {
             Some(name) => fault(0, &format!("missing column `{name}`")),
@@ -199,17 +207,37 @@ impl Columns {
             Some(sigma) => sigma,
             None => wide(RADIUS)?.unwrap_or(0.0) * SIGMA_PER_RADIUS,
         };
-        let aspect = match sigma {
+        let (sigma, shape) = match sigma {
             // A blob without a size has no shape.
-            0.0 => 1.0,
-            _ => number(SIGMA_Y, &|v| wrong_height(v, sigma))?.map_or(1.0, |high| high / sigma),
+            0.0 => (sigma, Shape::BALL),
+            _ => {
+                let other = |column: usize| number(column, &|v| wrong_height(v, sigma));
+                let (high, deep) = (other(SIGMA_Y)?.unwrap_or(sigma), other(SIGMA_Z)?);
+                let [w, x, y, z] = [0, 1, 2, 3].map(|k| number(TURN.start + k, &|_| None));
+                match (deep, w?) {
+                    // No number is rounded.
+                    (None, None) => (sigma, Shape::upright(high / sigma)),
+                    (deep, w) => {
+                        let part = |v: Result<Option<f64>>| Ok(v?.unwrap_or(0.0));
+                        let of = DQuat::from_xyzw(part(x)?, part(y)?, part(z)?, w.unwrap_or(1.0));
+                        let length = of.length();
+                        if !(length.is_finite() && length > 1e-30) {
+                            let i = self.0[TURN.start].unwrap_or(0);
+                            let what = "expected a rotation other than zero";
+                            return Err(Error::scene(file.place(row, i), what));
+                        }
+                        let scales = DVec3::new(sigma, high, deep.unwrap_or(sigma));
+                        Shape::of(scales, of / length)
+                    }
+                }
+            }
         };
         let [x, y, z] = [0, 1, 2].map(|axis| coordinate(POSITION.start + axis));
         let [r, g, b] = [0, 1, 2].map(|channel| size(COLOR.start + channel));
         Ok(Particle {
             position: DVec3::new(x?, y?, z?),
             sigma,
-            shape: Shape::upright(aspect),
+            shape,
             kappa: size(KAPPA)?.unwrap_or(0.0),
             color: DVec3::new(r?.unwrap_or(1.0), g?.unwrap_or(1.0), b?.unwrap_or(1.0)),
         })
@@ -248,6 +276,10 @@ mod tests {
         assert_eq!(list, [expected]);
         let flat = good("x,y,z,sigma,sigma_y,kappa\n1,2,-3,2,0.5,2\n0,0,0,0,7,1\n");
         assert_eq!([flat[0].shape, flat[1].shape], [Shape::upright(0.25), Shape::BALL]);
+        // A turn by a third about the diagonal: x, y and z become y, z and x.
+        let turned = good("x,y,z,sigma,sigma_y,sigma_z,qw,qx,qy,qz,kappa\n0,0,0,3,2,1,2,2,2,2,1\n");
+        let extents = turned[0].sigma * turned[0].shape.extents();
+        assert!(extents.abs_diff_eq(DVec3::new(1.0, 3.0, 2.0), 3e-5), "{extents}");
         let plain = good("\n\"x\",y,z,sigma,kappa\r\n\r\n1,2,-3, 2.0 ,\"2\"\r\n \r\n");
         assert_eq!(plain, [Particle { color: DVec3::ONE, ..expected }]);
         assert_eq!(good("x,y,z,sigma,kappa"), []);
@@ -257,7 +289,8 @@ mod tests {
 
     #[test]
     fn faults_have_their_place_and_say_what_was_expected() {
-        let known = "(known: `x`, `y`, `z`, `sigma`, `radius`, `sigma_y`, `kappa`, `r`, `g`, `b`)";
+        let known = "(known: `x`, `y`, `z`, `sigma`, `radius`, `sigma_y`, `kappa`, `r`, `g`, `b`, \
+                     `sigma_z`, `qw`, `qx`, `qy`, `qz`)";
         let row = |row: &str| format!("x,y,z,sigma,kappa\n0,0,0,1,1\r\n\r\n{row}\n");
         for (text, expected) in [
             (

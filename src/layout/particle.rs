@@ -7,6 +7,8 @@ use crate::model::boxes::{BoxLaw, CloudBox, Form, radius_factor};
 use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
 use crate::model::count::DrawnCount;
 use crate::model::gust::Mode;
+pub use crate::model::shape::Shapes;
+use crate::model::shape::{Shape, Turn};
 use crate::model::texture::Texture;
 
 record! {
@@ -14,18 +16,18 @@ record! {
     pub struct ParticleRecord {
         /// Centre relative to its group's origin.
         position: [f32; 3],
-        /// σ along x and z.
+        /// σ along the first axis of its shape.
         sigma: f32,
         /// Factor on K_d, linear RGB.
         color: [f32; 3],
         /// Extinction at the centre, per scene unit.
         kappa: f32,
-        /// σ along y over that along x and z.
+        /// Length of the second axis over σ; of an upright blob σ along y over that along x and z.
         aspect: f32,
-        /// Padding.
-        unused: f32,
-        /// Padding.
-        unused_too: [f32; 2],
+        /// Length of the third axis over σ.
+        aspect_z: f32,
+        /// How the axes are turned from x, y and z (`Turn::words`).
+        turn: [u32; 2],
     }
 }
 
@@ -71,8 +73,17 @@ impl ParticleRecord {
             color: particle.color.as_vec3().to_array(),
             kappa: particle.kappa as f32,
             aspect: particle.shape.aspect as f32,
-            unused: 0.0,
-            unused_too: [0.0; 2],
+            aspect_z: particle.shape.aspect_z as f32,
+            turn: particle.shape.turn.words(),
+        }
+    }
+
+    /// Returns the shape of the particle.
+    pub fn shape(&self) -> Shape {
+        Shape {
+            aspect: f64::from(self.aspect),
+            aspect_z: f64::from(self.aspect_z),
+            turn: Turn::of_words(self.turn),
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use super::shape::Shapes;
+
 /// A run of consecutive particles that share an origin: a box, or a whole particle list. Positions
 /// relative to that origin keep their accuracy in f32 wherever the origin lies.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,9 +62,13 @@ impl Group {
         self.sigma_bounds().max_element().max(self.turned_max)
     }
 
-    /// Returns whether some blob is not a ball.
-    pub fn has_ellipsoids(&self) -> bool {
-        self.n_particles > 0 && self.aspects != [1.0; 3]
+    /// Returns the shapes of the blobs.
+    pub fn shapes(&self) -> Shapes {
+        match self.n_particles > 0 {
+            true if self.turned_max > 0.0 => Shapes::Turned,
+            true if self.aspects != [1.0; 3] => Shapes::Upright,
+            _ => Shapes::Balls,
+        }
     }
 
     /// Returns the group when its cloud has grown to `scale`. Every place x moves to c + s (x − c),

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::air::Air;
 use super::camera::Camera;
-use super::cloud::{Cloud, CloudSource, Group, MIN_ASPECT, runs};
+use super::cloud::{Cloud, CloudSource, Group, MIN_ASPECT, Shapes, runs};
 pub use super::draw::{Chunks, Cull, Draw, DrawPath, Impostors, MAX_CHUNKS};
 use super::film::Film;
 use super::grid::GridSpec;
@@ -183,14 +183,14 @@ impl Scene {
         self.clouds.iter().any(|c| matches!(c.source, CloudSource::Animated(_)))
     }
 
-    /// Returns whether some blobs are not balls.
-    pub fn has_ellipsoids(&self) -> bool {
+    /// Returns the shapes of the blobs.
+    pub fn shapes(&self) -> Shapes {
         let of = |c: &Cloud| match c.source {
-            CloudSource::Particles(_) => c.groups(0, 0).iter().any(Group::has_ellipsoids),
-            CloudSource::Animated(_) => true,
-            CloudSource::Boxes { .. } | CloudSource::Disc(_) => false,
+            CloudSource::Particles(_) => c.groups(0, 0).iter().map(Group::shapes).max(),
+            CloudSource::Animated(_) => Some(Shapes::Upright),
+            CloudSource::Boxes { .. } | CloudSource::Disc(_) => None,
         };
-        self.clouds.iter().any(of)
+        self.clouds.iter().filter_map(of).max().unwrap_or_default()
     }
 
     /// Returns the density grid over ± `half` about the lighting origin.
@@ -202,7 +202,7 @@ impl Scene {
     /// Otherwise it is the blobs' mean aspect or that of the bounds of the given extent, whichever
     /// is flatter.
     fn cell_aspect(groups: &[Group], extent: DVec3) -> f64 {
-        if !groups.iter().any(Group::has_ellipsoids) {
+        if groups.iter().all(|g| g.shapes() == Shapes::Balls) {
             return 1.0;
         }
         let n: f64 = groups.iter().map(|g| f64::from(g.n_particles)).sum();

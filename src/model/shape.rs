@@ -38,6 +38,16 @@ impl Turn {
         ])
     }
 
+    /// Returns the rotation of these words. All words are of one.
+    pub const fn of_words(words: [u32; 2]) -> Turn {
+        Turn(words)
+    }
+
+    /// Returns the rotation in two words.
+    pub const fn words(self) -> [u32; 2] {
+        self.0
+    }
+
     /// Returns the rotation as a unit quaternion.
     pub fn rotation(self) -> DQuat {
         let [low, high] = self.0;
@@ -53,6 +63,18 @@ impl Turn {
         };
         DQuat::from_xyzw(x, y, z, w).normalize()
     }
+}
+
+/// The kinds of shapes among some blobs. Each includes those before it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Shapes {
+    /// Balls.
+    #[default]
+    Balls,
+    /// Ellipsoids with one axis along y, the others equal.
+    Upright,
+    /// Any ellipsoids.
+    Turned,
 }
 
 /// The shape of a blob: its half axes over σ, and their directions. Its first axis is σ long.
@@ -86,6 +108,15 @@ impl Shape {
         self.aspect_z == 1.0 && self.turn == Turn::NONE
     }
 
+    /// Returns the kind of the shape.
+    pub fn kind(&self) -> Shapes {
+        match self.is_upright() {
+            true if self.aspect == 1.0 => Shapes::Balls,
+            true => Shapes::Upright,
+            false => Shapes::Turned,
+        }
+    }
+
     /// Returns σ and the shape of an ellipsoid. `scales` are its σ along x, y and z before the
     /// rotation `turned`.
     ///
@@ -94,13 +125,15 @@ impl Shape {
     pub fn of(scales: DVec3, turned: DQuat) -> (f64, Shape) {
         let within =
             |v: f64| if v > 0.0 { v.clamp(MIN_ASPECT, 1.0 / MIN_ASPECT) } else { MIN_ASPECT };
-        let turn = Turn::new(turned);
         if scales.max_element() <= 0.0 {
             return (0.0, Shape::BALL);
         }
-        let is_ball = scales.x == scales.y && scales.y == scales.z;
-        if scales.x == scales.z && scales.x > 0.0 && (is_ball || turn == Turn::NONE) {
-            return (scales.x, Shape::upright(within(scales.y / scales.x)));
+        let (wide, high) = match scales.x == scales.z {
+            true if scales.x == scales.y || turned == DQuat::IDENTITY => (scales.x, scales.y),
+            _ => upright_of(scales, turned).unwrap_or_default(),
+        };
+        if wide > 0.0 {
+            return (wide, Shape::upright(within(high / wide)));
         }
         // The axes change places in a circle, which is a turn by a third about their diagonal.
         let first = (1..3).fold(0, |most, i| if scales[i] > scales[most] { i } else { most });
@@ -149,6 +182,17 @@ impl Shape {
         axes * change(axes.transpose() * v, self.lengths())
     }
 
+    /// Returns the blob's point over σ that `v` of the unit ball becomes, its axes those of the
+    /// blob.
+    pub fn from_ball(&self, v: DVec3) -> DVec3 {
+        self.axes() * (self.lengths() * v)
+    }
+
+    /// Returns a gradient over the ball of [`Shape::from_ball`] as one over the blob.
+    pub fn gradient_from_ball(&self, g: DVec3) -> DVec3 {
+        self.axes() * (g / self.lengths())
+    }
+
     /// Returns S = M⁻²: the covariance over σ².
     pub fn covariance(&self) -> DMat3 {
         let lengths = DMat3::from_diagonal(self.lengths() * self.lengths());
@@ -190,6 +234,25 @@ impl Shape {
     pub fn volume(&self) -> f64 {
         self.aspect * self.aspect_z
     }
+}
+
+/// Returns σ along x and z, and along y, of an ellipsoid that is upright after it is turned; `None`
+/// of others. Rotations in f32 are rounded by 6e-8, so that a relative difference of 1e-6 counts as
+/// none.
+fn upright_of(scales: DVec3, turned: DQuat) -> Option<(f64, f64)> {
+    // Covariance: the sum of σ² r rᵀ over the turned axes r.
+    let (mut own, mut across) = (DVec3::ZERO, DVec3::ZERO);
+    let axes = DMat3::from_quat(turned);
+    for (axis, sigma) in [axes.x_axis, axes.y_axis, axes.z_axis].iter().zip(scales.to_array()) {
+        let r = sigma * *axis;
+        own += r * r;
+        across += r * DVec3::new(r.y, r.z, r.x);
+    }
+    let wide = 0.5 * (own.x + own.z);
+    // Squares of what an upright one lacks, and of all.
+    let lost = 2.0 * (own.x - wide).powi(2) + 2.0 * across.length_squared();
+    let all = own.length_squared() + 2.0 * across.length_squared();
+    (lost <= 1e-12 * all).then(|| (wide.sqrt(), own.y.sqrt()))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use glam::DVec3;
 
 use crate::gpu::RecordCount;
 use crate::layout::frame::{CameraRecord, GridRecord};
+use crate::layout::particle::Shapes;
 use crate::layout::record;
 
 bindings! {
@@ -54,8 +55,8 @@ pub struct BlobVariant {
     pub textured: bool,
     /// Blobs end where their optical depth falls below a threshold.
     pub threshold: bool,
-    /// Some blobs are not spheres.
-    pub ellipsoids: bool,
+    /// The blobs' shapes.
+    pub shapes: Shapes,
     /// No blob's optical depth is above [`THIN`], and none has a texture.
     pub thin: bool,
     /// The light changes linearly across each blob.
@@ -68,19 +69,13 @@ impl BlobVariant {
     /// Returns the specialization constants that the blob shaders share, by id.
     pub(super) fn constants(self) -> [(u32, u32); 8] {
         let BlobVariant {
-            lit,
-            grouped,
-            weighted,
-            textured,
-            threshold,
-            ellipsoids,
-            thin,
-            shaded,
-            ..
+            lit, grouped, weighted, textured, threshold, shapes, thin, shaded, ..
         } = self;
         let ids = [0, 2, 3, 4, 5, 6, 9, 12];
-        let are_on = [lit, grouped, weighted, textured, threshold, ellipsoids, thin, shaded];
-        std::array::from_fn(|k| (ids[k], u32::from(are_on[k])))
+        let [lit, grouped, weighted, textured] = [lit, grouped, weighted, textured].map(u32::from);
+        let [threshold, thin, shaded] = [threshold, thin, shaded].map(u32::from);
+        let values = [lit, grouped, weighted, textured, threshold, shapes as u32, thin, shaded];
+        std::array::from_fn(|k| (ids[k], values[k]))
     }
 }
 

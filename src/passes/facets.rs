@@ -11,6 +11,7 @@
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::frame::GridRecord;
+use crate::layout::particle::Shapes;
 use crate::layout::record;
 
 record! {
@@ -70,7 +71,7 @@ pub struct Facets {
 }
 
 impl Facets {
-    /// Creates the pipelines; `has_ellipsoids` if some blobs are not spheres. Facets lie on the
+    /// Creates the pipelines; `shapes` are those of the blobs. Facets lie on the
     /// blobs' shells, or at their centres where clouds are a medium, `is_medium`.
     ///
     /// # Errors
@@ -78,10 +79,10 @@ impl Facets {
     pub fn new(
         device: &Device,
         compiler: &Compiler,
-        has_ellipsoids: bool,
+        shapes: Shapes,
         is_medium: bool,
     ) -> Result<Facets> {
-        let macros = [("ELLIPSOIDS", u32::from(has_ellipsoids)), ("SHELL", u32::from(!is_medium))];
+        let macros = [("ELLIPSOIDS", shapes as u32), ("SHELL", u32::from(!is_medium))];
         let kernel = |name| Kernel::with_macros(device, compiler, name, Push::FIELDS, &[], &macros);
         Ok(Facets {
             particles: kernel("facets")?,

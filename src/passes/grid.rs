@@ -10,6 +10,7 @@
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
 use crate::layout::frame::GridRecord;
+use crate::layout::particle::Shapes;
 use crate::layout::record;
 
 record! {
@@ -97,6 +98,8 @@ pub struct Deposit<'a> {
 /// The pipelines and scratch buffers of the pass.
 pub struct Grid {
     deposit: Kernel,
+    /// For ellipsoids whose axes are turned.
+    turned: Option<Kernel>,
     resolve: Kernel,
     /// For wider grids, and for the finest where there are some.
     spread: Option<[Kernel; 2]>,
@@ -115,19 +118,23 @@ impl Grid {
         compiler: &Compiler,
         n_cells: u64,
         has_levels: bool,
+        shapes: Shapes,
     ) -> Result<Grid> {
         // A workgroup of one subgroup does not wait at its barriers, and a blob's few cells fill
         // it.
         let width = device.limits().subgroup_size.clamp(8, 64);
-        let macros = [("WORKGROUP", width)];
+        let is_turned = shapes == Shapes::Turned;
+        let macros = [("WORKGROUP", width), ("TURNED", u32::from(is_turned))];
         let fields = DepositPush::FIELDS;
+        let kernel = |name| Kernel::with_macros(device, compiler, name, fields, &[], &macros);
         let spread = |finest: u32| {
             let macros = [("FINEST", finest)];
             let fields = SpreadPush::FIELDS;
             Kernel::with_macros(device, compiler, "grid.spread", fields, &[], &macros)
         };
         Ok(Grid {
-            deposit: Kernel::with_macros(device, compiler, "grid.deposit", fields, &[], &macros)?,
+            deposit: kernel("grid.deposit")?,
+            turned: is_turned.then(|| kernel("grid.turned")).transpose()?,
             resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS)?,
             spread: if has_levels { Some([spread(0)?, spread(1)?]) } else { None },
             scratch: Scratch::new(device, n_cells, room_of_wide(n_cells, has_levels))?,
@@ -189,15 +196,13 @@ impl Grid {
             is_wide: 0,
         };
         rec.fill(sums, 0);
-        let buffers = [placed, particles, sums];
-        rec.dispatch_groups(&self.deposit, &buffers, &push, of.n_particles)?;
+        self.deposit(rec, &[placed, particles, sums], &push)?;
         let spread = self.spread.as_ref().filter(|_| levels.n_wide() > 0);
         let Some([spread, spread_finest]) = spread else {
             return self.resolve(rec, density, &levels.0[0]);
         };
         rec.fill(wide_sums, 0);
-        let (buffers, push) = ([placed, particles, wide_sums], DepositPush { is_wide: 1, ..push });
-        rec.dispatch_groups(&self.deposit, &buffers, &push, of.n_particles)?;
+        self.deposit(rec, &[placed, particles, wide_sums], &DepositPush { is_wide: 1, ..push })?;
         let wide = &self.scratch.wide;
         for level in levels.0[1..].iter().rev() {
             rec.dispatch(spread, &[wide_sums, wide], level, level.n_cells.iter().product())?;
@@ -205,6 +210,20 @@ impl Grid {
         let finest = &levels.0[0];
         let n_cells = finest.n_cells.iter().product();
         rec.dispatch(spread_finest, &[sums, wide, density], finest, n_cells)
+    }
+
+    /// Adds the particles' mass to the sums of the finest grid, or of all wider ones.
+    fn deposit(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: &[&Buffer; 3],
+        push: &DepositPush,
+    ) -> Result<()> {
+        let kernels = [Some(&self.deposit), self.turned.as_ref()];
+        for kernel in kernels.into_iter().flatten() {
+            rec.dispatch_groups(kernel, buffers, push, push.n_particles)?;
+        }
+        Ok(())
     }
 
     /// Converts the sums of the finest grid to density.

@@ -17,6 +17,7 @@ use crate::gpu::{
     buffers, has_depth24,
 };
 use crate::layout::cull::KeptRecord;
+use crate::layout::particle::Shapes;
 use crate::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 
 pub use division::{Division, RUN, TILES_ACROSS, invocations};
@@ -70,7 +71,7 @@ buffers! {
         sheets: Buffer => SplatTextureRecord, one_unless(variant.blobs.textured, n_max),
             "tiles.sheets";
         /// Shapes of ellipsoids.
-        conics: Buffer => [u32; 4], one_unless(variant.blobs.ellipsoids, n_max), "tiles.conics";
+        conics: Buffer => [u32; 4], n_conics(variant.blobs.shapes, n_max), "tiles.conics";
         /// Changes of the light of shaded splats.
         shades: Buffer => [u32; 4], one_unless(variant.blobs.shaded, n_max), "tiles.shades";
         reaches: Buffer => [u32; 2], n_max, "tiles.reaches";
@@ -93,6 +94,11 @@ buffers! {
 
 fn one_unless(is_used: bool, n: u64) -> u64 {
     if is_used { n } else { 1 }
+}
+
+/// Returns the number of fours of the shapes of `n` splats.
+fn n_conics(shapes: Shapes, n: u64) -> u64 {
+    (n * shapes as u64).max(1)
 }
 
 /// Returns the number of fours of the state of all pixels.
@@ -163,7 +169,7 @@ impl Tiles {
             ("ONE_SUBGROUP", u32::from(is_one_subgroup)),
             ("THIN", u32::from(blobs.thin)),
             ("TEXTURED", u32::from(blobs.textured)),
-            ("ELLIPSOIDS", u32::from(blobs.ellipsoids)),
+            ("ELLIPSOIDS", blobs.shapes as u32),
             ("SHADED", u32::from(blobs.shaded)),
             ("CELLS", u32::from(blobs.in_cells)),
             ("THRESHOLD", u32::from(blobs.threshold)),
@@ -194,7 +200,7 @@ impl Tiles {
             n_compose_bindings: match blobs {
                 BlobVariant { in_cells: true, .. } => 13,
                 BlobVariant { shaded: true, .. } => 12,
-                BlobVariant { ellipsoids: true, .. } => 11,
+                BlobVariant { shapes, .. } if shapes > Shapes::Balls => 11,
                 BlobVariant { textured: true, .. } => 10,
                 _ if has_under => 8,
                 _ => 6,

@@ -84,7 +84,7 @@ pub fn deposit_on(spec: &GridSpec, level: u32, blobs: &[Blob]) -> Vec<f64> {
 
 /// Returns the level, of `n_levels`, that a blob is deposited on. Spreading adds variance along all
 /// axes, so that the level follows from the blob's least variance in any direction.
-fn level_of(spec: &GridSpec, blob: &Blob, n_levels: u32) -> u32 {
+pub fn level_of(spec: &GridSpec, blob: &Blob, n_levels: u32) -> u32 {
     let sigma =
         if blob.shape.is_upright() { blob.extents() } else { DVec3::splat(blob.narrowest()) };
     spec.level_of(sigma, n_levels)

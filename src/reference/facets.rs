@@ -58,8 +58,8 @@ pub fn directions() -> [(DVec3, f64); 14] {
 }
 
 /// Returns G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of the density ρ smoothed by a
-/// Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ A d). A = M⁻¹ gives the sphere the blob's shape,
-/// so that the gradient is one in the space where the blob is a ball (§14).
+/// Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ A d). A gives the sphere the blob's shape, along
+/// its axes, so that the gradient is one in the space where the blob is a ball (§14).
 pub fn gradient(
     density: impl Fn(DVec3) -> f64,
     p: DVec3,
@@ -67,7 +67,7 @@ pub fn gradient(
     shape: &Shape,
 ) -> (DVec3, f64) {
     directions().iter().fold((DVec3::ZERO, 0.0), |(g, s), &(d, w)| {
-        let density = w * density(p + GRADIENT_RADIUS_SIGMA * sigma * shape.stretch(d));
+        let density = w * density(p + GRADIENT_RADIUS_SIGMA * sigma * shape.from_ball(d));
         (g + density * d, s + density)
     })
 }
@@ -79,7 +79,7 @@ fn blended_normal((g, s): (DVec3, f64), shape: &Shape, p: DVec3, center: DVec3) 
     let q = if s > 0.0 { g.length() / s } else { 0.0 };
     let t = smoothstep(CONDITIONING, q);
     // t > 0 only where q > 0, hence |G| > 0.
-    let down = if t > 0.0 { -shape.whiten(g).normalize() } else { DVec3::ZERO };
+    let down = if t > 0.0 { -shape.gradient_from_ball(g).normalize() } else { DVec3::ZERO };
     ((t * down + (1.0 - t) * away).try_normalize().unwrap_or(away), q)
 }
 

@@ -85,7 +85,7 @@ impl View {
 
     /// Returns the columns and rows (first, end) outside which no ray meets `blob` out to `reach`
     /// σ, `c` its offset from the eye. The range may be too large, never too small.
-    pub(super) fn rectangle(&self, blob: &Blob, c: DVec3, reach: f64) -> [(u32, u32); 2] {
+    pub fn rectangle(&self, blob: &Blob, c: DVec3, reach: f64) -> [(u32, u32); 2] {
         let (slope_x, slope_y) = self.half_slopes();
         let [x, y] = [self.pose.right, self.pose.up]
             .map(|side| blob.slopes(c, [side, self.pose.forward], reach));

@@ -16,7 +16,7 @@ use nimbus::layout::facet::{LitRecord, SlopeRecord};
 use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
 use nimbus::model::camera::{Camera, CameraKey};
-use nimbus::model::cloud::{SQRT_TAU, Shape};
+use nimbus::model::cloud::{SQRT_TAU, Shape, Shapes, Turn};
 use nimbus::model::edge::Edge;
 use nimbus::model::film::FilmFormat;
 use nimbus::model::grid::GridSpec;
@@ -120,8 +120,8 @@ impl Picture {
         let color = [1.0, shade, 1.5 - shade];
         self.particles.push(ParticleRecord {
             aspect: 1.0,
-            unused: 0.0,
-            unused_too: [0.0; 2],
+            aspect_z: 1.0,
+            turn: [0; 2],
             position: [0.0; 3],
             sigma: sigma as f32,
             color,
@@ -150,9 +150,18 @@ impl Picture {
         self
     }
 
-    /// Returns whether some blob is an ellipsoid.
-    pub fn has_ellipsoids(&self) -> bool {
-        self.particles.iter().any(|p| p.aspect != 1.0)
+    /// Gives the last blob any shape.
+    pub fn of_shape(mut self, shape: Shape) -> Picture {
+        if let Some(last) = self.particles.last_mut() {
+            (last.aspect, last.aspect_z) = (shape.aspect as f32, shape.aspect_z as f32);
+            last.turn = shape.turn.words();
+        }
+        self
+    }
+
+    /// Returns the shapes of the blobs.
+    pub fn shapes(&self) -> Shapes {
+        self.particles.iter().map(|p| p.shape().kind()).max().unwrap_or_default()
     }
 
     /// Returns the position at an offset of `x` right, `y` up and `z` forward of the eye.
@@ -165,7 +174,7 @@ impl Picture {
         let blob = |(p, q): (&PlacedRecord, &ParticleRecord)| Blob {
             position: double(p.position),
             sigma: f64::from(p.sigma),
-            shape: Shape::upright(f64::from(q.aspect)),
+            shape: q.shape(),
             kappa: f64::from(q.kappa),
         };
         let blobs = self.placed.iter().zip(&self.particles).map(blob);
@@ -344,6 +353,8 @@ impl Picture {
     /// tiles or as sprites.
     pub fn worst(&self, tiled: bool) -> [f64; 3] {
         let (mut off_alpha, mut edge, mut off_tau) = (ONE_MINUS_EXP, 8.0 * U, 8.0 * U);
+        let columns: Vec<Bounded> = (0..self.view.width).map(|i| self.ray(i, 0)[0]).collect();
+        let rows: Vec<Bounded> = (0..self.view.height).map(|j| self.ray(0, j)[1]).collect();
         for ((blob, placed), sheet) in self.blobs().iter().zip(&self.placed).zip(self.sheets()) {
             let c = blob.position - self.view.pose.position;
             if !(c.dot(self.view.pose.forward) >= self.view.near
@@ -361,28 +372,32 @@ impl Picture {
                     self.view.pixel(),
                 )
             });
-            for j in 0..self.view.height {
-                for i in 0..self.view.width {
-                    let d = self.view.ray(i, j);
-                    let line = blob.along(c, d);
+            // The pixels within the cut, and a little beyond it.
+            let slack = |cut: f64| 0.2 * cut.max(1.0);
+            let most = self.view.edge.cut(blob.deepest());
+            let reach = (2.0 * (most + slack(most)).max(0.0)).sqrt();
+            let [(left, right), (top, bottom)] = self.view.rectangle(blob, c, reach);
+            for j in top..bottom {
+                for i in left..right {
+                    let line = blob.along(c, self.view.ray(i, j));
+                    let ray = [columns[i as usize], rows[j as usize]];
                     let cut = self.view.edge.cut(line.depth);
                     let at_cut = 0.5 * line.off.powi(2) - cut;
-                    if at_cut > 0.2 * cut.max(1.0) {
+                    if at_cut > slack(cut) {
                         continue;
                     }
                     let e = match tiled {
-                        true => sprite.tiled_exponent(self.ray(i, j)),
-                        false => sprite.exponent(self.ray(i, j)),
+                        true => sprite.tiled_exponent(ray),
+                        false => sprite.exponent(ray),
                     };
-                    let tau = sprite.deep(self.ray(i, j));
+                    let tau = sprite.deep(ray);
                     let cut_error = self.cut_error(tau);
                     // The cutoff: e ≤ cutoff²/2, three roundings; or the threshold's.
-                    if at_cut > -0.2 * cut.max(1.0) {
+                    if at_cut > -slack(cut) {
                         let error = if tiled { std::f64::consts::LN_2 * e.error } else { e.error };
                         edge = edge.max(0.51 * (error + cut_error) / cut.max(1.0) + 4.0 * U);
                     }
-                    let sheet =
-                        paper.as_ref().map(|p| p.exponent(sprite.difference(self.ray(i, j))));
+                    let sheet = paper.as_ref().map(|p| p.exponent(sprite.difference(ray)));
                     let log2_e = Bounded::once(std::f64::consts::LOG2_E);
                     let factor = match (sheet, tiled) {
                         (None, false) => e.scaled(-1.0).exp(),
@@ -444,9 +459,13 @@ impl Picture {
             .times(Bounded::exact(blob.sigma));
         let one = Bounded::exact(1.0);
         let tau = if self.drawn.is_some() { tau.times(one).times(one) } else { tau };
-        let ellipsoid = self
-            .has_ellipsoids()
-            .then(|| Ellipsoid::new(blob.shape.aspect, [pose.right.y, pose.up.y, pose.forward.y]));
+        let ellipsoid = match self.shapes() {
+            Shapes::Balls => None,
+            Shapes::Upright => {
+                Some(Ellipsoid::new(blob.shape.aspect, [pose.right.y, pose.up.y, pose.forward.y]))
+            }
+            Shapes::Turned => Some(Ellipsoid::turned(&blob.shape, pose)),
+        };
         Sprite {
             s: [slope(pose.right), slope(pose.up)],
             z: z_sigmas.squared().scaled(0.5),

@@ -349,7 +349,7 @@ impl Picture {
             weighted: self.drawn.is_some(),
             textured: self.textured.is_some(),
             threshold: self.view.edge.has_threshold(),
-            ellipsoids: self.has_ellipsoids(),
+            shapes: self.shapes(),
             thin: self.textured.is_none() && tau_max <= THIN,
             shaded: self.slopes.is_some(),
             in_cells: self.cells.is_some(),

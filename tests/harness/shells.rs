@@ -1,10 +1,10 @@
 //! Blobs in two clouds with all inputs of their facets, and bounds on the facets.
 
-use glam::{DVec3, UVec3, Vec3};
+use glam::{DQuat, DVec3, UVec3, Vec3};
 use nimbus::gpu::Compiler;
 use nimbus::layout::facet::{FacetRecord, RunRecord};
 use nimbus::layout::frame::GridRecord;
-use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
+use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord, Shapes};
 use nimbus::model::grid::GridSpec;
 use nimbus::passes::facets::{Facets, ParticleBuffers};
 use nimbus::passes::grid::{Deposit, Grid};
@@ -18,7 +18,7 @@ use nimbus::reference::grid::sample;
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
 
 use crate::harness::Gpu;
-use nimbus::model::cloud::Shape;
+use nimbus::model::cloud::{Shape, Turn};
 
 pub const U: f64 = U_F32;
 /// Mean σ of the groups' particles: some are smaller, some larger.
@@ -60,6 +60,18 @@ impl Scene {
     /// around.
     pub fn new() -> Scene {
         Scene::of_shape(1.0)
+    }
+
+    /// Returns the same with ellipsoids of any axes, a fifth to once as long as the longest.
+    pub fn turned() -> Scene {
+        let mut scene = Scene::new();
+        for (blob, i) in scene.blobs.iter_mut().zip(0..) {
+            let ([a, b, c, d], [e, f, ..]) = (uniforms(0x7e11, 0, i, 0), uniforms(0x7e11, 1, i, 0));
+            let of = |v: f64| f64::from((0.2 + 0.8 * v) as f32);
+            let turn = DQuat::from_xyzw(a - 0.5, b - 0.5, c - 0.5, d - 0.5).normalize();
+            blob.shape = Shape { aspect: of(e), aspect_z: of(f), turn: Turn::new(turn) };
+        }
+        scene
     }
 
     /// Returns the same with aspects from a third of `aspect` to `aspect`, unless that is 1, in
@@ -107,8 +119,8 @@ impl Scene {
         Scene { spec, record, blobs, groups: [0, 1, 2, 3].map(group), i_group }
     }
 
-    pub fn has_ellipsoids(&self) -> bool {
-        self.blobs.iter().any(|b| b.shape != Shape::BALL)
+    pub fn shapes(&self) -> Shapes {
+        self.blobs.iter().map(|b| b.shape.kind()).max().unwrap_or_default()
     }
 
     /// The GPU's density and facets.
@@ -127,8 +139,8 @@ impl Scene {
         runs: &[(u64, u64)],
     ) -> (Vec<f64>, Vec<FacetRecord>, Vec<u32>) {
         let (n, n_cells) = (self.blobs.len(), self.spec.n_total() as usize);
-        let grid = Grid::new(&gpu.device, compiler, n_cells as u64, false).unwrap();
-        let pass = Facets::new(&gpu.device, compiler, self.has_ellipsoids(), false).unwrap();
+        let grid = Grid::new(&gpu.device, compiler, n_cells as u64, false, self.shapes()).unwrap();
+        let pass = Facets::new(&gpu.device, compiler, self.shapes(), false).unwrap();
         let placed = |b: &Blob| PlacedRecord {
             position: b.position.as_vec3().to_array(),
             sigma: b.sigma as f32,
@@ -137,6 +149,8 @@ impl Scene {
             kappa: b.kappa as f32,
             color: color(b),
             aspect: b.shape.aspect as f32,
+            aspect_z: b.shape.aspect_z as f32,
+            turn: b.shape.turn.words(),
             ..ParticleRecord::default()
         };
         let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
@@ -240,7 +254,7 @@ impl Scene {
     /// exponentials: with |log2 a| < 6 and 3 ulp a logarithm, 2⁻²¹ about 1, and 3 + 2|x| an
     /// exponential, 320 roundings in total, including those of its depth.
     pub fn area_error(&self) -> f64 {
-        AREA_ERROR + if self.has_ellipsoids() { 320.0 * U } else { 0.0 }
+        AREA_ERROR + if self.shapes() > Shapes::Balls { 320.0 * U } else { 0.0 }
     }
 
     /// Returns bounds on normal, position and area of blob `i`.
@@ -252,7 +266,7 @@ impl Scene {
             p_error: 0.0,
             scale,
             scale_error: 0.0,
-            aspect: blob.shape.aspect,
+            shape: blob.shape,
             aspect_error: 0.0,
         };
         let normal = self.normal_bound(cells, &around, facet);
@@ -262,23 +276,24 @@ impl Scene {
     /// Returns the bound on `facet`'s normal around a point.
     pub fn normal_bound(&self, cells: &[f64], at: &Around, facet: &Facet) -> f64 {
         let center = self.centers()[facet.region as usize];
-        let axes = DVec3::new(1.0, at.aspect, 1.0);
+        let lengths = at.shape.lengths();
         let density = |x| sample(&self.spec, cells, x);
-        let (g, s) = gradient(density, at.p, at.scale, &Shape::upright(at.aspect));
+        let (g, s) = gradient(density, at.p, at.scale, &at.shape);
         // The sample's offset.
-        let scale_error = at.scale_error * at.aspect.max(1.0) + at.scale * at.aspect_error;
+        let (widest, turned) = (at.shape.widest(), at.axes_error());
+        let scale_error = at.scale_error * widest + at.scale * (at.aspect_error + turned * widest);
         let astray = at.p_error + GRADIENT_RADIUS_SIGMA * scale_error;
         // Σ w δρ over the directions, and 14 sums and a product each of the running total.
         let sampled = |(d, w): &(DVec3, f64)| {
-            let p = at.p + GRADIENT_RADIUS_SIGMA * at.scale * axes * *d;
-            w * self.sample_error(cells, p, at.scale * at.aspect.max(1.0), astray)
+            let p = at.p + GRADIENT_RADIUS_SIGMA * at.scale * at.shape.from_ball(*d);
+            w * self.sample_error(cells, p, at.scale * widest, astray)
         };
         let dg = directions().iter().map(sampled).sum::<f64>() + 18.0 * U * s;
         let to_center = (at.p - center).length();
         // p − c rounds once; length and quotient follow. The exact centre has no direction on
         // either side.
-        let turned = if to_center > 0.0 { 2.0 * at.p_error / to_center } else { 0.0 };
-        let d_away = U * (1.0 + LENGTH_ERROR + DIVISION_ERROR) * 2.0 + turned;
+        let swung = if to_center > 0.0 { 2.0 * at.p_error / to_center } else { 0.0 };
+        let d_away = U * (1.0 + LENGTH_ERROR + DIVISION_ERROR) * 2.0 + swung;
         let away = if to_center > 0.0 { (at.p - center) / to_center } else { DVec3::Y };
         let q = facet.conditioning;
         let normal = if s == 0.0 {
@@ -300,10 +315,13 @@ impl Scene {
                 // The unit gradient turns by 2√3 dg/|G|: the error grows with 1/(q S). Then the
                 // blend v = t·down + (1−t)·away, whose own length divides. For an ellipsoid the
                 // error is stretched with it; the quotient by a is rounded, and a may be off.
-                let down = -(g / axes);
-                let wrong = dg + g.y.abs() * (at.aspect_error / at.aspect + DIVISION_ERROR * U);
+                let down = -at.shape.gradient_from_ball(g);
+                let of_shape = at.aspect_error / at.shape.aspect + DIVISION_ERROR * U;
+                let sides = if turned > 0.0 { g.length() } else { g.y.abs() };
+                // Axes that are off take a part of every component to the shortest one's.
+                let wrong = dg + sides * of_shape + 3.0 * turned * g.length();
                 let d_down =
-                    2.0 * 3f64.sqrt() * wrong / axes.min_element().min(1.0) / down.length()
+                    2.0 * 3f64.sqrt() * wrong / lengths.min_element().min(1.0) / down.length()
                         + U * (LENGTH_ERROR + DIVISION_ERROR);
                 let blend = t * down.normalize_or_zero() + (1.0 - t) * away;
                 let dv = (t + dt) * d_down + dt * 2.0 + (1.0 - t + dt) * d_away + 4.0 * U;
@@ -321,19 +339,27 @@ pub struct Around {
     pub p_error: f64,
     pub scale: f64,
     pub scale_error: f64,
-    pub aspect: f64,
+    pub shape: Shape,
     pub aspect_error: f64,
 }
 
 impl Around {
+    /// Returns the error of a component of the axes: those of the quaternion's components, 4 U and
+    /// more for the root, of products and sums; and of the first axis, a cross product.
+    fn axes_error(&self) -> f64 {
+        if self.shape.is_upright() { 0.0 } else { 160.0 * U }
+    }
+
     pub fn shell_bound(&self, normal: f64, facet: &Facet) -> DVec3 {
         // For an ellipsoid Σn/√(nᵀΣn), Σ = diag(1, a², 1), is at most max(1, a) long. It changes by
         // at most 2 max(1, a²)/min(1, a) times the error of n and by 2 max(1, a) times the error of
         // a; eight more roundings, and the root's.
-        let a = self.aspect;
-        let (wide, steep) =
-            (a.max(1.0), if a == 1.0 { 1.0 } else { 2.0 * a.max(1.0).powi(2) / a.min(1.0) });
-        let more = if a == 1.0 { 0.0 } else { 8.0 + LENGTH_ERROR + DIVISION_ERROR };
+        let (wide, narrow) = (self.shape.widest(), self.shape.narrowest());
+        let is_ball = self.shape == Shape::BALL;
+        let steep = if is_ball { 1.0 } else { 2.0 * wide.powi(2) / narrow };
+        let more = if is_ball { 0.0 } else { 8.0 + LENGTH_ERROR + DIVISION_ERROR };
+        // Axes that are off change n along them, and the way back.
+        let normal = normal + 2.0 * self.axes_error();
         let shell = SHELL_SIGMA * (self.scale + self.scale_error) * wide;
         // 1.5σ, its product with n, and the sum.
         let inherited = self.p_error

@@ -88,6 +88,7 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("first_tensor.comp", first::TensorPush::FIELDS, "Facet Light 4 T F Lit 4"),
     ("generate.comp", generate::Push::FIELDS, "Box 4 Particle 4"),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, "Placed Particle 4"),
+    ("grid_turned.comp", grid::DepositPush::FIELDS, "Placed Particle 4"),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, "8 4"),
     ("grid_spread.comp", grid::SpreadPush::FIELDS, "8 4"),
     ("impostors.frag", impostors::Push::FIELDS, "T"),

@@ -5,13 +5,13 @@ mod wrong;
 
 use crate::bounded::{Random, U};
 use crate::harness::Gpu;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use nimbus::gpu::{Compiler, DeviceCount};
 use nimbus::layout::cull::KeptRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::camera::Pose;
-use nimbus::model::cloud::{SQRT_TAU, Shape};
+use nimbus::model::cloud::{SQRT_TAU, Turn};
 use nimbus::model::edge::Edge;
 use nimbus::passes::blobs::{BlobVariant, BlobView, DepthFrom, Depths};
 use nimbus::passes::cull::{Cull, CullBuffers, CullView, Order};
@@ -102,7 +102,12 @@ impl Scene {
     fn with(mut self, position: [f32; 3], sigma: f32, tau: f64) -> Scene {
         self.placed.push(PlacedRecord { position, sigma });
         let kappa = (tau / (SQRT_TAU * f64::from(sigma))) as f32;
-        self.particles.push(ParticleRecord { kappa, aspect: 1.0, ..ParticleRecord::default() });
+        self.particles.push(ParticleRecord {
+            kappa,
+            aspect: 1.0,
+            aspect_z: 1.0,
+            ..ParticleRecord::default()
+        });
         self.i_group.push(0);
         self
     }
@@ -120,7 +125,7 @@ impl Scene {
         let variant = BlobVariant {
             weighted: self.weighted,
             threshold: self.view.edge.has_threshold(),
-            ellipsoids: self.particles.iter().any(|p| p.aspect != 1.0),
+            shapes: self.particles.iter().map(|p| p.shape().kind()).max().unwrap_or_default(),
             ..BlobVariant::default()
         };
         let pass = Cull::new(&gpu.device, compiler, self.n(), variant).expect("cull");
@@ -178,7 +183,7 @@ impl Scene {
             if self.weighted { f64::from(group.kappa_scale) * f64::from(last) } else { 1.0 };
         let position = DVec3::from(p.position.map(f64::from));
         Blob {
-            shape: Shape::upright(f64::from(q.aspect)),
+            shape: q.shape(),
             position,
             sigma: f64::from(p.sigma),
             kappa: weight * f64::from(q.kappa),
@@ -272,13 +277,33 @@ fn random(seed: u64, n: usize) -> Scene {
     scene.seen()
 }
 
-/// The same of ellipsoids, from a fiftieth to fifty times as high as wide.
+/// The same of ellipsoids, from a thousandth to a thousand times as high as wide.
 fn random_ellipsoids(seed: u64, n: usize) -> Scene {
     let (mut scene, mut random) = (random(seed, n), Random(seed ^ 0xe11));
     for particle in &mut scene.particles {
-        particle.aspect = 50f32.powf(random.within(-1.0, 1.0));
+        particle.aspect = 1000f32.powf(random.within(-1.0, 1.0));
     }
     scene
+}
+
+/// The same with turned axes.
+fn random_turned(seed: u64, n: usize) -> Scene {
+    let (mut scene, mut random) = (random_ellipsoids(seed, n), Random(seed ^ 0x7e11));
+    for particle in &mut scene.particles {
+        let mut of = || f64::from(random.within(-1.0, 1.0));
+        let turn = DQuat::from_xyzw(of(), of(), of(), of() + 1e-3).normalize();
+        let ratio = 1000f64.powf(of()) as f32;
+        // No axis is shorter than a thousandth of the longest.
+        let [least, most] = [particle.aspect.min(1.0), particle.aspect.max(1.0)];
+        particle.aspect_z = ratio.clamp(1e-3 * most, 1e3 * least);
+        particle.turn = Turn::new(turn).words();
+    }
+    scene
+}
+
+#[test]
+fn of_turned_ones_too() {
+    keep_what_the_reference_keeps(random_turned);
 }
 
 #[test]
@@ -314,7 +339,8 @@ fn keep_what_the_reference_keeps(scenes: fn(u64, usize) -> Scene) {
 fn no_ray_meets_what_is_left_out() {
     let (mut n_left, mut n_met) = (0, 0);
     for seed in 1..=16 {
-        let mut scene = if seed > 8 { random_ellipsoids(seed, 400) } else { random(seed, 400) };
+        let scenes = [random, random_ellipsoids, random_turned];
+        let mut scene = scenes[seed as usize % 3](seed, 400);
         scene.view.smallest = 0.0;
         for (i, outcome) in scene.fates().into_iter().enumerate() {
             let (blob, view) = (scene.blob(i), &scene.view);

@@ -8,7 +8,7 @@ use crate::shells::{
 use glam::{DVec3, Vec3};
 use nimbus::gpu::Compiler;
 use nimbus::layout::facet::FacetRecord;
-use nimbus::model::cloud::runs;
+use nimbus::model::cloud::{Shapes, runs};
 use nimbus::reference::facet_runs::{grouped, merged};
 use nimbus::reference::facets::{CONDITIONING, Facet, FacetPlace, FacetSources};
 use nimbus::reference::morton;
@@ -103,8 +103,11 @@ fn facets_are_within_bounds_that_grow_as_the_gradient_vanishes() {
 fn facets_of_ellipsoids_are_within_their_bounds() {
     let mut gpu = Gpu::new();
     let compiler = Compiler::new(nimbus::passes::sources(), Compiler::default_cache()).unwrap();
-    for aspect in [0.2, 2.5] {
-        let scene = Scene::of_shape(aspect);
+    for (what, scene) in [
+        ("flat", Scene::of_shape(0.2)),
+        ("tall", Scene::of_shape(2.5)),
+        ("turned", Scene::turned()),
+    ] {
         let (cells, made) = scene.run(&mut gpu, &compiler);
         let compared = compare(&scene, &cells, &made);
         assert!(compared.labels_right);
@@ -118,25 +121,46 @@ fn facets_of_ellipsoids_are_within_their_bounds() {
         }
         let mut bounds = compared.bounds[0].clone();
         bounds.sort_by(f64::total_cmp);
-        println!("{aspect}: normals' bounds: median {:e}", bounds[bounds.len() / 2]);
+        println!("{what}: normals' bounds: median {:e}", bounds[bounds.len() / 2]);
         assert!(bounds[bounds.len() / 2] < 1e-2);
         for counts in [[100, 400], [1, 1499]] {
             let runs = Runs::new(&scene, counts);
             let (cells, made, _) = scene.run_groups(&mut gpu, &compiler, &runs.order, &runs.runs);
             let ratios = compare_runs(&runs.truth(&scene, &cells), &made).unwrap();
-            println!("{aspect}, {counts:?}: error/bound {ratios:.3?}");
+            println!("{what}, {counts:?}: error/bound {ratios:.3?}");
         }
     }
     let scene = Scene::of_shape(0.2);
     for (from, to) in [
         ("gradient /= axes;", ""),
-        ("aspect * aspect * n.y", "aspect * n.y"),
-        ("tau *= aspect / wider;", "tau *= aspect;"),
-        ("scale * (axes * d)", "scale * d"),
+        ("form.aspect * form.aspect * n.y", "form.aspect * n.y"),
+        ("tau *= volume_of(form) / wider;", "tau *= volume_of(form);"),
+        ("at = axes * d;", "at = d;"),
     ] {
         let (cells, made) =
             scene.run(&mut gpu, &Gpu::wrong_compiler("include/shell.glsl", from, to));
         assert!(!compare(&scene, &cells, &made).is_right(), "{to} was not noticed");
+    }
+    let scene = Scene::turned();
+    for (file, from, to) in [
+        ("include/turn.glsl", "q.y * q.z - q.x * q.w", "q.y * q.z + q.x * q.w"),
+        ("include/shell.glsl", "gradient = form.axes * gradient;", ""),
+        ("include/shell.glsl", "at = form.axes * at;", ""),
+        ("include/shell.glsl", "powers.x + powers.y + powers.x * powers.y", "1.0 + 2.0 * powers.x"),
+        ("include/shell.glsl", "vec3 own = n * form.axes", "vec3 own = n"),
+        ("include/shell.glsl", "return form.lengths.y * form.lengths.z;", "return form.lengths.y;"),
+    ] {
+        let (cells, made) = scene.run(&mut gpu, &Gpu::wrong_compiler(file, from, to));
+        assert!(!compare(&scene, &cells, &made).is_right(), "{to} was not noticed");
+    }
+    let runs = Runs::new(&scene, [100, 400]);
+    for (from, to) in [
+        ("particles[i].aspect * particles[i].aspect_z;", "particles[i].aspect;"),
+        ("0.5 * dot(squares, 1.0 - upward * upward)", "0.5 * dot(squares, upward * upward)"),
+    ] {
+        let compiler = Gpu::wrong_compiler("facets_groups.comp", from, to);
+        let (cells, made, _) = scene.run_groups(&mut gpu, &compiler, &runs.order, &runs.runs);
+        assert!(compare_runs(&runs.truth(&scene, &cells), &made).is_err(), "{to} was not noticed");
     }
 }
 
@@ -237,10 +261,10 @@ fn run_bounds(
     };
     let greatest =
         |of: &dyn Fn(usize) -> f64| run.iter().map(|i| of(*i as usize)).fold(0.0, f64::max);
-    let ellipsoids = scene.has_ellipsoids();
+    let ellipsoids = scene.shapes() > Shapes::Balls;
     let (b, first) = (merged(m, run, ellipsoids), run[0] as usize);
-    // κσ³a: four products.
-    let by_mass = 4.0 * U;
+    // κσ³a, and b where axes are turned: five products.
+    let by_mass = 5.0 * U;
     let reach = greatest(&|i| (m.blobs[i].position - m.blobs[first].position).length());
     let p_error = if run.len() == 1 { 0.0 } else { mean(by_mass, reach, b.position.length()) };
     // σ² + |p − p̄|²/3: p̄'s error and the difference's rounding enter the square, whose five
@@ -275,7 +299,7 @@ fn run_bounds(
         if run.len() == 1 { 0.0 } else { spread.max(mean(by_mass, means, b.sigma_mean)) };
     let scale = b.sigma.max(b.sigma_mean);
     let around =
-        Around { p: b.position, p_error, scale, scale_error, aspect: b.shape.aspect, aspect_error };
+        Around { p: b.position, p_error, scale, scale_error, shape: b.shape, aspect_error };
     let normal = scene.normal_bound(cells, &around, facet);
     let position = around.shell_bound(normal, facet).max_element();
     let colors = greatest(&|i| (m.colors[i] - m.colors[first]).length());

@@ -319,8 +319,8 @@ fn given_groups_and_empty_lists_are_left_alone() {
     assert_eq!(list[2].form, FORM_GIVEN);
     let before = ParticleRecord {
         aspect: 1.0,
-        unused: 0.0,
-        unused_too: [0.0; 2],
+        aspect_z: 1.0,
+        turn: [0; 2],
         position: [7.0, 8.0, 9.0],
         sigma: 4.0,
         color: [0.1, 0.2, 0.3],

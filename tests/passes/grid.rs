@@ -2,20 +2,22 @@
 //! deposits.
 
 mod blobs;
+#[path = "grid/turned.rs"]
+mod of_turned;
 
 use glam::{DVec3, UVec3, Vec3};
 
-use blobs::{at_the_cut, ellipsoids, paper, scattered, wide, wide_ellipsoids};
+use blobs::{at_the_cut, ellipsoids, paper, scattered, turned, wide, wide_ellipsoids, wide_turned};
 
 use crate::harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
 use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{ParticleRecord, PlacedRecord};
-use nimbus::model::cloud::Shape;
+use nimbus::model::cloud::{Shape, Shapes};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use nimbus::passes::grid::{Deposit, Grid};
 use nimbus::reference::Blob;
-use nimbus::reference::deposit::{axis_weights, deposit, deposit_on, spread};
+use nimbus::reference::deposit::{axis_weights, deposit, deposit_on, level_of, spread};
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32, erf_bound};
 
 const U: f64 = U_F32;
@@ -36,7 +38,11 @@ impl Scene {
         let spec = GridSpec { n_cells: spec.n_cells, cell, aspect, low };
         let f32 = |b: &Blob| Blob {
             position: b.position.as_vec3().as_dvec3(),
-            shape: Shape::upright(f64::from(b.shape.aspect as f32)),
+            shape: Shape {
+                aspect: f64::from(b.shape.aspect as f32),
+                aspect_z: f64::from(b.shape.aspect_z as f32),
+                ..b.shape
+            },
             sigma: f64::from(b.sigma as f32),
             kappa: f64::from(b.kappa as f32),
         };
@@ -49,14 +55,30 @@ impl Scene {
         let reach = |b: &Blob| DEPOSIT_CUT_SIGMA * b.extents();
         let low = blobs.iter().map(|b| b.position - reach(b)).reduce(DVec3::min).unwrap();
         let high = blobs.iter().map(|b| b.position + reach(b)).reduce(DVec3::max).unwrap();
-        let aspect = blobs.iter().map(|b| b.shape.aspect).sum::<f64>() / blobs.len() as f64;
+        let of = blobs.iter().map(|b| b.shape.aspect_upright());
+        let aspect = of.sum::<f64>() / blobs.len() as f64;
         Scene::new(&GridSpec::fit(low, high, n, aspect), blobs)
+    }
+
+    /// Leaves out turned ellipsoids that extend over as many cells along two axes, but for
+    /// rounding: which axis comes first is open.
+    fn decided(self) -> Scene {
+        let n_levels = self.n_levels();
+        let of =
+            |b: &&Blob| of_turned::is_decided(&self.spec, b, level_of(&self.spec, b, n_levels));
+        let blobs = self.blobs.iter().filter(of).copied().collect();
+        Scene { blobs, ..self }
+    }
+
+    fn shapes(&self) -> Shapes {
+        self.blobs.iter().map(|b| b.shape.kind()).max().unwrap()
     }
 
     fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> Vec<f64> {
         let n_cells = self.spec.n_total() as usize;
         let n_levels = self.n_levels();
-        let pass = Grid::new(&gpu.device, compiler, n_cells as u64, n_levels > 1).unwrap();
+        let n_total = n_cells as u64;
+        let pass = Grid::new(&gpu.device, compiler, n_total, n_levels > 1, self.shapes()).unwrap();
         let placed = |b: &Blob| PlacedRecord {
             position: b.position.as_vec3().to_array(),
             sigma: b.sigma as f32,
@@ -64,6 +86,8 @@ impl Scene {
         let particle = |b: &Blob| ParticleRecord {
             kappa: b.kappa as f32,
             aspect: b.shape.aspect as f32,
+            aspect_z: b.shape.aspect_z as f32,
+            turn: b.shape.turn.words(),
             ..ParticleRecord::default()
         };
         let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
@@ -89,7 +113,7 @@ impl Scene {
     /// Bound of every cell's density.
     fn bounds(&self) -> Vec<f64> {
         let n_levels = self.n_levels();
-        let level_of = |b: &Blob| self.spec.level_of(b.extents(), n_levels);
+        let level_of = |b: &Blob| level_of(&self.spec, b, n_levels);
         let mut wider: Option<[Vec<f64>; 2]> = None;
         for level in (0..n_levels).rev() {
             let of = |b: &&Blob| b.sigma > 0.0 && b.kappa > 0.0 && level_of(b) == level;
@@ -120,6 +144,10 @@ impl Scene {
         let volume = spec.cell_volume();
         let quantum = self.heaviest / 2f64.powi(31) / volume;
         for blob in blobs {
+            if !blob.shape.is_upright() {
+                of_turned::add_bounds(&self.spec, blob, level, quantum, &mut bounds);
+                continue;
+            }
             let axis = |k: usize| self.axis(blob, level, k, n[k]);
             let (x, y, z) = (axis(0), axis(1), axis(2));
             let density = blob.mass() / volume;
@@ -225,6 +253,8 @@ fn scenes() -> Vec<(&'static str, Scene)> {
         ("wide, of 45 cells", Scene::fitted(&wide(1000), 45)),
         ("wide ellipsoids", Scene::fitted(&wide_ellipsoids(3000), 64)),
         ("ellipsoids", Scene::fitted(&ellipsoids(3000), 48)),
+        ("turned", Scene::fitted(&turned(3000), 48).decided()),
+        ("wide turned ones", Scene::fitted(&wide_turned(3000), 64).decided()),
         ("the paper's 554", Scene::fitted(&paper(), 64)),
         ("at the cut", Scene::new(&cells, &at_the_cut())),
         ("a speck", Scene::new(&cells, &[at(4.5, 1e-4, 3.0)])),
@@ -251,8 +281,10 @@ fn every_cell_is_within_its_bound() {
         let greatest = (0..truths.len()).max_by(|a, b| truths[*a].total_cmp(&truths[*b])).unwrap();
         println!("{name}: relative bound of the densest cell {:e}", relative(greatest));
         // Weights are some tenth and their bounds 2.5e-6: a bound that said nothing would show
-        // here.
-        assert!(relative(greatest) < 1e-3);
+        // here. Parts of turned ellipsoids follow from matrices, whose errors are bounded as a
+        // whole.
+        let most = if scene.shapes() == Shapes::Turned { 1e-2 } else { 1e-3 };
+        assert!(relative(greatest) < most, "{name}");
     }
 }
 
@@ -357,7 +389,7 @@ fn a_grid_without_room_is_refused() {
     let mut gpu = Gpu::new();
     let scene = Scene::fitted(&scattered(10), 24);
     let n_cells = scene.spec.n_total();
-    let pass = Grid::new(&gpu.device, &compiler(), n_cells - 1, false).unwrap();
+    let pass = Grid::new(&gpu.device, &compiler(), n_cells - 1, false, Shapes::Balls).unwrap();
     let (placed, particles) = (gpu.buffer::<PlacedRecord>(10), gpu.buffer::<ParticleRecord>(10));
     let density = gpu.buffer::<f32>(n_cells as usize);
     let mut what = String::new();

@@ -10,6 +10,7 @@ use glam::DVec3;
 use nimbus::gpu::{Buffer, Compiler, Image, LoadOp, MemoryUsage, Target};
 use nimbus::gpu::{TargetFormat, has_depth24};
 use nimbus::layout::facet::{FacetRecord, RegionRecord};
+use nimbus::model::cloud::Shapes;
 use nimbus::passes::facets::Facets;
 use nimbus::passes::terrain::{Piece, Terrain};
 
@@ -230,8 +231,9 @@ fn facets_lie_where_their_origins_are() {
         hills,
     );
     let run = |gpu: &mut Gpu, compiler: Option<&Compiler>| -> Vec<FacetRecord> {
-        let pass = Facets::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), false, false)
-            .expect("facets");
+        let pass =
+            Facets::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), Shapes::Balls, false)
+                .expect("facets");
         let (regions, points) = (gpu.upload(&relief.regions), gpu.upload(&relief.points));
         let n = relief.points.len() as u32;
         let facets = gpu.upload(&vec![FacetRecord::default(); (n + 5) as usize]);

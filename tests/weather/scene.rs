@@ -9,7 +9,7 @@ use crate::weather_files::{Made, NX, NY, NZ};
 use glam::DVec3;
 use nimbus::io::scene_file::{self, LoadedScene};
 use nimbus::io::weather::wrf;
-use nimbus::model::cloud::{CloudSource, Facing, Particle};
+use nimbus::model::cloud::{CloudSource, Facing, Particle, Shapes};
 use nimbus::model::light::Light;
 use nimbus::model::scene::Scene;
 
@@ -67,7 +67,7 @@ fn particles_hold_the_files_extinction_whatever_the_exaggeration() {
                 .all(|p| p.position.is_finite() && p.sigma > 0.0 && p.shape.aspect > 0.0)
         );
         assert_eq!(scene.clouds[0].facing, Facing::Up);
-        assert!(scene.has_ellipsoids());
+        assert_eq!(scene.shapes(), Shapes::Upright);
     }
     // Another step, and another seed, are other particles.
     let first = load(&format!("{KATRINA}particles = 500")).expect("a scene");

@@ -58,8 +58,8 @@ pub(super) fn layers(
             let offset = vector(place.position) - eye;
             let (depth, sigma) = (offset.dot(forward), f64::from(place.sigma));
             // In units in which the blob is round.
-            let round = DVec3::new(1.0, 1.0 / f64::from(particle.aspect), 1.0);
-            let (offset, ray) = (offset * round, *ray * round);
+            let shape = particle.shape();
+            let (offset, ray) = (shape.whiten(offset), shape.whiten(*ray));
             let along = offset.dot(ray) / ray.length();
             let apart = offset.length_squared() - along * along;
             let tau = SQRT_TAU * f64::from(particle.kappa) * sigma / ray.length();
@@ -122,7 +122,13 @@ mod tests {
         let position = [0.0, 0.0, z];
         (
             PlacedRecord { position, sigma },
-            ParticleRecord { sigma, kappa, aspect: 1.0, ..ParticleRecord::default() },
+            ParticleRecord {
+                sigma,
+                kappa,
+                aspect: 1.0,
+                aspect_z: 1.0,
+                ..ParticleRecord::default()
+            },
         )
     }
 

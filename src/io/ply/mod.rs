@@ -57,7 +57,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Read> {
     memory::check(n_bytes, || format!("{}: {} particles", path.display(), element.n))?;
     let blank = Particle { sigma: 0.0, shape: Shape::BALL, ..Particle::default() };
     let particles = rows.map(blank, &columns)?;
-    let notes = columns.notes(particles.len());
+    let notes = columns.notes();
     Ok(Read { particles, notes })
 }
 

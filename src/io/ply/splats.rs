@@ -1,16 +1,14 @@
 //! The meaning of a row's properties: those of a particle in a list, or of a splat of 3D Gaussian
 //! splatting (Kerbl et al. 2023).
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DQuat, DVec3};
 
 use super::header::{Element, Scalar};
 use super::rows::{Fault, Made, OfRow};
 use crate::io::bounds::{AMOUNT, DIVISOR, GREATEST, LEAST, wrong_coordinate, wrong_size};
 use crate::io::document::suggest::list;
 use crate::io::particle_file::wrong_height;
-use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, SQRT_TAU, Shape};
+use crate::model::cloud::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, Shape};
 
 /// Greatest opacity of a splat, as in the rasterizer of Kerbl et al.: no splat hides all behind it.
 const MOST_OPACITY: f64 = 0.99;
@@ -23,8 +21,8 @@ const THOMSEN: f64 = 1.6075;
 type Three = [usize; 3];
 
 enum Size {
-    /// σ or a multiple of it, and σ along y.
-    Sigma(usize, f64, Option<usize>),
+    /// σ or a multiple of it, σ along y and z, and the rotation.
+    Sigma { wide: usize, factor: f64, others: [Option<usize>; 2], rotation: Option<[usize; 4]> },
     /// Logarithms of σ along three axes, and their rotation.
     Scales(Three, Option<[usize; 4]>),
 }
@@ -51,8 +49,6 @@ pub struct Columns {
     color: Color,
     /// Properties that belong to harmonics of higher degrees.
     n_harmonics: usize,
-    /// Ellipsoids that lie askew.
-    askew: AtomicU64,
 }
 
 impl Columns {
@@ -64,12 +60,13 @@ impl Columns {
         };
         let scales = all_of(element, ["scale_0", "scale_1", "scale_2"])?;
         let sizes = (find("sigma"), find("radius"), scales);
+        let rotation = all_of(element, ["rot_0", "rot_1", "rot_2", "rot_3"])?;
+        let others = ["sigma_y", "sigma_z"].map(find);
+        let of_sigma = |wide, factor| Size::Sigma { wide, factor, others, rotation };
         let size = match sizes {
-            (Some(i), None, None) => Size::Sigma(i, 1.0, find("sigma_y")),
-            (None, Some(i), None) => Size::Sigma(i, SIGMA_PER_RADIUS, find("sigma_y")),
-            (None, None, Some(scales)) => {
-                Size::Scales(scales, all_of(element, ["rot_0", "rot_1", "rot_2", "rot_3"])?)
-            }
+            (Some(i), None, None) => of_sigma(i, 1.0),
+            (None, Some(i), None) => of_sigma(i, SIGMA_PER_RADIUS),
+            (None, None, Some(scales)) => Size::Scales(scales, rotation),
             (None, None, None) => {
                 return Err("expected a property `sigma`, `radius` (3 sigma), or `scale_0`, \
                             `scale_1`, `scale_2` (logarithms of sigma)"
@@ -103,19 +100,12 @@ impl Columns {
             }
             _ => 0,
         };
-        Ok(Columns { position, size, density, color, n_harmonics, askew: AtomicU64::new(0) })
+        Ok(Columns { position, size, density, color, n_harmonics })
     }
 
-    /// Returns notes for the user about the `n` particles that were made.
-    pub fn notes(&self, n: usize) -> Vec<String> {
+    /// Returns notes for the user about the particles that were made.
+    pub fn notes(&self) -> Vec<String> {
         let mut notes = vec![];
-        let askew = self.askew.load(Ordering::Relaxed);
-        if askew > 0 {
-            notes.push(format!(
-                "{askew} of {n} ellipsoids lie askew; each is drawn upright, with its mass, its \
-                 height and its mean width"
-            ));
-        }
         if self.n_harmonics > 0 {
             notes.push(format!(
                 "colours do not change with the view: f_rest_0 to f_rest_{} are left out",
@@ -123,30 +113,6 @@ impl Columns {
             ));
         }
         notes
-    }
-
-    /// Returns σ along x and z, and the aspect, of the upright ellipsoid that stands for one: of
-    /// the same height and mean width.
-    fn upright(&self, scales: DVec3, rotation: DQuat) -> (f64, f64) {
-        if scales.x == scales.z && (rotation == DQuat::IDENTITY || scales.x == scales.y) {
-            return (scales.x, aspect_of(scales.y, scales.x));
-        }
-        // Covariance: the sum of σ² r rᵀ over the turned axes r.
-        let (mut own, mut across) = (DVec3::ZERO, DVec3::ZERO);
-        let axes = DMat3::from_quat(rotation);
-        for (axis, sigma) in [axes.x_axis, axes.y_axis, axes.z_axis].iter().zip(scales.to_array()) {
-            let r = sigma * *axis;
-            own += r * r;
-            across += r * DVec3::new(r.y, r.z, r.x);
-        }
-        let wide = 0.5 * (own.x + own.z);
-        // Squares of what the upright one lacks, and of all. Rotations in f32 are rounded by 6e-8,
-        // so that a relative difference of 1e-6 counts as none.
-        let lost = 2.0 * (own.x - wide).powi(2) + 2.0 * across.length_squared();
-        if lost > 1e-12 * (own.length_squared() + 2.0 * across.length_squared()) {
-            self.askew.fetch_add(1, Ordering::Relaxed);
-        }
-        (wide.sqrt(), aspect_of(own.y.sqrt(), wide.sqrt()))
     }
 }
 
@@ -181,20 +147,35 @@ impl OfRow<Particle> for Columns {
         let coordinate = |i: usize| finite(i).and_then(|v| checked(i, v, wrong_coordinate(v)));
         let [x, y, z] = self.position.map(coordinate);
         let position = DVec3::new(x?, y?, z?);
-        // κ of an upright ellipsoid is `share` of that of the one that it stands for.
-        let (sigma, aspect, logs, share) = match self.size {
-            Size::Sigma(i, factor, high) => {
-                let sigma = size(i, factor * value(i), LEAST)?;
-                let aspect = match high {
+        let turn = |rotation: Option<[usize; 4]>| {
+            let Some(of) = rotation else { return Ok(DQuat::IDENTITY) };
+            let [w, x, y, z] = of.map(finite);
+            let of_length = DQuat::from_xyzw(x?, y?, z?, w?);
+            let found = of_length.length();
+            let wrong = !(found.is_finite() && found > 1e-30);
+            checked(of[0], 0.0, wrong.then(|| "a rotation other than zero".to_owned()))?;
+            Ok(of_length / found)
+        };
+        // Where an aspect is limited, κ is `share` of the given one, so that the mass stays.
+        let (sigma, shape, logs, share) = match self.size {
+            Size::Sigma { wide, factor, others, rotation } => {
+                let sigma = size(wide, factor * value(wide), LEAST)?;
+                let other = |j: Option<usize>| match j {
                     Some(j) if sigma > 0.0 => {
-                        let high = finite(j)?;
-                        checked(j, high, wrong_height(high, sigma))? / sigma
+                        let of = finite(j)?;
+                        checked(j, of, wrong_height(of, sigma))
                     }
-                    _ => 1.0,
+                    _ => Ok(sigma),
                 };
-                let high = libm::log(sigma * aspect);
-                let wide = libm::log(sigma);
-                (sigma, aspect, [wide, high, wide], 1.0)
+                let [high, deep] = others.map(other);
+                let (high, deep) = (high?, deep?);
+                // Without a third axis and a rotation no number is rounded.
+                let (first, shape) = match (others[1], rotation) {
+                    _ if sigma == 0.0 => (sigma, Shape::BALL),
+                    (None, None) => (sigma, Shape::upright(high / sigma)),
+                    (_, rotation) => Shape::of(DVec3::new(sigma, high, deep), turn(rotation)?),
+                };
+                (first, shape, [sigma, high, deep].map(libm::log), 1.0)
             }
             Size::Scales(of, rotation) => {
                 let [a, b, c] = of.map(|i| {
@@ -204,28 +185,13 @@ impl OfRow<Particle> for Columns {
                     checked(i, sigma, wrong.then(expected))
                 });
                 let scales = DVec3::new(a?, b?, c?);
-                let rotation = match rotation {
-                    None => DQuat::IDENTITY,
-                    Some(of) => {
-                        let [w, x, y, z] = of.map(finite);
-                        let of_length = DQuat::from_xyzw(x?, y?, z?, w?);
-                        let found = of_length.length();
-                        let wrong = !(found.is_finite() && found > 1e-30);
-                        checked(
-                            of[0],
-                            0.0,
-                            wrong.then(|| "a rotation other than zero".to_owned()),
-                        )?;
-                        of_length / found
-                    }
-                };
-                let (sigma, aspect) = self.upright(scales, rotation);
-                let own = sigma * sigma * sigma * aspect;
+                let (sigma, shape) = Shape::of(scales, turn(rotation)?);
+                let own = sigma * sigma * sigma * shape.volume();
                 let share = if own > 0.0 { scales.element_product() / own } else { 1.0 };
-                (sigma, aspect, of.map(&value), share)
+                (sigma, shape, of.map(&value), share)
             }
         };
-        let own = sigma * sigma * sigma * aspect;
+        let own = sigma * sigma * sigma * shape.volume();
         let kappa = match self.density {
             Density::Kappa(i) => share * size(i, value(i), 0.0)?,
             Density::Opacity(i) => {
@@ -251,13 +217,8 @@ impl OfRow<Particle> for Columns {
                 DVec3::new(r?, g?, b?)
             }
         };
-        Ok(Particle { position, sigma, shape: Shape::upright(aspect), kappa, color })
+        Ok(Particle { position, sigma, shape, kappa, color })
     }
-}
-
-/// Returns the aspect of an ellipsoid, within what is drawn.
-fn aspect_of(high: f64, wide: f64) -> f64 {
-    if wide > 0.0 { (high / wide).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT) } else { 1.0 }
 }
 
 /// Returns the logarithm of the mean over all directions of an ellipsoid's projected area, over π,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2};
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::*;
 use crate::io::mapped_file::MappedFile;
@@ -114,7 +114,7 @@ fn a_splat_has_its_opacity_through_the_middle() {
 }
 
 #[test]
-fn ellipsoids_keep_mass_height_and_mean_width() {
+fn ellipsoids_have_their_axes() {
     let names = "x y z scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3 kappa";
     let ln3 = 3f64.ln();
     // Turned about x by a right angle, z becomes the height.
@@ -129,12 +129,11 @@ fn ellipsoids_keep_mass_height_and_mean_width() {
     let (cos, sin) = (std::f64::consts::FRAC_PI_8.cos(), std::f64::consts::FRAC_PI_8.sin());
     let askew = one(names, &format!("0 0 0 0 0 {ln3} {cos} {sin} 0 0 2"));
     let p = askew.particles[0];
-    assert!(
-        is_near(p.sigma, 3f64.sqrt()) && is_near(p.sigma * p.shape.aspect, 5f64.sqrt()),
-        "{p:?}"
-    );
-    assert!(is_near(p.kappa * 3.0 * 5f64.sqrt(), 2.0 * 3.0), "mass: {p:?}");
-    assert!(askew.notes[0].starts_with("1 of 1 ellipsoids lie askew"), "{:?}", askew.notes);
+    let found = p.sigma * p.sigma * p.shape.covariance();
+    let expected = DMat3::from_cols_array(&[1.0, 0.0, 0.0, 0.0, 5.0, -4.0, 0.0, -4.0, 5.0]);
+    assert!(found.abs_diff_eq(expected, 9.0 * 1e-5), "{found}");
+    assert!(is_near(p.sigma, 3.0) && is_near(p.kappa, 2.0), "{p:?}");
+    assert_eq!(askew.notes, [""; 0]);
     // A splat of any shape: its opacity times its area, in the mean over directions.
     let flat = one("x y z scale_0 scale_1 scale_2 opacity", &format!("0 0 0 {ln3} 0 {ln3} 0"));
     let p = flat.particles[0];

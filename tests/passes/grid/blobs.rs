@@ -1,9 +1,9 @@
 //! Blobs of all sizes that are deposited on a grid.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 use nimbus::model::boxes::{BoxLaw, Form};
-use nimbus::model::cloud::Shape;
+use nimbus::model::cloud::{Shape, Turn};
 use nimbus::reference::Blob;
 use nimbus::reference::generate::{generate_box, uniforms};
 
@@ -47,6 +47,27 @@ pub fn wide_ellipsoids(n: u32) -> Vec<Blob> {
         ..b
     };
     wide(n).into_iter().zip(0..).map(shaped).collect()
+}
+
+/// Ellipsoids of any axes, a twentieth to once as long as the longest.
+pub fn turned(n: u32) -> Vec<Blob> {
+    scattered(n)
+        .into_iter()
+        .zip(0..)
+        .map(|(b, i)| Blob { shape: turned_shape(i, 0.05), ..b })
+        .collect()
+}
+
+/// The same of one to seven cells of 64, half to once as long as the longest.
+pub fn wide_turned(n: u32) -> Vec<Blob> {
+    wide(n).into_iter().zip(0..).map(|(b, i)| Blob { shape: turned_shape(i, 0.5), ..b }).collect()
+}
+
+fn turned_shape(i: u32, least: f64) -> Shape {
+    let ([a, b, c, d], [e, f, ..]) = (uniforms(0x64127, 0, i, 0), uniforms(0x64127, 1, i, 0));
+    let turn = DQuat::from_xyzw(a - 0.5, b - 0.5, c - 0.5, d - 0.5).normalize();
+    let [aspect, aspect_z] = [e, f].map(|v| least.powf(v));
+    Shape { aspect, aspect_z, turn: Turn::new(turn) }
 }
 
 pub fn paper() -> Vec<Blob> {

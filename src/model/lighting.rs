@@ -131,6 +131,34 @@ const fn rung(
     Rung { mode, grid, bounces, bounce_cells, slice, errors }
 }
 
+/// Number of facets of a cloud.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FacetCount {
+    /// One for each particle, up to [`MOST_GATHERED`] or [`MOST_ALONE`].
+    Auto,
+    /// One for each particle.
+    Every,
+    /// At most so many, and at least one.
+    AtMost(u32),
+}
+
+/// The most facets of a cloud with [`FacetCount::Auto`] where each gathers light from all others.
+const MOST_GATHERED: u64 = 4096;
+/// The same where each is lit by itself.
+const MOST_ALONE: u64 = 1 << 18;
+
+impl FacetCount {
+    /// Returns the number of facets of a cloud of `n` particles.
+    pub fn of(self, n: u64, mode: LightingMode) -> u64 {
+        n.min(match self {
+            FacetCount::Every => n,
+            FacetCount::AtMost(most) => u64::from(most.max(1)),
+            FacetCount::Auto if mode == LightingMode::TwoReflection => MOST_GATHERED,
+            FacetCount::Auto => MOST_ALONE,
+        })
+    }
+}
+
 /// Lighting settings of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lighting {
@@ -152,8 +180,8 @@ pub struct Lighting {
     pub gather: Gather,
     /// θ: radius over distance above which clusters are opened.
     pub theta: f64,
-    /// Greatest number of facets of a cloud; `None` makes one facet a particle.
-    pub facets_per_cloud: Option<u32>,
+    /// Number of facets of each cloud.
+    pub facets_per_cloud: FacetCount,
     /// Accuracy of pairs of facets.
     pub pairs: Pairs,
     /// Formation of long sums.
@@ -217,6 +245,18 @@ pub struct Pairs {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_cloud_has_more_facets_than_particles_or_than_its_mode_lights() {
+        let [first, second] = [LightingMode::First, LightingMode::TwoReflection];
+        for n in [0, 1, 4096, 4097, 1 << 18, (1 << 18) + 1, 10_000_000] {
+            assert_eq!(FacetCount::Every.of(n, second), n);
+            assert_eq!(FacetCount::AtMost(0).of(n, first), n.min(1));
+            assert_eq!(FacetCount::AtMost(300).of(n, second), n.min(300));
+            assert_eq!(FacetCount::Auto.of(n, second), n.min(4096));
+            assert_eq!(FacetCount::Auto.of(n, first), n.min(262_144));
+        }
+    }
 
     #[test]
     fn in_slices_each_rung_is_nearer_to_transport_than_the_one_before() {

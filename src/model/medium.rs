@@ -229,7 +229,7 @@ mod tests {
         exponents: [1.0; 2],
         gather: crate::model::scene::Gather::Exact,
         theta: 0.4,
-        facets_per_cloud: None,
+        facets_per_cloud: crate::model::scene::FacetCount::Every,
         pairs: crate::model::scene::Pairs { size: 0.5, levels: 1, steps: 1 },
         sums: crate::model::sums::Sums {
             summation: crate::model::sums::Summation::Plain,

@@ -13,8 +13,8 @@ use super::film::Film;
 use super::grid::GridSpec;
 use super::light::Light;
 pub use super::lighting::{
-    DiffusionSettings, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCE_CELLS, MAX_BOUNCES,
-    MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs, RUNGS, Rung,
+    DiffusionSettings, FacetCount, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCE_CELLS,
+    MAX_BOUNCES, MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs, RUNGS, Rung,
 };
 use super::material::Material;
 use super::named::named;
@@ -257,8 +257,7 @@ impl Scene {
 
     /// Returns the number of facets of one cloud.
     pub fn n_cloud_facets(&self, cloud: &Cloud) -> u64 {
-        let n = cloud.n_particles();
-        self.lighting.facets_per_cloud.map_or(n, |most| n.min(u64::from(most.max(1))))
+        self.lighting.facets_per_cloud.of(cloud.n_particles(), self.lighting.mode)
     }
 
     /// Returns whether some facet stands for several particles.

@@ -8,7 +8,7 @@ use crate::model::basis::Sampling;
 use crate::model::cloud::CloudSource;
 use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::scene::{
-    Gather, LightBudget, Lighting, Pairs, Scene, Simulate, Threading, Threads,
+    FacetCount, Gather, LightBudget, Lighting, Pairs, Scene, Simulate, Threading, Threads,
 };
 use crate::model::sums::Sums;
 use crate::reference::picture::{Pixels, ReferenceKind, TransportParts};
@@ -75,7 +75,7 @@ fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
         ReferenceKind::Model | ReferenceKind::Reflections(_) | ReferenceKind::Transport
     );
     let (grid, step, facets_per_cloud) =
-        if by_model { (1, 1.0, None) } else { (grid, step, facets_per_cloud) };
+        if by_model { (1, 1.0, FacetCount::Every) } else { (grid, step, facets_per_cloud) };
     let lighting = Lighting {
         mode,
         grid,

@@ -6,7 +6,7 @@ use nimbus::io::scene_file::LoadedScene;
 use nimbus::model::basis::Sampling;
 use nimbus::model::light::{Light, MIN_PENUMBRA};
 use nimbus::model::material::Brdf;
-use nimbus::model::scene::{Gather, LightingMode, Pairs};
+use nimbus::model::scene::{FacetCount, Gather, LightingMode, Pairs};
 use nimbus::model::sums::{Precision, Summation, Sums};
 use serde_json::json;
 
@@ -139,7 +139,7 @@ fn the_second_reflection_has_its_keys() {
         (l.mode, l.bases, l.sampling, l.gather),
         (LightingMode::TwoReflection, 8, Sampling::Log, Gather::Auto)
     );
-    assert_eq!((l.theta, l.facets_per_cloud), (0.4, None));
+    assert_eq!((l.theta, l.facets_per_cloud), (0.4, FacetCount::Auto));
     assert_eq!(l.pairs, Pairs { size: 0.5, levels: 6, steps: 16 });
     for (name, mode) in LightingMode::NAMES {
         assert_eq!(lighting(&format!("[lighting]\nmode = '{name}'")).mode, mode);
@@ -161,12 +161,26 @@ fn the_second_reflection_has_its_keys() {
         );
     }
     let loaded = good(&format!("[lighting]\nfacets_per_cloud = 2\nsampling = 'uniform'\n{CLOUD}"));
-    assert_eq!((loaded.scene.lighting.facets_per_cloud, loaded.scene.n_facets()), (Some(2), 2));
+    assert_eq!(
+        (loaded.scene.lighting.facets_per_cloud, loaded.scene.n_facets()),
+        (FacetCount::AtMost(2), 2)
+    );
     assert_eq!(
         (loaded.scene.n_particles(), loaded.scene.lighting.sampling),
         (3, Sampling::Uniform)
     );
     assert_reads_back(&loaded);
+    let of_many =
+        |lines: &str| good(&format!("[draw]\nparticles = 5000\n[lighting]\n{lines}\n{CLOUD}"));
+    let many = of_many("");
+    assert_eq!((many.scene.n_facets(), many.warnings.len()), (4096, 1));
+    assert!(many.warnings[0].starts_with("cloud 0: 4096 facets stand for 5000 particles; "));
+    for (lines, n) in
+        [("facets_per_cloud = 0", 5000), ("facets_per_cloud = 8", 8), ("mode = 'first'", 5000)]
+    {
+        let found = of_many(lines);
+        assert_eq!((found.scene.n_facets(), found.warnings.len()), (n, 0), "{lines}");
+    }
     // No more than there are particles.
     assert_eq!(good(&format!("[lighting]\nfacets_per_cloud = 4\n{CLOUD}")).scene.n_facets(), 3);
 }

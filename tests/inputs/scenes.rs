@@ -240,7 +240,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             "lighting": {
                 "mode": "two-reflection", "grid": 64, "step": 1.0, "forward": 0.85, "bases": 8,
                 "sampling": "log",
-                "exponents": [1.0, 256.0], "gather": "auto", "theta": 0.4, "facets_per_cloud": 0,
+                "exponents": [1.0, 256.0], "gather": "auto", "theta": 0.4, "facets_per_cloud": "auto",
                 "pair_size": 0.5, "pair_levels": 6, "pair_steps": 16, "summation": "plain",
                 "precision": "f32",
                 "sun_radius_deg": 0.27,

@@ -1,20 +1,28 @@
 //! Table `[lighting]`.
 
 use super::key::{Keys, keys, read_table};
-use super::spec::{Spec, choice, flag, integer, number, pair};
+use super::spec::{Spec, choice, flag, integer, number, one_of, pair};
 use crate::error::Result;
 use crate::io::bounds::{Bounds, GREATEST_EXPONENT, SHARE};
 use crate::io::document::section::Section;
 use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, min_step};
 use crate::model::scene::{
-    DiffusionSettings, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCE_CELLS, MAX_BOUNCES,
-    MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs,
+    DiffusionSettings, FacetCount, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCE_CELLS,
+    MAX_BOUNCES, MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs,
 };
 use crate::model::sums::{Precision, Summation, Sums};
 
 /// Cutoff cells of the density grid: with fewer the margins leave next to no grid.
 const MIN_CELLS: u32 = 8;
+
+fn facet_count() -> Spec<FacetCount> {
+    let numbers = integer(0, 0, u32::MAX).map(|n| match n {
+        0 => FacetCount::Every,
+        n => FacetCount::AtMost(n),
+    });
+    one_of("auto", [("auto".into(), FacetCount::Auto)], Some(numbers))
+}
 
 keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
     /// How light is computed. "none": particles have their colours as given. "first": the first
@@ -43,8 +51,9 @@ keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
     gather: choice("auto", &Gather::NAMES);
     /// Share of its distance above which the radius of a cluster opens it.
     theta: number(0.4, Bounds::Within(0.0, 2.0));
-    /// Facets of each cloud; 0: one for each particle.
-    facets_per_cloud: integer(0, 0, u32::MAX).map(|n| Some(n).filter(|n| *n > 0));
+    /// Most facets of each cloud; 0: one for each particle. With "auto" a cloud has at most 4,096
+    /// with mode "two-reflection", and 262,144 with the others.
+    facets_per_cloud: facet_count();
     pairs => pairs(s)?;
     sums => sums(s)?;
     /// Angular radius of directional lights, for the reference "transport". The default is the

@@ -36,7 +36,7 @@ use spec::text;
 use super::document::section::Section;
 use super::document::tree::{Document, KeyNames, without_numbers};
 use crate::error::{Error, Result};
-use crate::model::scene::Scene;
+use crate::model::scene::{FacetCount, Lighting, LightingMode, Scene};
 
 /// A table of a scene file and its keys.
 pub struct Table {
@@ -255,5 +255,22 @@ pub(super) fn read_scene(
         );
         return Err(Error::scene(root.place("cloud"), what));
     }
+    warnings.extend(grouped(&scene));
     Ok(Read { scene, resolved: root.finish(), digests, warnings })
+}
+
+/// Says for which clouds the default makes fewer facets than particles.
+fn grouped(scene: &Scene) -> impl Iterator<Item = String> {
+    let Lighting { facets_per_cloud, mode, .. } = scene.lighting;
+    let is_default = facets_per_cloud == FacetCount::Auto && mode != LightingMode::None;
+    let clouds = scene.clouds.iter().enumerate().filter(move |_| is_default);
+    clouds.filter_map(|(i, cloud)| {
+        let (n, n_facets) = (cloud.n_particles(), scene.n_cloud_facets(cloud));
+        (n_facets < n).then(|| {
+            format!(
+                "cloud {i}: {n_facets} facets stand for {n} particles; \
+                 lighting.facets_per_cloud = 0 makes one for each"
+            )
+        })
+    })
 }

@@ -28,7 +28,11 @@ const KNOBS: &[Knob] = &[
     Knob { key: "film.format", values: &["rgba8", "rgba16f", "rgba32f"], applies: |_| true },
     Knob { key: "lighting.grid", values: &["16", "32", "64", "128"], applies: marches },
     Knob { key: "lighting.step", values: &["0.5", "1.0", "2.0", "4.0"], applies: marches },
-    Knob { key: "lighting.facets_per_cloud", values: &["32", "128", "512", "0"], applies: marches },
+    Knob {
+        key: "lighting.facets_per_cloud",
+        values: &["32", "128", "512", "auto"],
+        applies: marches,
+    },
     Knob {
         key: "lighting.mode",
         values: &["first", "two-reflection"],

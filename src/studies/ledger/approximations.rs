@@ -6,7 +6,7 @@ use crate::model::cutoff::Cutoff;
 use crate::model::edge::{EDGE, FARTHEST, Reach};
 use crate::model::film::FilmFormat;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Chunks, DrawPath, Gather, LightingMode, Scene};
+use crate::model::scene::{Chunks, DrawPath, FacetCount, Gather, LightingMode, Scene};
 use crate::model::sort_bits::SortBits;
 
 /// An approximation of the scene, and the scene without it.
@@ -148,7 +148,7 @@ fn ungrouped(scene: &Scene) -> Option<Approximation> {
     let lit = scene.lighting.mode != LightingMode::None;
     (lit && scene.groups_facets()).then(|| {
         let mut without = scene.clone();
-        without.lighting.facets_per_cloud = None;
+        without.lighting.facets_per_cloud = FacetCount::Every;
         // The choice between tree and pairs stays the same.
         if without.lighting.gather == Gather::Auto {
             without.lighting.gather =

@@ -33,11 +33,12 @@ struct Sums {
 
 float mass_of(uint i) {
     float sigma = placed[i].sigma;
-    float ball = particles[i].kappa * sigma * sigma * sigma;
 #if ELLIPSOIDS == 2
-    return ball * particles[i].aspect * particles[i].aspect_z;
+    // sigma cubed alone may overflow.
+    return particles[i].kappa * sigma * (sigma * particles[i].aspect)
+           * (sigma * particles[i].aspect_z);
 #else
-    return ball * particles[i].aspect;
+    return particles[i].kappa * sigma * sigma * sigma * particles[i].aspect;
 #endif
 }
 

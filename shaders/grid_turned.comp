@@ -64,8 +64,9 @@ void main() {
         Placed blob = placed[p];
         vec3 lengths = vec3(1.0, particles[p].aspect, particles[p].aspect_z);
         uvec2 turn = particles[p].turn;
-        float mass = particles[p].kappa * MASS_FACTOR * blob.sigma * blob.sigma * blob.sigma
-                     * lengths.y * lengths.z;
+        // sigma cubed alone may overflow.
+        vec3 sigmas = blob.sigma * lengths;
+        float mass = particles[p].kappa * MASS_FACTOR * sigmas.x * sigmas.y * sigmas.z;
         if ((lengths.z == 1.0 && turn == uvec2(0)) || !(mass > 0.0)) {
             continue;
         }

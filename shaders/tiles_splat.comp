@@ -142,7 +142,8 @@ uint project(uint i, uint r) {
     if (ELLIPSOIDS == 2) {
         Lean lean = lean_of(shape, s);
         conics[2 * r].w = lean.white;
-        conics[2 * r + 1] = vec4(lean.lean, 0.0, 0.0);
+        bool is_ball = shape.square == 1.0 && shape.square_z == 1.0;
+        conics[2 * r + 1] = vec4(lean.lean, is_ball ? 1.0 : 0.0, 0.0);
     }
     uvec2 tile = uvec2(push.tile_width, push.tile_height);
     if (TEXTURED != 0) {

@@ -9,8 +9,9 @@ const float SQRT_TAU = 2.50662827463;
 // Silhouettes are drawn this much larger, so that rounding never cuts a pixel that the pixel's own
 // test would keep.
 const float GROWTH = 1.0 + 1e-4;
-// A flat ellipsoid seen edge on is the difference of numbers that are a million times as large as
-// its own square. Of six products and sums none is off by more than 2^-24 of them.
+// The square of a flat ellipsoid's width, seen edge on, is a difference of terms up to a million
+// times as large. It is off by at most this share of their sum: six products and sums, each rounded
+// by 2^-24.
 const float FLAT = 1e-6;
 
 // Returns the slopes of the two tangents from the eye to a circle of radius r at (a, z). Where the

@@ -207,7 +207,7 @@ void compose(Loaded splat, float y) {
     float distance = splat.distance, in_sigmas = splat.near_in_sigmas;
 #if ELLIPSOIDS == 2
     vec4 conic = uintBitsToFloat(splat.fours[N_FOURS - 2]);
-    vec2 lean = uintBitsToFloat(splat.fours[N_FOURS - 1].xy);
+    vec3 lean = uintBitsToFloat(splat.fours[N_FOURS - 1].xyz);
 #elif ELLIPSOIDS
     vec3 vertical = vec3(push.y_right, push.y_up, push.y_forward);
     float inverse = uintBitsToFloat(splat.fours[N_FOURS - 1]).w;
@@ -219,13 +219,16 @@ void compose(Loaded splat, float y) {
 #endif
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
 #if ELLIPSOIDS == 2
-        float dx = x_of[j] - s.x, dy = y - s.y, norm = 1.0 / inv_norm[j];
-        float along = 1.0 + lean.x * dx + lean.y * dy;
-        float form = (conic.x * dx + conic.y * dy) * dx + conic.z * dy * dy;
-        float scale = uintBitsToFloat(splat.fours[0].z);
-        float white = conic.w * along * along + form / (scale * conic.w);
-        distance = inv_depth * sqrt(norm) * conic.w * along / white;
-        in_sigmas = splat.near_in_sigmas * sqrt(white / norm);
+        // A ball lies as along the ray through its centre.
+        if (lean.z == 0.0) {
+            float dx = x_of[j] - s.x, dy = y - s.y, norm = 1.0 / inv_norm[j];
+            float along = 1.0 + lean.x * dx + lean.y * dy;
+            float form = (conic.x * dx + conic.y * dy) * dx + conic.z * dy * dy;
+            float scale = uintBitsToFloat(splat.fours[0].z);
+            float white = conic.w * along * along + form / (scale * conic.w);
+            distance = inv_depth * sqrt(norm) * conic.w * along / white;
+            in_sigmas = splat.near_in_sigmas * sqrt(white / norm);
+        }
 #elif ELLIPSOIDS
         // A ball lies as along the ray through its centre.
         if (inverse != 1.0) {

@@ -206,7 +206,7 @@ impl Game {
     /// Returns a bound of every blob's mass; moving particles are looked at one by one.
     fn heaviest(&self, groups: &[Group], live: Option<&Vec<ParticleRecord>>) -> f64 {
         let mass_of =
-            |p: &ParticleRecord| mass(f64::from(p.kappa), f64::from(p.sigma)) * f64::from(p.aspect);
+            |p: &ParticleRecord| mass(f64::from(p.kappa), f64::from(p.sigma)) * p.shape().volume();
         let moved = live
             .filter(|_| self.scene.is_animated())
             .map_or(0.0, |all| all.iter().map(mass_of).fold(0.0, f64::max));
@@ -230,7 +230,7 @@ impl Game {
         origins: &[DVec3],
         live: Option<&[ParticleRecord]>,
     ) -> Vec<Extent> {
-        let tau_of = |p: &ParticleRecord| f64::from(p.kappa * p.sigma * p.aspect.max(1.0));
+        let tau_of = |p: &ParticleRecord| f64::from(p.kappa * p.sigma) * p.shape().widest();
         let moved = live
             .filter(|_| self.scene.is_animated())
             .map(|all| SQRT_TAU * all.iter().map(tau_of).fold(0.0, f64::max));

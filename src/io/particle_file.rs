@@ -8,7 +8,7 @@ use std::path::Path;
 use csv::{ReaderBuilder, StringRecord};
 use glam::{DQuat, DVec3};
 
-use super::bounds::{LEAST, rounded, wrong_coordinate, wrong_size};
+use super::bounds::{LEAST, of_any_length, rounded, wrong_coordinate, wrong_size};
 use super::document::suggest::{did_you_mean, list, shown};
 use super::text_file::line_column;
 use crate::error::{Error, Place, Result};
@@ -211,23 +211,24 @@ impl Columns {
             // A blob without a size has no shape.
             0.0 => (sigma, Shape::BALL),
             _ => {
-                let other = |column: usize| number(column, &|v| wrong_height(v, sigma));
-                let (high, deep) = (other(SIGMA_Y)?.unwrap_or(sigma), other(SIGMA_Z)?);
+                let other = |column: usize, than: f64| {
+                    number(column, &|v| wrong_height(v, than).or_else(|| wrong_size(v, LEAST)))
+                };
+                let high = other(SIGMA_Y, sigma)?.unwrap_or(sigma);
+                other(SIGMA_Z, sigma)?;
+                let deep = other(SIGMA_Z, high)?;
                 let [w, x, y, z] = [0, 1, 2, 3].map(|k| number(TURN.start + k, &|_| None));
                 match (deep, w?) {
-                    // No number is rounded.
                     (None, None) => (sigma, Shape::upright(high / sigma)),
                     (deep, w) => {
                         let part = |v: Result<Option<f64>>| Ok(v?.unwrap_or(0.0));
                         let of = DQuat::from_xyzw(part(x)?, part(y)?, part(z)?, w.unwrap_or(1.0));
-                        let length = of.length();
-                        if !(length.is_finite() && length > 1e-30) {
-                            let i = self.0[TURN.start].unwrap_or(0);
-                            let what = "expected a rotation other than zero";
-                            return Err(Error::scene(file.place(row, i), what));
-                        }
-                        let scales = DVec3::new(sigma, high, deep.unwrap_or(sigma));
-                        Shape::of(scales, of / length)
+                        let zero = || {
+                            let place = file.place(row, self.0[TURN.start].unwrap_or(0));
+                            Error::scene(place, "expected a rotation other than zero, found zeros")
+                        };
+                        let turn = of_any_length(of).ok_or_else(zero)?;
+                        Shape::of(DVec3::new(sigma, high, deep.unwrap_or(sigma)), turn)
                     }
                 }
             }

@@ -28,7 +28,7 @@ pub struct Group {
     pub sigma_max: f64,
     /// Bound on σ along y.
     pub sigma_y_max: f64,
-    /// Mean σ along x and z.
+    /// Mean σ along x and z; of turned ellipsoids along their longest axes.
     pub sigma_mean: f64,
     /// The same, weighted by the areas that particles cover: Σσ³/Σσ². Of discs and animated
     /// particles it is the plain mean.
@@ -40,7 +40,7 @@ pub struct Group {
     pub turned_max: f64,
     /// Greatest peak extinction.
     pub kappa_max: f64,
-    /// Greatest mass κ (2π)^{3/2} σ² σ_y of a blob.
+    /// Greatest mass κ (2π)^{3/2} σ³ of a blob times its shape's volume.
     pub mass_max: f64,
     /// Greatest displacement by the cloud's gusts.
     pub gust_reach: f64,

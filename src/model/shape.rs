@@ -121,13 +121,14 @@ impl Shape {
     /// rotation `turned`.
     ///
     /// The returned σ is the greatest of the three. An upright ellipsoid has the σ along x and z
-    /// instead. An aspect below [`MIN_ASPECT`] is raised to that value.
+    /// instead. An axis shorter than [`MIN_ASPECT`] of the longest is raised to that.
     pub fn of(scales: DVec3, turned: DQuat) -> (f64, Shape) {
         let within =
             |v: f64| if v > 0.0 { v.clamp(MIN_ASPECT, 1.0 / MIN_ASPECT) } else { MIN_ASPECT };
         if scales.max_element() <= 0.0 {
             return (0.0, Shape::BALL);
         }
+        let scales = scales.max(DVec3::splat(MIN_ASPECT * scales.max_element()));
         let (wide, high) = match scales.x == scales.z {
             true if scales.x == scales.y || turned == DQuat::IDENTITY => (scales.x, scales.y),
             _ => upright_of(scales, turned).unwrap_or_default(),
@@ -182,8 +183,8 @@ impl Shape {
         axes * change(axes.transpose() * v, self.lengths())
     }
 
-    /// Returns the blob's point over σ that `v` of the unit ball becomes, its axes those of the
-    /// blob.
+    /// Takes a point of the unit ball, whose axes are those of the blob, to the blob. Lengths are
+    /// over σ.
     pub fn from_ball(&self, v: DVec3) -> DVec3 {
         self.axes() * (self.lengths() * v)
     }
@@ -249,10 +250,11 @@ fn upright_of(scales: DVec3, turned: DQuat) -> Option<(f64, f64)> {
         across += r * DVec3::new(r.y, r.z, r.x);
     }
     let wide = 0.5 * (own.x + own.z);
-    // Squares of what an upright one lacks, and of all.
-    let lost = 2.0 * (own.x - wide).powi(2) + 2.0 * across.length_squared();
-    let all = own.length_squared() + 2.0 * across.length_squared();
-    (lost <= 1e-12 * all).then(|| (wide.sqrt(), own.y.sqrt()))
+    // What an upright one lacks.
+    let most = [wide.max(own.y), wide.max(own.y), wide];
+    let is_upright = (own.x - wide).abs() <= 1e-6 * wide
+        && across.to_array().iter().zip(most).all(|(of, most)| of.abs() <= 1e-6 * most);
+    is_upright.then(|| (wide.sqrt(), own.y.sqrt()))
 }
 
 #[cfg(test)]

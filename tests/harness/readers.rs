@@ -130,7 +130,10 @@ pub fn ply(bytes: &[u8]) -> std::result::Result<(), String> {
     let again = ply::parse(&written, Path::new("p.ply")).expect("what was written");
     assert_eq!(again.particles.len(), found.particles.len());
     for (a, b) in again.particles.iter().zip(&found.particles) {
-        assert!((a.shape.aspect / b.shape.aspect - 1.0).abs() < 1e-12, "{a:?} {b:?}");
+        // The axes are stored within 5e-6 radians.
+        let (found, expected) = (a.shape.covariance(), b.shape.covariance());
+        assert!(found.abs_diff_eq(expected, 3e-5 * b.shape.widest().powi(2)), "{a:?} {b:?}");
+        assert!((a.shape.volume() / b.shape.volume() - 1.0).abs() < 1e-12, "{a:?} {b:?}");
         assert_eq!(
             (a.position, a.sigma, a.kappa, a.color),
             (b.position, b.sigma, b.kappa, b.color)

@@ -174,7 +174,9 @@ fn the_second_reflection_has_its_keys() {
         |lines: &str| good(&format!("[draw]\nparticles = 5000\n[lighting]\n{lines}\n{CLOUD}"));
     let many = of_many("");
     assert_eq!((many.scene.n_facets(), many.warnings.len()), (4096, 1));
-    assert!(many.warnings[0].starts_with("cloud 0: 4096 facets stand for 5000 particles; "));
+    assert!(
+        many.warnings[0].starts_with("cloud 0: 5000 particles share the light and colour of 4096")
+    );
     for (lines, n) in
         [("facets_per_cloud = 0", 5000), ("facets_per_cloud = 8", 8), ("mode = 'first'", 5000)]
     {

@@ -155,7 +155,7 @@ fn facets_of_ellipsoids_are_within_their_bounds() {
     }
     let runs = Runs::new(&scene, [100, 400]);
     for (from, to) in [
-        ("particles[i].aspect * particles[i].aspect_z;", "particles[i].aspect;"),
+        ("* (sigma * particles[i].aspect_z);", "* sigma;"),
         ("0.5 * dot(squares, 1.0 - upward * upward)", "0.5 * dot(squares, upward * upward)"),
     ] {
         let compiler = Gpu::wrong_compiler("facets_groups.comp", from, to);

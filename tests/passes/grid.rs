@@ -366,6 +366,21 @@ fn a_wrong_shader_is_noticed() {
 }
 
 #[test]
+fn a_wrong_deposit_of_turned_ones_is_noticed() {
+    let scene = Scene::fitted(&turned(300), 32).decided();
+    let mutations = [
+        ("grid_turned.comp", "by_a * slab.y / variance_b", "by_a * slab.y"),
+        ("grid_turned.comp", "of_a * lag + of_b", "of_b"),
+        ("grid_turned.comp", "rest_c + of_a * of_a * slab.y * (rest_b / variance_b)", "rest_c"),
+        ("grid_turned.comp", "/ (1.0 + width)", ""),
+        ("grid_turned.comp", "lengths.z == 1.0 && turn == uvec2(0)", "false"),
+        ("grid_deposit.comp", "is_turned ? 0.0 : mass", "0.0"),
+        ("grid_deposit.comp", "is_turned ? 0.0 : mass", "mass"),
+    ];
+    assert_noticed(&scene, &mutations);
+}
+
+#[test]
 fn a_wrong_grid_of_wide_cells_is_noticed() {
     let scene = Scene::fitted(&wide(1400), 64);
     assert!(scene.n_levels() > 2);

@@ -238,8 +238,11 @@ fn deposits(scene: &Scene, packet: &Packet) -> f64 {
         |sigma: f64, edge: f64| (2.0 * DEPOSIT_CUT_SIGMA * sigma / edge.max(least)).max(1.0);
     let groups = scene.groups();
     let of = |((group, record), extent): ((&Group, &GroupRecord), &Extent)| {
-        let across = reached(f64::from(record.sigma_mean), cell);
-        let along = reached(extent.sigma_mean, cell * f64::from(packet.grid.aspect));
+        // The mean σ of turned ellipsoids is that of their longest axes. All count as balls of the
+        // shortest.
+        let least = if group.turned_max > 0.0 { group.aspects[0].min(1.0) } else { 1.0 };
+        let across = reached(least * f64::from(record.sigma_mean), cell);
+        let along = reached(least * extent.sigma_mean, cell * f64::from(packet.grid.aspect));
         f64::from(group.n_particles) * across * across * along
     };
     groups.iter().zip(&packet.groups).zip(&packet.extents).map(of).sum()

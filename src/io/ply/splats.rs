@@ -5,7 +5,9 @@ use glam::{DQuat, DVec3};
 
 use super::header::{Element, Scalar};
 use super::rows::{Fault, Made, OfRow};
-use crate::io::bounds::{AMOUNT, DIVISOR, GREATEST, LEAST, wrong_coordinate, wrong_size};
+use crate::io::bounds::{
+    AMOUNT, DIVISOR, GREATEST, LEAST, of_any_length, wrong_coordinate, wrong_size,
+};
 use crate::io::document::suggest::list;
 use crate::io::particle_file::wrong_height;
 use crate::model::cloud::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, Shape};
@@ -150,25 +152,25 @@ impl OfRow<Particle> for Columns {
         let turn = |rotation: Option<[usize; 4]>| {
             let Some(of) = rotation else { return Ok(DQuat::IDENTITY) };
             let [w, x, y, z] = of.map(finite);
-            let of_length = DQuat::from_xyzw(x?, y?, z?, w?);
-            let found = of_length.length();
-            let wrong = !(found.is_finite() && found > 1e-30);
-            checked(of[0], 0.0, wrong.then(|| "a rotation other than zero".to_owned()))?;
-            Ok(of_length / found)
+            let turn = of_any_length(DQuat::from_xyzw(x?, y?, z?, w?));
+            let expected = "a rotation other than zero".to_owned();
+            checked(of[0], 0.0, turn.is_none().then_some(expected))?;
+            Ok(turn.unwrap_or_default())
         };
         // Where an aspect is limited, κ is `share` of the given one, so that the mass stays.
         let (sigma, shape, logs, share) = match self.size {
             Size::Sigma { wide, factor, others, rotation } => {
                 let sigma = size(wide, factor * value(wide), LEAST)?;
-                let other = |j: Option<usize>| match j {
+                let other = |j: Option<usize>, than: [f64; 2]| match j {
                     Some(j) if sigma > 0.0 => {
                         let of = finite(j)?;
-                        checked(j, of, wrong_height(of, sigma))
+                        let wrong = than.into_iter().find_map(|than| wrong_height(of, than));
+                        checked(j, of, wrong.or_else(|| wrong_size(of, LEAST)))
                     }
                     _ => Ok(sigma),
                 };
-                let [high, deep] = others.map(other);
-                let (high, deep) = (high?, deep?);
+                let high = other(others[0], [sigma, sigma])?;
+                let deep = other(others[1], [sigma, high])?;
                 // Without a third axis and a rotation no number is rounded.
                 let (first, shape) = match (others[1], rotation) {
                     _ if sigma == 0.0 => (sigma, Shape::BALL),

@@ -268,8 +268,8 @@ fn grouped(scene: &Scene) -> impl Iterator<Item = String> {
         let (n, n_facets) = (cloud.n_particles(), scene.n_cloud_facets(cloud));
         (n_facets < n).then(|| {
             format!(
-                "cloud {i}: {n_facets} facets stand for {n} particles; \
-                 lighting.facets_per_cloud = 0 makes one for each"
+                "cloud {i}: {n} particles share the light and colour of {n_facets} facets; \
+                 lighting.facets_per_cloud = 0 makes one facet for each"
             )
         })
     })

@@ -31,7 +31,12 @@ const KNOBS: &[Knob] = &[
     Knob {
         key: "lighting.facets_per_cloud",
         values: &["32", "128", "512", "auto"],
-        applies: marches,
+        applies: |s| marches(s) && !s.groups_facets(),
+    },
+    Knob {
+        key: "lighting.facets_per_cloud",
+        values: &["32", "128", "512", "2048", "0"],
+        applies: |s| marches(s) && s.groups_facets(),
     },
     Knob {
         key: "lighting.mode",

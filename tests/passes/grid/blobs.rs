@@ -49,7 +49,7 @@ pub fn wide_ellipsoids(n: u32) -> Vec<Blob> {
     wide(n).into_iter().zip(0..).map(shaped).collect()
 }
 
-/// Ellipsoids of any axes, a twentieth to once as long as the longest.
+/// Ellipsoids of any axes, a twentieth to once as long as the longest. Every fifth blob is a ball.
 pub fn turned(n: u32) -> Vec<Blob> {
     scattered(n)
         .into_iter()
@@ -64,6 +64,9 @@ pub fn wide_turned(n: u32) -> Vec<Blob> {
 }
 
 fn turned_shape(i: u32, least: f64) -> Shape {
+    if i % 5 == 4 {
+        return Shape::BALL;
+    }
     let ([a, b, c, d], [e, f, ..]) = (uniforms(0x64127, 0, i, 0), uniforms(0x64127, 1, i, 0));
     let turn = DQuat::from_xyzw(a - 0.5, b - 0.5, c - 0.5, d - 0.5).normalize();
     let [aspect, aspect_z] = [e, f].map(|v| least.powf(v));

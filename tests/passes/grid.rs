@@ -374,7 +374,7 @@ fn a_wrong_deposit_of_turned_ones_is_noticed() {
         ("grid_turned.comp", "rest_c + of_a * of_a * slab.y * (rest_b / variance_b)", "rest_c"),
         ("grid_turned.comp", "/ (1.0 + width)", ""),
         ("grid_turned.comp", "lengths.z == 1.0 && turn == uvec2(0)", "false"),
-        ("grid_deposit.comp", "is_turned ? 0.0 : mass", "0.0"),
+        ("grid_deposit.comp", "is_turned ? 0.0 : mass", "is_turned ? 0.0 : 0.9 * mass"),
         ("grid_deposit.comp", "is_turned ? 0.0 : mass", "mass"),
     ];
     assert_noticed(&scene, &mutations);

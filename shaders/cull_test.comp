@@ -55,8 +55,6 @@ bool is_kept(uint i) {
         shape = shape_of(
             push.camera, particles[i].aspect, particles[i].aspect_z, particles[i].turn
         );
-    }
-    if (ELLIPSOIDS != 0) {
         tau *= shape.wider;
     }
     float reach = push.cutoff;

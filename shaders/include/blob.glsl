@@ -85,8 +85,8 @@ float white_square(Shape shape, vec3 v) {
     return dot(across, across) + shape.inverse * up * up + rest;
 }
 
-// What changes from ray to ray through a turned ellipsoid: |M d|^2 = white ((1 + lean.delta)^2 +
-// E/(scale white^2)) with d = (s + delta, 1), and E of conic_of(). No terms cancel.
+// |M d|^2 of the rays d = (s + delta, 1) through a turned ellipsoid: it is white ((1 +
+// lean.delta)^2 + E/(scale white^2)), with E of conic_of(). No terms cancel.
 struct Lean {
     float white;
     vec2 lean;

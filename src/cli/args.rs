@@ -223,7 +223,8 @@ pub enum Command {
     ///
     /// --mitsuba writes the scene for Mitsuba 3 (scalar_rgb, volpath): the blobs as extinction on a
     /// grid, surfaces, ground, lights and camera. Lobes, spot lights and textures are refused:
-    /// Mitsuba has none as nimbus has them (docs/explanation/transport.md).
+    /// Mitsuba has none as nimbus has them (docs/explanation/transport.md). Ellipsoids whose axes
+    /// are turned are refused, too.
     Export(ExportArgs),
     /// Distribute frames, studies, sweeps or reference pictures over machines that share a folder
     ///

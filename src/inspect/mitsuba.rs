@@ -85,7 +85,10 @@ fn check(parts: &TransportParts) -> Result<()> {
         Err(Error::usage(format!("Mitsuba has no {what} as nimbus has; expected {expected}")))
     };
     if parts.blobs.iter().any(|blob| !blob.shape.is_upright()) {
-        return refused("ellipsoids whose axes are turned", "balls and upright ellipsoids");
+        return Err(Error::usage(
+            "ellipsoids whose axes are turned are not exported; expected balls and upright \
+             ellipsoids",
+        ));
     }
     if parts.lights.iter().any(spot::is_too_wide) {
         return refused("spot lights so wide", "outer_deg of at most 80");

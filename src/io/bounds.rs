@@ -8,7 +8,7 @@
 
 use std::fmt;
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 /// Upper limit of coordinates, lengths, times, κ, optical depths, irradiance and colours.
 pub const GREATEST: f64 = 1e15;
@@ -120,14 +120,6 @@ pub fn wrong_size(v: f64, least: f64) -> Option<String> {
 /// Returns whether the device can carry a place.
 pub fn is_carried_place(place: DVec3) -> bool {
     place.to_array().into_iter().all(|v| COORDINATE.contains(v))
-}
-
-/// Returns a quaternion of finite numbers as one of length 1; `None` of zeros.
-pub fn of_any_length(of: DQuat) -> Option<DQuat> {
-    let greatest = of.to_array().into_iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    // Squares of any numbers do not overflow then, nor vanish.
-    let scaled = of.to_array().map(|v| v / greatest);
-    (greatest > 0.0).then(|| DQuat::from_array(scaled).normalize())
 }
 
 #[cfg(test)]

@@ -8,11 +8,11 @@ use std::path::Path;
 use csv::{ReaderBuilder, StringRecord};
 use glam::{DQuat, DVec3};
 
-use super::bounds::{LEAST, of_any_length, rounded, wrong_coordinate, wrong_size};
+use super::bounds::{LEAST, rounded, wrong_coordinate, wrong_size};
 use super::document::suggest::{did_you_mean, list, shown};
 use super::text_file::line_column;
 use crate::error::{Error, Place, Result};
-use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, Shape};
+use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, Shape, unit_quaternion};
 
 const COLUMNS: [&str; 15] = [
     "x", "y", "z", "sigma", "radius", "sigma_y", "kappa", "r", "g", "b", "sigma_z", "qw", "qx",
@@ -211,12 +211,12 @@ impl Columns {
             // A blob without a size has no shape.
             0.0 => (sigma, Shape::BALL),
             _ => {
-                let other = |column: usize, than: f64| {
-                    number(column, &|v| wrong_height(v, than).or_else(|| wrong_size(v, LEAST)))
+                let other = |column: usize, than: [f64; 2]| {
+                    let wrong = |v| than.into_iter().find_map(|than| wrong_height(v, than));
+                    number(column, &|v| wrong(v).or_else(|| wrong_size(v, LEAST)))
                 };
-                let high = other(SIGMA_Y, sigma)?.unwrap_or(sigma);
-                other(SIGMA_Z, sigma)?;
-                let deep = other(SIGMA_Z, high)?;
+                let high = other(SIGMA_Y, [sigma; 2])?.unwrap_or(sigma);
+                let deep = other(SIGMA_Z, [sigma, high])?;
                 let [w, x, y, z] = [0, 1, 2, 3].map(|k| number(TURN.start + k, &|_| None));
                 match (deep, w?) {
                     (None, None) => (sigma, Shape::upright(high / sigma)),
@@ -227,7 +227,7 @@ impl Columns {
                             let place = file.place(row, self.0[TURN.start].unwrap_or(0));
                             Error::scene(place, "expected a rotation other than zero, found zeros")
                         };
-                        let turn = of_any_length(of).ok_or_else(zero)?;
+                        let turn = unit_quaternion(of).ok_or_else(zero)?;
                         Shape::of(DVec3::new(sigma, high, deep.unwrap_or(sigma)), turn)
                     }
                 }

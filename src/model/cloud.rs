@@ -11,7 +11,7 @@ use super::gust::Gust;
 use super::named::named;
 pub use super::particle::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
 pub use super::particle_list::ParticleList;
-pub use super::shape::{MIN_ASPECT, Shape, Shapes, Turn};
+pub use super::shape::{MIN_ASPECT, Shape, Shapes, Turn, unit_quaternion};
 use super::texture::Texture;
 
 /// A cloud of a scene.

@@ -134,7 +134,7 @@ const fn rung(
 /// Number of facets of a cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FacetCount {
-    /// One for each particle, up to [`MOST_GATHERED`] or [`MOST_ALONE`].
+    /// One for each particle, up to a number that the mode lights in seconds on two cores.
     Auto,
     /// One for each particle.
     Every,
@@ -142,9 +142,11 @@ pub enum FacetCount {
     AtMost(u32),
 }
 
-/// The most facets of a cloud with [`FacetCount::Auto`] where each gathers light from all others.
+/// The most facets of a cloud with [`FacetCount::Auto`] where each gathers light from all others: a
+/// gather of as many took 2.4 s on llvmpipe with two busy cores.
 const MOST_GATHERED: u64 = 4096;
-/// The same where each is lit by itself.
+/// The same where each is lit by itself. Scenes of weather have up to 100,000 particles, each with
+/// its facet.
 const MOST_ALONE: u64 = 1 << 18;
 
 impl FacetCount {

@@ -38,7 +38,7 @@ impl Turn {
         ])
     }
 
-    /// Returns the rotation of these words. All words are of one.
+    /// Returns the rotation that has these words: those of [`Turn::words`].
     pub const fn of_words(words: [u32; 2]) -> Turn {
         Turn(words)
     }
@@ -63,6 +63,14 @@ impl Turn {
         };
         DQuat::from_xyzw(x, y, z, w).normalize()
     }
+}
+
+/// Returns a quaternion of finite numbers as one of length 1; `None` of zeros.
+pub fn unit_quaternion(of: DQuat) -> Option<DQuat> {
+    let greatest = of.to_array().into_iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    // Squares of any numbers do not overflow then, nor vanish.
+    let scaled = of.to_array().map(|v| v / greatest);
+    (greatest > 0.0).then(|| DQuat::from_array(scaled).normalize())
 }
 
 /// The kinds of shapes among some blobs. Each includes those before it.
@@ -250,7 +258,7 @@ fn upright_of(scales: DVec3, turned: DQuat) -> Option<(f64, f64)> {
         across += r * DVec3::new(r.y, r.z, r.x);
     }
     let wide = 0.5 * (own.x + own.z);
-    // What an upright one lacks.
+    // Of an upright one these differences and products are zero.
     let most = [wide.max(own.y), wide.max(own.y), wide];
     let is_upright = (own.x - wide).abs() <= 1e-6 * wide
         && across.to_array().iter().zip(most).all(|(of, most)| of.abs() <= 1e-6 * most);
@@ -260,6 +268,16 @@ fn upright_of(scales: DVec3, turned: DQuat) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn quaternions_may_have_any_length() {
+        let unit = DQuat::from_xyzw(0.5, -0.5, 0.5, 0.5);
+        for length in [2.0, 1e-300, 1e300] {
+            let found = unit_quaternion(unit * length).unwrap();
+            assert!(found.abs_diff_eq(unit, 1e-15), "{length}: {found}");
+        }
+        assert_eq!(unit_quaternion(unit * 0.0), None);
+    }
 
     fn rotations() -> Vec<DQuat> {
         let mut all = vec![DQuat::IDENTITY];

@@ -2,11 +2,11 @@
 //!
 //! In: placed particles and their extinction. Out: density (extinction per length), cell (x, y, z)
 //! at x + n_x (y + n_y z). Law: mass-conserving deposit, separable unless an ellipsoid is turned.
-//! Source: model.md §8 and §14, passes.md. Error: at most 2.5e-6 of a weight, of which 3e-7 are
-//! from the formula of erf and the rest from rounding (1e-6 measured); of turned ellipsoids also
-//! that of their slabs' and rows' places; and half a quantum of the fixed-point sum a deposit.
-//! Where there are many blobs, wide ones are deposited on grids of wider cells, each of which is
-//! spread to the one of half its edges.
+//! Source: model.md §8 and §14, passes.md. Error: half a quantum of the fixed-point sum a deposit,
+//! and at most 2.5e-6 of a weight. Of these 3e-7 are from the formula of erf, and the rest from
+//! rounding (1e-6 measured). Weights of turned ellipsoids also have the error of the places of
+//! their slabs and rows. Where there are many blobs, wide ones are deposited on grids of wider
+//! cells, each of which is spread to the one of half its edges.
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};

@@ -21,6 +21,10 @@ use crate::harness::Gpu;
 use nimbus::model::cloud::{Shape, Turn};
 
 pub const U: f64 = U_F32;
+/// Error of an axis of a turned ellipsoid, as a vector. A component of its quaternion errs by 6 U:
+/// it is the root of what the other three leave. The second and the third axis err by 44 U, and the
+/// first is their cross product.
+pub const AXIS_ERROR: f64 = 160.0 * U;
 /// Mean σ of the groups' particles: some are smaller, some larger.
 pub const SIGMA_MEANS: [f32; 4] = [0.15, 0.17, 0.25, 0.29];
 /// Two clouds of two groups each, numbers 3 and 1.
@@ -344,10 +348,9 @@ pub struct Around {
 }
 
 impl Around {
-    /// Returns the error of a component of the axes: those of the quaternion's components, 4 U and
-    /// more for the root, of products and sums; and of the first axis, a cross product.
+    /// Returns the error of an axis.
     fn axes_error(&self) -> f64 {
-        if self.shape.is_upright() { 0.0 } else { 160.0 * U }
+        if self.shape.is_upright() { 0.0 } else { AXIS_ERROR }
     }
 
     pub fn shell_bound(&self, normal: f64, facet: &Facet) -> DVec3 {

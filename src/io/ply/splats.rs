@@ -5,12 +5,10 @@ use glam::{DQuat, DVec3};
 
 use super::header::{Element, Scalar};
 use super::rows::{Fault, Made, OfRow};
-use crate::io::bounds::{
-    AMOUNT, DIVISOR, GREATEST, LEAST, of_any_length, wrong_coordinate, wrong_size,
-};
+use crate::io::bounds::{AMOUNT, DIVISOR, GREATEST, LEAST, wrong_coordinate, wrong_size};
 use crate::io::document::suggest::list;
 use crate::io::particle_file::wrong_height;
-use crate::model::cloud::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, Shape};
+use crate::model::cloud::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, Shape, unit_quaternion};
 
 /// Greatest opacity of a splat, as in the rasterizer of Kerbl et al.: no splat hides all behind it.
 const MOST_OPACITY: f64 = 0.99;
@@ -152,7 +150,7 @@ impl OfRow<Particle> for Columns {
         let turn = |rotation: Option<[usize; 4]>| {
             let Some(of) = rotation else { return Ok(DQuat::IDENTITY) };
             let [w, x, y, z] = of.map(finite);
-            let turn = of_any_length(DQuat::from_xyzw(x?, y?, z?, w?));
+            let turn = unit_quaternion(DQuat::from_xyzw(x?, y?, z?, w?));
             let expected = "a rotation other than zero".to_owned();
             checked(of[0], 0.0, turn.is_none().then_some(expected))?;
             Ok(turn.unwrap_or_default())
@@ -169,7 +167,7 @@ impl OfRow<Particle> for Columns {
                     }
                     _ => Ok(sigma),
                 };
-                let high = other(others[0], [sigma, sigma])?;
+                let high = other(others[0], [sigma; 2])?;
                 let deep = other(others[1], [sigma, high])?;
                 // Without a third axis and a rotation no number is rounded.
                 let (first, shape) = match (others[1], rotation) {

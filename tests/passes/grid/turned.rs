@@ -9,11 +9,9 @@ use nimbus::reference::deposit::axis_weights;
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
 
 use super::{PHI_3, ROUNDINGS, SHARE, erf_error};
+use crate::shells::AXIS_ERROR;
 
 const U: f64 = U_F32;
-/// Error of an axis as a vector: a quaternion's component errs by 6 U (the root of what the other
-/// three leave), those of the second and the third axis by 44 U, and the first is their product.
-pub const AXIS_ERROR: f64 = 160.0 * U;
 
 /// A value and its error.
 #[derive(Clone, Copy)]

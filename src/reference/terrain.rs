@@ -152,19 +152,60 @@ fn shares(hit: &Hit) -> [f64; 3] {
     [1.0 - hit.s - hit.t, hit.s, hit.t]
 }
 
-/// Returns the depth along `ray` at which `terrain` is seen, and the share of each point's radiance
-/// in that of the place: all 0 from below.
-pub fn weights(terrain: &Terrain, view: &View, ray: DVec3) -> Option<(f64, [(usize, f64); 3])> {
-    let dark = [DVec3::ZERO; 3];
-    let hits = halves(terrain).filter_map(|numbers| {
-        let points = numbers.map(|k| terrain.origin + terrain.points[k]);
-        Some((numbers, Triangle::new(points, dark).hit(view, ray)?))
-    });
-    let nearest = hits.reduce(|near, next| if next.1.depth <= near.1.depth { next } else { near });
-    let (numbers, hit) = nearest?;
-    let shown = if hit.is_front { 1.0 } else { 0.0 };
-    let shares = shares(&hit).map(|share| shown * share);
-    Some((hit.depth, [0, 1, 2].map(|k| (numbers[k], shares[k]))))
+/// The rounding of a corner's place must not leave a pixel out; the hit decides.
+const MARGIN: f64 = 1e-6;
+
+/// The triangles of a ground by the rows of a picture that may show them.
+pub struct ByRow<'a> {
+    terrain: &'a Terrain,
+    view: &'a View,
+    /// Triangles of each row, in order of their cells.
+    rows: Vec<Vec<InRow>>,
+}
+
+/// A triangle in a row of pixels.
+#[derive(Debug, Clone, Copy)]
+struct InRow {
+    /// Points: corner, end of u and end of v.
+    numbers: [usize; 3],
+    /// First and end of the columns that may show it.
+    columns: (u32, u32),
+}
+
+impl<'a> ByRow<'a> {
+    /// Finds the triangles of the rows for which `is_drawn`.
+    pub fn new(terrain: &'a Terrain, view: &'a View, is_drawn: impl Fn(u32) -> bool) -> ByRow<'a> {
+        let drawn: Vec<bool> = (0..view.height).map(is_drawn).collect();
+        let mut rows = vec![vec![]; drawn.len()];
+        for numbers in halves(terrain) {
+            let [columns, (top, bottom)] = half(terrain, numbers).pixels(view, MARGIN);
+            for j in (top as usize..bottom as usize).filter(|j| drawn[*j]) {
+                rows[j].push(InRow { numbers, columns });
+            }
+        }
+        ByRow { terrain, view, rows }
+    }
+
+    /// Returns the depth at which the pixel in column `i` and row `j` sees the ground, and the
+    /// share of each point's radiance in that of the place: all 0 from below.
+    pub fn weights(&self, [i, j]: [u32; 2]) -> Option<(f64, [(usize, f64); 3])> {
+        let ray = self.view.ray(i, j);
+        let hits = self.rows[j as usize].iter().filter_map(|&InRow { numbers, columns }| {
+            let may_hit = (columns.0..columns.1).contains(&i);
+            let hit = || half(self.terrain, numbers).hit(self.view, ray);
+            Some((numbers, may_hit.then(hit)??))
+        });
+        let nearest = hits.reduce(|a, b| if b.1.depth <= a.1.depth { b } else { a });
+        let (numbers, hit) = nearest?;
+        let shown = if hit.is_front { 1.0 } else { 0.0 };
+        let shares = shares(&hit).map(|share| shown * share);
+        Some((hit.depth, [0, 1, 2].map(|k| (numbers[k], shares[k]))))
+    }
+}
+
+/// Returns the triangle of the points with `numbers`, without radiance.
+fn half(terrain: &Terrain, numbers: [usize; 3]) -> Triangle {
+    Triangle::new(numbers.map(|k| terrain.origin + terrain.points[k]), [DVec3::ZERO; 3])
 }
 
 /// Columns and rows (first, end) of a part of a picture.
@@ -179,8 +220,6 @@ pub fn render_over(
     radiance: &[DVec3],
 ) {
     let [(first_column, end_column), (first_row, end_row)] = window;
-    /// The rounding of a corner's place must not leave a pixel out; the hit decides.
-    const MARGIN: f64 = 1e-6;
     for half in Triangle::of(terrain, radiance) {
         let [(left, right), (top, bottom)] = half.pixels(view, MARGIN);
         for j in top.max(first_row)..bottom.min(end_row) {
@@ -286,6 +325,25 @@ mod tests {
         let mut over = vec![before(1.25); 9];
         render_over((&mut over, [(0, 3), (0, 3)]), &from_above(), &hill, &radiance);
         assert!(over[4].depth < 1.25 && over[5].color == [9.0; 4]);
+    }
+
+    /// Both ways find the same places in the same light.
+    #[test]
+    fn shares_of_points_are_those_of_the_picture() {
+        let heights = [0.0, 0.3, -0.2, 0.5, 1.0, 0.1, -0.4, 0.2, 0.6];
+        let shift = DVec2::new(0.05, 0.03);
+        let (hill, view) = (terrain(heights), View { shift, ..from_above() });
+        let radiance: Vec<DVec3> = (0..9).map(|k| DVec3::splat(1.0 + f64::from(k))).collect();
+        let by_row = ByRow::new(&hill, &view, |j| j != 2);
+        for (k, pixel) in picture(&view, &hill, &radiance).iter().enumerate() {
+            let found = by_row.weights([k as u32 % 3, k as u32 / 3]);
+            let Some((depth, weights)) = found else {
+                assert!(k >= 6, "{k}: only the last row is left out");
+                continue;
+            };
+            let light: f64 = weights.iter().map(|(k, share)| radiance[*k].x * share).sum();
+            assert!(k < 6 && depth == pixel.depth && (light - pixel.color[0]).abs() < 1e-14);
+        }
     }
 
     #[test]

@@ -4,12 +4,13 @@
 //! In: a seed; a particle. Out: n at every texel of every level; ln of the factor on τ.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use glam::DVec2;
 
 use crate::model::philox::{philox4x32_10, uniform};
 use crate::model::texture::N_FIELDS;
+use crate::reference::parallel::parallel_map;
 
 /// Philox stream "text".
 const STREAM: u32 = 0x7465_7874;
@@ -115,10 +116,12 @@ fn phases(seed: u32, (x, y): (i32, i32), pair: u32) -> [f64; 2] {
 impl Pool {
     /// Computes the pool of a seed.
     pub fn new(seed: u32) -> Pool {
+        let pairs = parallel_map((N_FIELDS / 2) as usize, |pair| {
+            (0..N_LEVELS).map(|l| pair_of_fields(seed, pair as u32, l)).collect()
+        });
         let mut fields = Vec::new();
-        for pair in 0..N_FIELDS / 2 {
-            let levels: Vec<[Vec<f64>; 2]> =
-                (0..N_LEVELS).map(|l| pair_of_fields(seed, pair, l)).collect();
+        for levels in pairs {
+            let levels: Vec<[Vec<f64>; 2]> = levels;
             for part in 0..2 {
                 let own = |l: usize| levels.get(l).map(|of| of[part].as_slice());
                 let level = |l: usize| Level {
@@ -133,6 +136,20 @@ impl Pool {
         Pool(fields)
     }
 
+    /// Returns the rounded pool of a seed. The last one is kept: pictures of a scene share it, and
+    /// computing it takes longer than a small picture.
+    pub fn on_device(seed: u32) -> Arc<Pool> {
+        static LAST: Mutex<Option<(u32, Arc<Pool>)>> = Mutex::new(None);
+        let last = || LAST.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, pool)) = last().as_ref().filter(|(of, _)| *of == seed) {
+            return Arc::clone(pool);
+        }
+        // Not under the lock: another task of this thread may ask for it meanwhile.
+        let pool = Arc::new(Pool::new(seed).rounded());
+        *last() = Some((seed, Arc::clone(&pool)));
+        pool
+    }
+
     /// Returns the pool with every n rounded to the 16 bits that shaders read, quanta of
     /// [`QUANTUM`].
     pub fn rounded(&self) -> Pool {
@@ -144,17 +161,18 @@ impl Pool {
 }
 
 /// Computes level `l` of two fields: n(i, j) = Σ_k F(k) e^{2πi(k_x i + k_y j)/side}, first over
-/// k_x, then over k_y.
+/// k_x, then over k_y. The terms of k and −k are conjugate: the sum is twice the real part of that
+/// over half of the waves, those with k_y > 0, or k_y = 0 and k_x > 0.
 fn pair_of_fields(seed: u32, pair: u32, l: usize) -> [Vec<f64>; 2] {
     let (n, most, amplitude) = (side(l), most(l), amplitude());
     let roots: Vec<(f64, f64)> = (0..n).map(|j| (TAU * j as f64 / n as f64).sin_cos()).collect();
     let root = |k: i32, x: usize| roots[(k * x as i32).rem_euclid(n as i32) as usize];
-    let n_waves = (2 * most + 1) as usize;
     // Sums over k_x at every column, for each k_y.
-    let mut rows = vec![vec![[(0.0, 0.0); 2]; n]; n_waves];
-    for (row, y) in rows.iter_mut().zip(-most..) {
-        for x in (-most..=most).filter(|x| is_wave((*x, y), most)) {
-            let height = amplitude * shape((x, y));
+    let mut rows = vec![vec![[(0.0, 0.0); 2]; n]; (most + 1) as usize];
+    for (row, y) in rows.iter_mut().zip(0..) {
+        let first = if y == 0 { 1 } else { -most };
+        for x in (first..=most).filter(|x| is_wave((*x, y), most)) {
+            let height = 2.0 * amplitude * shape((x, y));
             let spectrum = phases(seed, (x, y), pair)
                 .map(|phase| (height * phase.cos(), height * phase.sin()));
             for (i, sums) in row.iter_mut().enumerate() {
@@ -168,11 +186,10 @@ fn pair_of_fields(seed: u32, pair: u32, l: usize) -> [Vec<f64>; 2] {
     }
     let mut fields = [vec![0.0; n * n], vec![0.0; n * n]];
     for j in 0..n {
-        for (row, y) in rows.iter().zip(-most..) {
+        for (row, y) in rows.iter().zip(0..) {
             let (sine, cosine) = root(y, j);
             for (i, sums) in row.iter().enumerate() {
                 for (field, (re, im)) in fields.iter_mut().zip(sums) {
-                    // The sum is real.
                     field[i + n * j] += re * cosine - im * sine;
                 }
             }

@@ -6,6 +6,7 @@ use crate::layout::frame::CameraRecord;
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::cloud::SQRT_TAU;
 use crate::model::edge::Edge;
+use crate::model::shape::Shape;
 
 /// Most pairs of ray and blob that are tested: about a tenth of a second.
 const MOST_TESTS: usize = 20_000_000;
@@ -37,6 +38,19 @@ impl Rays {
     }
 }
 
+/// A blob before the near plane, from the eye.
+struct Seen {
+    offset: DVec3,
+    sigma: f64,
+    /// View depth.
+    depth: f64,
+    shape: Shape,
+    /// Square of the distance of rays that may meet it.
+    reach_squared: f64,
+    /// Optical depth of a line through the centre on which σ is that of the first axis.
+    tau: f64,
+}
+
 /// Returns the mean number of layers along `rays`: blobs that have not ended there, near to far,
 /// until what passes is below `saturated`. Blobs that a solid in one of the boxes `solids` (low and
 /// high corner) may hide are none: those whose centres are not nearer than the box.
@@ -50,21 +64,35 @@ pub(super) fn layers(
 ) -> f64 {
     let (eye, forward) = (vector(camera.eye), vector(camera.forward));
     let near = f64::from(camera.near);
+    let seen = |(place, particle): (&PlacedRecord, &ParticleRecord)| {
+        let (offset, sigma) = (vector(place.position) - eye, f64::from(place.sigma));
+        let (depth, shape) = (offset.dot(forward), particle.shape());
+        let widest = sigma * shape.lengths().max_element();
+        let tau = SQRT_TAU * f64::from(particle.kappa) * sigma;
+        let cut = edge.cut(tau * shape.lengths().max_element());
+        let is_seen = cut > 0.0 && depth >= near;
+        // The rounding of a distance must leave no blob out; the test below decides.
+        let rounding = 1e-14 * offset.length_squared();
+        let reach_squared = 2.0 * cut * widest * widest + rounding;
+        is_seen.then_some(Seen { offset, sigma, depth, shape, reach_squared, tau })
+    };
+    let seen: Vec<Seen> = placed.iter().zip(particles).filter_map(seen).collect();
     let of_ray = |ray: &DVec3| {
         let nearest = solids.iter().map(|solid| entry(eye, *ray, solid));
         let hidden = nearest.fold(f64::INFINITY, f64::min) * ray.dot(forward);
         let mut met = Vec::new();
-        for (place, particle) in placed.iter().zip(particles) {
-            let offset = vector(place.position) - eye;
-            let (depth, sigma) = (offset.dot(forward), f64::from(place.sigma));
+        for &Seen { offset, sigma, depth, shape, reach_squared, tau } in &seen {
+            let along = offset.dot(*ray);
+            if offset.length_squared() - along * along > reach_squared {
+                continue;
+            }
             // In units in which the blob is round.
-            let shape = particle.shape();
             let (offset, ray) = (shape.whiten(offset), shape.whiten(*ray));
             let along = offset.dot(ray) / ray.length();
             let apart = offset.length_squared() - along * along;
-            let tau = SQRT_TAU * f64::from(particle.kappa) * sigma / ray.length();
+            let tau = tau / ray.length();
             let (off, cut) = (0.5 * apart / (sigma * sigma), edge.cut(tau));
-            if off > cut || cut <= 0.0 || depth < near || depth > hidden || tau <= 0.0 {
+            if off > cut || cut <= 0.0 || depth > hidden || tau <= 0.0 {
                 continue;
             }
             met.push((depth, tau * (-off).exp()));

@@ -1,6 +1,8 @@
 //! The shares that facets have in a picture's pixels: a thin picture is linear in the radiance of
 //! its facets, so that errors of the light and of the drawing can be told apart.
 
+use std::collections::HashSet;
+
 use glam::{DVec2, DVec3};
 
 use super::background::{solid_radiance, view};
@@ -14,9 +16,10 @@ use crate::reference::Blob;
 use crate::reference::composite::{OpaquePixel, Rounding};
 use crate::reference::parallel::parallel_map;
 use crate::reference::sprites::{self, Bounded, Sprites};
+use crate::reference::surfaces;
+use crate::reference::terrain::ByRow;
 use crate::reference::tiles::off_alpha;
 use crate::reference::view::View;
-use crate::reference::{surfaces, terrain};
 
 /// The shares of one pixel.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -129,6 +132,9 @@ pub(super) fn solid_shares(
         Terrain { origin, ..t.clone() }
     });
     let terrains: Vec<Terrain> = terrains.collect();
+    let rows: HashSet<u32> = pixels.at.iter().map(|at| at[1]).collect();
+    let grounds: Vec<ByRow<'_>> =
+        terrains.iter().map(|t| ByRow::new(t, view, |j| rows.contains(&j))).collect();
     let seen = parallel_map(pixels.at.len(), |k| {
         let ray = view.ray(pixels.at[k][0], pixels.at[k][1]);
         let (mut depth, mut shares) = (f64::INFINITY, vec![]);
@@ -138,8 +144,8 @@ pub(super) fn solid_shares(
             shares = weights.map(|(f, share)| (first[i] as u32 + f as u32, share)).to_vec();
         }
         let mut n_before = scene.n_surface_facets();
-        for terrain in &terrains {
-            let found = terrain::weights(terrain, view, ray);
+        for (terrain, ground) in terrains.iter().zip(&grounds) {
+            let found = ground.weights(pixels.at[k]);
             if let Some((at, weights)) = found.filter(|(at, _)| *at <= depth) {
                 depth = at;
                 shares = weights.map(|(f, share)| (n_before as u32 + f as u32, share)).to_vec();

@@ -45,7 +45,7 @@ pub(super) fn with_textures<T>(
     let splats: Vec<SplatTexture> =
         boxes.flat_map(|boxes| boxes.iter().zip(0u32..).flat_map(of_box)).collect();
     // The device stores the pool in 16 bits.
-    let pool = Pool::new(scene.draw.texture_seed).rounded();
+    let pool = Pool::on_device(scene.draw.texture_seed);
     take(Some(&|j, delta| splats[j].factor(&pool, delta)))
 }
 

@@ -34,7 +34,7 @@ const MOST_S: u32 = 120;
 const SHORT: [(&str, &[(&str, &str)]); 5] = [
     ("bench", &[("frames", "2"), ("warmup", "0"), ("repeat", "1")]),
     ("error", &[("rounds", "1"), ("frames", "1"), ("pixels", "16"), ("knob", "draw.cutoff=2")]),
-    ("ledger", &[("rounds", "1"), ("frames", "1"), ("pixels", "16")]),
+    ("ledger", &[("rounds", "1"), ("frames", "1"), ("pixels", "16"), ("reflections", "2")]),
     ("calibrate", &[("frames", "2")]),
     ("stress", &[("", "moisture")]),
 ];

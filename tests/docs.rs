@@ -106,7 +106,16 @@ const SMALL: [(&str, &[(&str, &str)]); 7] = [
     ("render", &[("--size", "64x48")]),
     ("bench", &[("--size", "64x48"), ("--frames", "2"), ("--warmup", "1"), ("--repeat", "2")]),
     ("error", &[("--size", "64x48"), ("--pixels", "64"), ("--rounds", "2"), ("--frames", "1")]),
-    ("ledger", &[("--size", "64x48"), ("--pixels", "64"), ("--rounds", "2"), ("--frames", "1")]),
+    (
+        "ledger",
+        &[
+            ("--size", "64x48"),
+            ("--pixels", "64"),
+            ("--rounds", "2"),
+            ("--frames", "1"),
+            ("--reflections", "2"),
+        ],
+    ),
     ("inspect", &[("--size", "64x48")]),
     ("view", &[("--size", "64x48"), ("--frames", "3")]),
     ("farm plan", &[("--size", "64x48")]),
@@ -122,7 +131,8 @@ fn shrink(mut args: Vec<String>) -> Vec<String> {
     if is_named("stress") {
         args.push("functions/division".to_owned());
     }
-    let is_large = |arg: &str| ["study-both", "cubes-554"].iter().any(|name| arg.contains(name));
+    const LARGE: [&str; 3] = ["study-both", "study-cloud", "cubes-554"];
+    let is_large = |arg: &str| LARGE.iter().any(|name| arg.contains(name));
     if is_named("ledger") && args.iter().any(|arg| is_large(arg)) {
         args.retain(|arg| !is_large(arg) && arg != "--plain");
         args.extend(["scenes/hello.toml", "--plain"].map(str::to_owned));
@@ -132,6 +142,11 @@ fn shrink(mut args: Vec<String>) -> Vec<String> {
         for many in ["500,1000,2000,5000,10000,20000,50000", "500,5000,50000"] {
             *arg = arg.replace(many, "500,600,700");
         }
+    }
+    // Its game step moves 100 000 particles.
+    let is_busy = args.iter().any(|arg| arg == "scenes/threads.toml");
+    if is_named("bench") && is_busy && !args.iter().any(|arg| arg.contains("particles")) {
+        args.extend(["--set", "draw.particles=2000"].map(str::to_owned));
     }
     let Some((command, options)) = SMALL.iter().find(|(command, _)| is_named(command)) else {
         return args;

@@ -204,7 +204,7 @@ fn a_fresh_study_ledger_and_stress_test_are_read() {
     let knobs =
         ["--knob", "draw.cutoff=2,3", "--knob", "lighting.grid=16,32", "--out", study.as_str()];
     nimbus(&[&["error", "scenes/study-cloud.toml"][..], &small, &knobs].concat());
-    let options = ["--plain", "--out", ledger.as_str()];
+    let options = ["--plain", "--reflections", "2", "--out", ledger.as_str()];
     nimbus(&[&["ledger", "scenes/hello.toml"][..], &small, &options].concat());
     for (path, form) in [(&json, "--json"), (&csv, "--csv")] {
         fs::write(path, nimbus(&["stress", "functions/division", form])).expect("a file");

@@ -148,7 +148,7 @@ fn changes(picture: &Picture) -> Vec<f64> {
 #[test]
 fn pictures_match_the_reference_and_change_by_the_omitted_parts() {
     let mut gpu = Gpu::new();
-    let pool = Arc::new(Pool::new(4).rounded());
+    let pool = Pool::on_device(4);
     let (mut n_cut, mut closest, mut greatest) = (0, 0f64, 0f64);
     for seed in 1..=12 {
         let picture = random(seed, &pool);
@@ -187,7 +187,7 @@ fn pictures_match_the_reference_and_change_by_the_omitted_parts() {
 
 #[test]
 fn number_of_layers_bounds_the_omitted_parts() {
-    let pool = Arc::new(Pool::new(4).rounded());
+    let pool = Pool::on_device(4);
     let mut most = Omitted::default();
     for seed in [1, 3, 5, 7, 9] {
         let picture = random(seed, &pool);

@@ -246,7 +246,7 @@ fn every_missing_barrier_is_found() {
 }
 
 #[test]
-fn parts_of_20_ms_draw_the_same_bytes_in_every_scene() {
+fn short_parts_draw_the_same_bytes_in_every_scene() {
     let dir = tempfile::tempdir().expect("a folder");
     let path = dir.path().join("p.exr");
     let picture = |scene: &str, options: &[&str]| {
@@ -259,9 +259,8 @@ fn parts_of_20_ms_draw_the_same_bytes_in_every_scene() {
     for scene in program::scenes() {
         let scene = scene.to_str().expect("UTF-8");
         let whole = picture(scene, &[]);
-        for limit in ["20", "0.5"] {
-            let parts = picture(scene, &["--max-submit-ms", limit]);
-            assert!(parts == whole, "{scene}: parts of {limit} ms");
-        }
+        // Parts of half a millisecond split also what takes less than 20 ms here.
+        let parts = picture(scene, &["--max-submit-ms", "0.5"]);
+        assert!(parts == whole, "{scene}: parts of 0.5 ms");
     }
 }

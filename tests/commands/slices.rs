@@ -121,14 +121,19 @@ fn auto_takes_thin_sprites_only_where_they_are_near_enough() {
 /// Without a knob, a study varies those that can change slices, and no other.
 #[test]
 fn studies_and_ledgers_know_slices() {
-    let small = ["scenes/hello.toml", "--size", "60x45", "--set", SLICES, "--pixels", "256"];
+    let small = ["scenes/hello.toml", "--size", "60x45", "--set", SLICES, "--pixels", "64"];
     let quick = ["--against", "slices", "--rounds", "1", "--frames", "1", "--csv", "-q"];
     let output = run(&[&["error"], &small[..], &quick[..]].concat());
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(text.contains("draw.slice=2.0") && text.contains("draw.overlap=thin"), "{text}");
     assert!(!text.contains("draw.path"), "{text}");
-    let output = run(&[&["ledger"], &small[..], &["--plain", "--json", "-q"]].concat());
+    let output = run(&[
+        &["ledger"],
+        &small[..],
+        &["--plain", "--reflections", "2", "--json", "-q"],
+    ]
+    .concat());
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(text.contains("\"slices\"") && !text.contains("thin sprites"), "{text}");
 }

@@ -2,8 +2,6 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
-use std::sync::Arc;
-
 use glam::DVec3;
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::particle::DrawnRecord;
@@ -104,7 +102,7 @@ pub fn cases() -> Vec<(String, Picture, f64)> {
         .rectangle(v(0.2, -0.1, 0.5), v(1.1, 0.2, 0.3), v(-0.18, 0.9, 0.06), [2, 3])
         .rectangle(v(-0.9, 0.3, 2.0), v(0.4, 0.0, 0.0), v(0.0, 0.4, 0.0), [1, 1]);
     case("over surfaces", Picture { scenery: Some(scenery), ..mixed(60, 5, 1.0, -2.0) }, 0.3);
-    case("textured", sheets::textured(front(), &Arc::new(Pool::new(4).rounded())), 0.5);
+    case("textured", sheets::textured(front(), &Pool::on_device(4)), 0.5);
     all
 }
 

@@ -5,8 +5,6 @@
 mod rounds;
 mod slices;
 
-use std::sync::Arc;
-
 use crate::bounded::{Random, greatest_ratio};
 use crate::harness::{Gpu, assert_within};
 use crate::mixed::{assert_small, cases, front, mixed};
@@ -36,8 +34,18 @@ fn usual(gpu: &Gpu, format: FilmFormat) -> Tiled {
 /// Draws `picture` in every format and compares every number of every pixel. The greatest value
 /// seen.
 fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
+    compare_in(&FORMATS, gpu, what, picture)
+}
+
+/// The same in some of the formats.
+fn compare_in(
+    formats: &[(TargetFormat, FilmFormat)],
+    gpu: &mut Gpu,
+    what: &str,
+    picture: &Picture,
+) -> f64 {
     let mut greatest = 0f64;
-    for (target, format) in FORMATS {
+    for &(target, format) in formats {
         let what = format!("{what}, {format:?}");
         let tiled = usual(gpu, format);
         let values = picture.draw_by(gpu, None, target, Way::Tiles(tiled));
@@ -62,7 +70,7 @@ fn blobs_of_all_kinds() {
 #[test]
 fn textures_of_every_size() {
     let mut gpu = Gpu::new();
-    let pool = Arc::new(Pool::new(4).rounded());
+    let pool = Pool::on_device(4);
     let picture = sheets::textured(front(), &pool);
     let v = DVec3::new;
     let scenery = Scenery::default().rectangle(

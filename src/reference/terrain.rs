@@ -186,8 +186,8 @@ impl<'a> ByRow<'a> {
         ByRow { terrain, view, rows }
     }
 
-    /// Returns the depth at which the pixel in column `i` and row `j` sees the ground, and the
-    /// share of each point's radiance in that of the place: all 0 from below.
+    /// Returns the depth at which the pixel in column `i` and row `j` sees the ground. Also returns
+    /// the share of each point's radiance in that of the place; all are 0 from below.
     pub fn weights(&self, [i, j]: [u32; 2]) -> Option<(f64, [(usize, f64); 3])> {
         let ray = self.view.ray(i, j);
         let hits = self.rows[j as usize].iter().filter_map(|&InRow { numbers, columns }| {

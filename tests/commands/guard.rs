@@ -259,7 +259,7 @@ fn short_parts_draw_the_same_bytes_in_every_scene() {
     for scene in program::scenes() {
         let scene = scene.to_str().expect("UTF-8");
         let whole = picture(scene, &[]);
-        // Parts of half a millisecond split also what takes less than 20 ms here.
+        // So short a limit also splits passes that take less than the usual 20 ms.
         let parts = picture(scene, &["--max-submit-ms", "0.5"]);
         assert!(parts == whole, "{scene}: parts of 0.5 ms");
     }

@@ -35,8 +35,8 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     let i_facet = Some((0..n).map(|i| (7 * i) % (n / 2 + 1)).collect());
     let singly = Picture { lit: singly, ..picture.clone() };
     let shared = Picture { lit: shared, i_facet, ..picture.clone() };
-    // The light of the last is drawn in every format. What lights a blob and how a target is
-    // written are separate in the shader, so that one format does for the others.
+    // The last picture is drawn in every format. The others are drawn in one, because the shader's
+    // light does not depend on the format.
     let all = [(picture.clone(), &FORMATS[2..]), (singly, &FORMATS[1..2]), (shared, &FORMATS[..])];
     for (picture, formats) in all {
         for &(target, format) in formats {

@@ -15,8 +15,8 @@ use crate::mixed::{cases, front, mixed};
 use crate::picture::{FORMATS, Picture, Tiled, Way};
 use crate::scenery::Scenery;
 
-/// Draws picture `i` of a test by slices in one of the formats, which take turns, and compares it as
-/// [`compare_in`] does. Greatest value seen.
+/// Draws picture `i` of a test by slices and compares it as [`compare_in`] does, in one of the
+/// formats: they take turns. Greatest value seen.
 fn compare(i: usize, gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     compare_in(&FORMATS[i % FORMATS.len()..][..1], gpu, &format!("slices, {what}"), picture)
 }

@@ -117,11 +117,10 @@ impl Pool {
     /// Computes the pool of a seed.
     pub fn new(seed: u32) -> Pool {
         let pairs = parallel_map((N_FIELDS / 2) as usize, |pair| {
-            (0..N_LEVELS).map(|l| pair_of_fields(seed, pair as u32, l)).collect()
+            (0..N_LEVELS).map(|l| pair_of_fields(seed, pair as u32, l)).collect::<Vec<_>>()
         });
         let mut fields = Vec::new();
         for levels in pairs {
-            let levels: Vec<[Vec<f64>; 2]> = levels;
             for part in 0..2 {
                 let own = |l: usize| levels.get(l).map(|of| of[part].as_slice());
                 let level = |l: usize| Level {

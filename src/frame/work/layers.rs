@@ -67,13 +67,13 @@ pub(super) fn layers(
     let seen = |(place, particle): (&PlacedRecord, &ParticleRecord)| {
         let (offset, sigma) = (vector(place.position) - eye, f64::from(place.sigma));
         let (depth, shape) = (offset.dot(forward), particle.shape());
-        let widest = sigma * shape.lengths().max_element();
         let tau = SQRT_TAU * f64::from(particle.kappa) * sigma;
-        let cut = edge.cut(tau * shape.lengths().max_element());
+        let cut = edge.cut(tau * shape.widest());
         let is_seen = cut > 0.0 && depth >= near;
-        // The rounding of a distance must leave no blob out; the test below decides.
+        // A hundred roundings of the squares of distances: they must leave no blob out, and the
+        // test below decides.
         let rounding = 1e-14 * offset.length_squared();
-        let reach_squared = 2.0 * cut * widest * widest + rounding;
+        let reach_squared = 2.0 * cut * (sigma * shape.widest()).powi(2) + rounding;
         is_seen.then_some(Seen { offset, sigma, depth, shape, reach_squared, tau })
     };
     let seen: Vec<Seen> = placed.iter().zip(particles).filter_map(seen).collect();

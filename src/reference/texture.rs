@@ -160,8 +160,10 @@ impl Pool {
 }
 
 /// Computes level `l` of two fields: n(i, j) = Σ_k F(k) e^{2πi(k_x i + k_y j)/side}, first over
-/// k_x, then over k_y. The terms of k and −k are conjugate, so that half of the waves are summed up:
-/// those with k_y > 0, and those with k_y = 0 and k_x > 0. n is twice the real part.
+/// k_x, then over k_y.
+///
+/// The terms of k and −k are conjugate. Half of the waves are summed up: those with k_y > 0, and
+/// those with k_y = 0 and k_x > 0. n is twice the real part of their sum.
 fn pair_of_fields(seed: u32, pair: u32, l: usize) -> [Vec<f64>; 2] {
     let (n, most, amplitude) = (side(l), most(l), amplitude());
     let roots: Vec<(f64, f64)> = (0..n).map(|j| (TAU * j as f64 / n as f64).sin_cos()).collect();

@@ -95,9 +95,11 @@ mod tests {
             let text = format_to_resolution(v, resolution);
             let back: f64 = text.parse().expect("a number");
             // Half a unit of the last digit: of the resolution, or of the third digit. Beyond 15
-            // digits f64 ends.
+            // digits f64 ends. Where a number lies halfway, `back` is one rounding of f64 away from
+            // what is written, half an epsilon of it; the bound and the resolution have theirs.
             let bound = (0.5 * resolution).min(0.005 * v.abs()).max(1e-14 * v.abs());
-            prop_assert!((back - v).abs() <= 1.000_001 * bound, "{text} for {v} to {resolution}");
+            let rounding = f64::EPSILON * v.abs();
+            prop_assert!((back - v).abs() <= bound + rounding, "{text} for {v} to {resolution}");
             prop_assert!(text.len() <= 24, "{text}");
             prop_assert_eq!(format_to_resolution(back, resolution), text);
         }

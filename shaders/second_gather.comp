@@ -170,8 +170,8 @@ void add_unresolved(
     n_unresolved += 1.0;
 }
 
-// Stores the receiver's sums. n_lost: sources that were not looked at.
-void store_receiver(uint j, Receiver receiver, float n_lost) {
+// Stores the receiver's sums. n_more: what is added to the sources that were not looked at.
+void store_receiver(uint j, Receiver receiver, float n_more, bool is_bounded) {
     bool begins = push.i_round == 0u;
     vec3 arrived = vec3(TOTAL(indirect)), shone = vec3(TOTAL(glossy));
     Lit before = lit[j];
@@ -179,9 +179,9 @@ void store_receiver(uint j, Receiver receiver, float n_lost) {
     lit[j].second = (begins ? vec3(0.0) : before.second) + receiver.albedo * arrived
                     + front * receiver.region.ks * shone;
     lit[j].n_unresolved = (begins ? 0.0 : before.n_unresolved) + n_unresolved;
-    lit[j].unresolved = n_lost > 0.0 ? uintBitsToFloat(0x7f800000u)
-                                     : (begins ? 0.0 : before.unresolved) + unresolved;
-    lit[j].n_lost = (begins ? 0.0 : before.n_lost) + n_lost;
+    lit[j].unresolved = is_bounded ? (begins ? 0.0 : before.unresolved) + unresolved
+                                   : uintBitsToFloat(0x7f800000u);
+    lit[j].n_lost = (begins ? 0.0 : before.n_lost) + n_more;
 }
 
 #define STORES_PAIRINGS 0

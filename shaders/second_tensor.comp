@@ -137,15 +137,15 @@ void store_pairing(uint j, Region own, Region emitter) {
     }
 }
 
-// Stores the receiver's counts. n_lost: sources that were not looked at.
-void store_receiver(uint j, Receiver receiver, float n_lost) {
+// Stores the receiver's counts. n_more: what is added to the sources that were not looked at.
+void store_receiver(uint j, Receiver receiver, float n_more, bool is_bounded) {
     bool begins = push.i_round == 0u;
     // The pairs are the same for every light.
     if (push.is_first_light != 0u) {
         lit[j].n_unresolved = (begins ? 0.0 : lit[j].n_unresolved) + n_unresolved;
     }
     bool fresh = begins && push.is_first_light != 0u;
-    n_lost += fresh ? 0.0 : lit[j].n_lost;
+    float n_lost = n_more + (fresh ? 0.0 : lit[j].n_lost);
     lit[j].n_lost = n_lost;
     // The error depends on materials and energies, which tensors do not know: there is no bound.
     lit[j].unresolved =

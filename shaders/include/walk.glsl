@@ -181,6 +181,7 @@ void main() {
     if (next == DONE) {
         return;
     }
+    uint begun = next;
     KEEP_LIGHTS
     Facet facet = facets[j];
     // All receivers of a block are of one region. The compiler knows so where the block gives it.
@@ -231,9 +232,13 @@ void main() {
     } while (next < last && n_iterations < BATCH_ITERATIONS);
 #endif
     if (is_receiver) {
-        // Sources that no dispatch has reached are counted, and then there is no bound.
+        // What is left counts as lost until a later round has looked at it: that round may not run.
+        // At the end there is no bound then.
+        uint left = last - min(next, last);
+        uint before = push.i_round == 0u ? 0u : last - min(begun, last);
         bool is_last = push.i_round + 1u == push.n_rounds;
-        store_receiver(j, receiver, n_cut + (is_last ? float(last - min(next, last)) : 0.0));
+        bool is_bounded = n_cut == 0.0 && (left == 0u || !is_last);
+        store_receiver(j, receiver, n_cut + float(left) - float(before), is_bounded);
         reached[j] = next >= last ? DONE : next;
         if (next < last) {
             atomicMax(rounds[3u * (push.i_round + 1u)], gl_WorkGroupID.x + 1u);

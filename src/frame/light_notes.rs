@@ -48,7 +48,7 @@ pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
     if !unresolved.is_empty() {
         let n_pairs: f64 = unresolved.iter().map(|l| f64::from(l.n_unresolved)).sum();
         let most = unresolved.iter().map(|l| f64::from(l.unresolved)).fold(0.0, f64::max);
-        let most = match most.is_finite() {
+        let most = match most.is_finite() && n_lost == 0.0 {
             true => format!("by up to {most:.3e}"),
             false => "by an unknown amount (there is no bound on light that was left out, or in \
                 tensors)"

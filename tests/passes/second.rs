@@ -168,4 +168,17 @@ fn a_gather_that_does_not_come_to_its_end_says_so() {
         lost.clone().all(|l| l.unresolved == f32::INFINITY)
             && f.lit.iter().all(|l| l.second.iter().all(|v| v.is_finite()))
     );
+    // The same where no later round runs: the first one has counted what it left.
+    let mut sources = nimbus::passes::sources();
+    for (from, to) in [
+        (
+            "while (s < end && n_iterations < BATCH_ITERATIONS",
+            "while (s < end && n_iterations < 1u",
+        ),
+        ("(push.i_round + 1u)], gl_WorkGroupID.x + 1u)", "(push.i_round + 1u)], 0u)"),
+    ] {
+        assert!(sources.replace("include/walk.glsl", from, to), "{from}");
+    }
+    let f = frame_by(&gpu, &Compiler::new(sources, None).expect("shaderc"), room(0, ""));
+    assert!(f.lit.iter().filter(|l| l.n_lost > 0.0).count() * 2 > f.lit.len());
 }

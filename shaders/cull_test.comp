@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "particles.glsl"
 #include "blob.glsl"
 #include "cull.glsl"
 #include "one_subgroup.glsl"
@@ -31,8 +32,8 @@ layout(push_constant) uniform Push {
     uint width;
     uint height;
 } push;
-READS(0, Placed, placed)
-READS(1, Particle, particles)
+TEXELS(0, placed)
+TEXELS(1, particles)
 READS(2, uint, i_group)
 READS(3, Drawn, drawn)
 // Bits of 32 particles, and the number of kept particles before them in their tile.
@@ -44,17 +45,17 @@ shared uint bits[WORDS];
 
 bool is_kept(uint i) {
     Drawn group = drawn[i_group[i]];
-    vec3 v = along_camera(push.camera, placed[i].position - push.camera.eye);
-    float sigma = placed[i].sigma;
-    float tau = SQRT_TAU * particles[i].kappa * sigma;
+    Placed blob = PLACED_AT(i);
+    Particle particle = PARTICLE_AT(i);
+    vec3 v = along_camera(push.camera, blob.position - push.camera.eye);
+    float sigma = blob.sigma;
+    float tau = SQRT_TAU * particle.kappa * sigma;
     if (WEIGHTED != 0) {
         tau *= weight_of(group, i);
     }
     Shape shape = upright_shape(push.camera, 1.0);
     if (ELLIPSOIDS != 0) {
-        shape = shape_of(
-            push.camera, particles[i].aspect, particles[i].aspect_z, particles[i].turn
-        );
+        shape = shape_of(push.camera, particle.aspect, particle.aspect_z, particle.turn);
         tau *= shape.wider;
     }
     float reach = push.cutoff;

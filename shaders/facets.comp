@@ -14,17 +14,19 @@
 
 void main() {
     FOR_EACH(i, push.n_facets) {
-        vec3 p = placed[i].position;
-        float sigma = placed[i].sigma;
+        Placed blob = PLACED_AT(i);
+        Particle particle = PARTICLE_AT(i);
+        vec3 p = blob.position;
+        float sigma = blob.sigma;
         Group group = groups[i_group[i]];
         // Small blobs take the group's scale: on their own scale the normal is that of their
         // neighbours' noise, and they would show as specks.
         float scale = max(sigma, group.sigma_mean);
-        Form form = form_of(i);
+        Form form = form_of(particle);
         vec3 n = normal_at(p, scale, form, group.cloud_center);
-        float area = area_of(sigma, form, particles[i].kappa);
+        float area = area_of(sigma, form, particle.kappa);
         vec3 place = shell_at(p, scale, form, n);
         facets[push.i_first_facet + i] =
-            Facet(place, area, n, group.i_region, particles[i].color, sigma);
+            Facet(place, area, n, group.i_region, particle.color, sigma);
     }
 }

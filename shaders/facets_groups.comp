@@ -31,24 +31,26 @@ struct Sums {
     float plain_sigma;
 };
 
-float mass_of(uint i) {
-    float sigma = placed[i].sigma;
+float mass_of(Particle particle, float sigma) {
 #if ELLIPSOIDS == 2
     // sigma cubed alone may overflow.
-    return particles[i].kappa * sigma * (sigma * particles[i].aspect)
-           * (sigma * particles[i].aspect_z);
+    return particle.kappa * sigma * (sigma * particle.aspect) * (sigma * particle.aspect_z);
 #else
-    return particles[i].kappa * sigma * sigma * sigma * particles[i].aspect;
+    return particle.kappa * sigma * sigma * sigma * particle.aspect;
 #endif
 }
 
 Sums sums_of(Run run, uint first, float sigma_first) {
     Sums s = Sums(0.0, vec3(0.0), 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    vec3 from = PLACED_AT(first).position, first_color = PARTICLE_AT(first).color;
     for (uint k = run.i_first; k < run.i_first + run.n_particles; ++k) {
         uint i = order[k];
-        float m = mass_of(i), a = area_of(placed[i].sigma, form_of(i), particles[i].kappa);
-        vec3 p = placed[i].position - placed[first].position;
-        vec3 c = particles[i].color - particles[first].color;
+        Placed blob = PLACED_AT(i);
+        Particle particle = PARTICLE_AT(i);
+        float m = mass_of(particle, blob.sigma);
+        float a = area_of(blob.sigma, form_of(particle), particle.kappa);
+        vec3 p = blob.position - from;
+        vec3 c = particle.color - first_color;
         float sigma = groups[i_group[i]].sigma_mean - sigma_first;
         s.mass += m;
         s.position += m * p;
@@ -69,18 +71,20 @@ vec2 spread_of(Run run, vec3 p, bool by_mass) {
     float weight = 0.0;
     for (uint k = run.i_first; k < run.i_first + run.n_particles; ++k) {
         uint i = order[k];
-        float m = by_mass ? mass_of(i) : 1.0;
-        float sigma = placed[i].sigma;
-        vec3 d = placed[i].position - p;
+        Placed blob = PLACED_AT(i);
+        Particle particle = PARTICLE_AT(i);
+        float sigma = blob.sigma;
+        float m = by_mass ? mass_of(particle, sigma) : 1.0;
+        vec3 d = blob.position - p;
 #if ELLIPSOIDS == 2
-        Form form = form_of(i);
+        Form form = form_of(particle);
         vec3 squares = sigma * sigma * form.lengths * form.lengths;
         vec3 upward = vec3(form.axes[0].y, form.axes[1].y, form.axes[2].y);
         float high = dot(squares, upward * upward);
         float wide = 0.5 * dot(squares, 1.0 - upward * upward);
         sum += m * vec2(wide + 0.5 * (d.x * d.x + d.z * d.z), high + d.y * d.y);
 #elif ELLIPSOIDS
-        float high = particles[i].aspect * sigma;
+        float high = particle.aspect * sigma;
         sum += m * vec2(sigma * sigma + 0.5 * (d.x * d.x + d.z * d.z), high * high + d.y * d.y);
 #else
         sum.x += m * (sigma * sigma + dot(d, d) * (1.0 / 3.0));
@@ -95,23 +99,25 @@ void main() {
         Run run = runs[g];
         uint first = order[run.i_first];
         Group group = groups[i_group[first]];
+        Placed first_blob = PLACED_AT(first);
+        Particle first_particle = PARTICLE_AT(first);
         Sums s = sums_of(run, first, group.sigma_mean);
         float n_inverse = 1.0 / float(run.n_particles);
         // Members without mass, or without area, all count alike.
         bool by_mass = s.mass > 0.0, by_area = s.area > 0.0;
         vec3 p =
-            placed[first].position + (by_mass ? s.position / s.mass : s.plain_position * n_inverse);
+            first_blob.position + (by_mass ? s.position / s.mass : s.plain_position * n_inverse);
         float sigma_mean =
             group.sigma_mean + (by_mass ? s.sigma_mean / s.mass : s.plain_sigma * n_inverse);
         vec3 color =
-            particles[first].color + (by_area ? s.color / s.area : s.plain_color * n_inverse);
+            first_particle.color + (by_area ? s.color / s.area : s.plain_color * n_inverse);
         vec2 spread = run.n_particles > 1u ? sqrt(spread_of(run, p, by_mass))
-                                           : vec2(placed[first].sigma, 0.0);
+                                           : vec2(first_blob.sigma, 0.0);
         float sigma = spread.x;
         Form form = upright_form(1.0);
 #if ELLIPSOIDS
         if (run.n_particles == 1u) {
-            form = form_of(first);
+            form = form_of(first_particle);
         } else if (sigma > 0.0) {
             form = upright_form(clamp(spread.y / sigma, MIN_ASPECT, 1.0 / MIN_ASPECT));
         }

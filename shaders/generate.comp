@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "particles.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
 
@@ -22,7 +23,7 @@ layout(push_constant) uniform Push {
 } push;
 READS(0, Box, boxes)
 READS(1, uint, i_group)
-WRITES(2, Particle, particles)
+TEXEL_STORES(2, particles)
 // Attempts made; bit 31 is set where the particle was folded.
 WRITES(3, uint, status)
 
@@ -84,10 +85,7 @@ void make(Box b, uint begin, uint end, uint hop) {
         vec3 v = offset_of(u.xyz, b);
         float r = u.w * b.radius_max;
         float radius = r + 0.5 * PI * sine(r);
-        particles[i] = Particle(
-            inside ? v : fold(v, h), b.sigma_factor * radius, vec3(1.0), b.kappa, 1.0, 1.0,
-            uvec2(0)
-        );
+        STORE_BALL(i, inside ? v : fold(v, h), b.sigma_factor * radius, b.kappa);
         status[i] = n_attempts | (inside ? 0u : 0x80000000u);
     }
 }

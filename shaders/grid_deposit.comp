@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "particles.glsl"
 #include "functions.glsl"
 
 // Deposits each blob's mass into the grid's cells, a workgroup a blob (model.md §8, passes.md
@@ -38,8 +39,8 @@ layout(push_constant) uniform Push {
     uint n_levels;
     uint is_wide;
 } push;
-READS(0, Placed, placed)
-READS(1, Particle, particles)
+TEXELS(0, placed)
+TEXELS(1, particles)
 // Cell c: low word at 2c, high word at 2c + 1. Each grid of wider cells lies behind that of half
 // their edges.
 UPDATES(2, uint, sums)
@@ -58,12 +59,13 @@ float weight(float a, float b) {
 
 void main() {
     for (uint p = gl_WorkGroupID.x; p < push.n_particles; p += gl_NumWorkGroups.x) {
-        Placed blob = placed[p];
-        float aspect = particles[p].aspect;
+        Placed blob = PLACED_AT(p);
+        Particle particle = PARTICLE_AT(p);
+        float aspect = particle.aspect;
         float mass =
-            particles[p].kappa * MASS_FACTOR * blob.sigma * blob.sigma * blob.sigma * aspect;
+            particle.kappa * MASS_FACTOR * blob.sigma * blob.sigma * blob.sigma * aspect;
 #if TURNED
-        bool is_turned = particles[p].aspect_z != 1.0 || particles[p].turn != uvec2(0);
+        bool is_turned = particle.aspect_z != 1.0 || particle.turn != uvec2(0);
         mass = is_turned ? 0.0 : mass;
 #endif
         vec3 sigma = blob.sigma * vec3(1.0, aspect, 1.0);

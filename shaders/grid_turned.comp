@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "particles.glsl"
 #include "functions.glsl"
 #include "turn.glsl"
 
@@ -32,8 +33,8 @@ layout(push_constant) uniform Push {
     uint n_levels;
     uint is_wide;
 } push;
-READS(0, Placed, placed)
-READS(1, Particle, particles)
+TEXELS(0, placed)
+TEXELS(1, particles)
 // Cell c: low word at 2c, high word at 2c + 1. Each grid of wider cells lies behind that of half
 // their edges.
 UPDATES(2, uint, sums)
@@ -61,12 +62,13 @@ ivec2 reached(float at, float sigma, float edge, int n) {
 
 void main() {
     for (uint p = gl_WorkGroupID.x; p < push.n_particles; p += gl_NumWorkGroups.x) {
-        Placed blob = placed[p];
-        vec3 lengths = vec3(1.0, particles[p].aspect, particles[p].aspect_z);
-        uvec2 turn = particles[p].turn;
+        Placed blob = PLACED_AT(p);
+        Particle particle = PARTICLE_AT(p);
+        vec3 lengths = vec3(1.0, particle.aspect, particle.aspect_z);
+        uvec2 turn = particle.turn;
         // sigma cubed alone may overflow.
         vec3 sigmas = blob.sigma * lengths;
-        float mass = particles[p].kappa * MASS_FACTOR * sigmas.x * sigmas.y * sigmas.z;
+        float mass = particle.kappa * MASS_FACTOR * sigmas.x * sigmas.y * sigmas.z;
         if ((lengths.z == 1.0 && turn == uvec2(0)) || !(mass > 0.0)) {
             continue;
         }

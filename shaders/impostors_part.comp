@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "particles.glsl"
 #include "each.glsl"
 
 // Splits the sorted entries into far ones and near ones (passes.md "impostors").
@@ -22,12 +23,12 @@ READS(0, uvec2, entries)
 UPDATES(1, uint, members)
 WRITES(2, uvec2, far)
 WRITES(3, uvec2, near)
-READS(4, Placed, placed)
+TEXELS(4, placed)
 
 void main() {
     FOR_EACH(k, push.n_entries) {
         uvec2 entry = entries[k];
-        bool is_far = dot(push.forward, placed[entry.y].position) >= push.cut;
+        bool is_far = dot(push.forward, PLACED_AT(entry.y).position) >= push.cut;
         if (push.is_new != 0) {
             members[entry.y] = uint(is_far);
         } else {

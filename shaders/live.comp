@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "particles.glsl"
 #include "each.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
@@ -14,7 +15,7 @@ layout(push_constant) uniform Push {
     uint n_particles;
 } push;
 READS(0, Disc, discs)
-WRITES(1, Particle, particles)
+TEXEL_STORES(1, particles)
 
 // "disc", as in src/model/disc.rs.
 const uint STREAM = 0x64697363u;
@@ -65,9 +66,7 @@ void main() {
             smooth_rise(lived * d.inv_fade_in) * smooth_rise((1.0 - lived) * d.inv_fade_out);
         float above = position.y - d.base - d.lift * warm * (1.0 - cooled);
         float condensed = d.inv_over > 0.0 ? smooth_rise(above * d.inv_over) : 1.0;
-        particles[d.i_first + slot] = Particle(
-            position - d.center, sigma, vec3(1.0), d.kappa * diluted * faded * condensed, 1.0, 1.0,
-            uvec2(0)
-        );
+        float kappa = d.kappa * diluted * faded * condensed;
+        STORE_BALL(d.i_first + slot, position - d.center, sigma, kappa);
     }
 }

@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "particles.glsl"
 #include "each.glsl"
 
 // Computes keys of a Morton order, region after region (model.md §7, passes.md
@@ -26,14 +27,14 @@ WRITES(2, uvec2, entries)
 vec3 position_of(uint i) { return facets[i].position; }
 uint region_of(uint i) { return facets[i].i_region; }
 #else
-READS(0, Placed, placed)
+TEXELS(0, placed)
 READS(1, uint, i_group)
 READS(2, Group, groups)
 READS(3, RegionBounds, bounds)
 // (key, particle)
 WRITES(4, uvec2, entries)
 
-vec3 position_of(uint i) { return placed[i].position; }
+vec3 position_of(uint i) { return PLACED_AT(i).position; }
 uint region_of(uint i) { return groups[i_group[i]].i_region; }
 #endif
 

@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "particles.glsl"
 #include "each.glsl"
 #include "functions.glsl"
 
@@ -10,21 +11,22 @@
 // Error: a few roundings, and sine()'s.
 
 layout(push_constant) uniform Push { uint n_particles; } push;
-READS(0, Particle, particles)
+TEXELS(0, particles)
 READS(1, uint, i_group)
 READS(2, Group, groups)
 READS(3, Mode, modes)
-WRITES(4, Placed, placed)
+TEXEL_STORES(4, placed)
 
 void main() {
     FOR_EACH(i, push.n_particles) {
         Group group = groups[i_group[i]];
-        vec3 rest = particles[i].position * group.scale;
+        Particle particle = PARTICLE_AT(i);
+        vec3 rest = particle.position * group.scale;
         vec3 x = rest + group.center;
         vec3 d = vec3(0.0);
         for (uint m = group.i_mode; m < group.i_mode + group.n_modes; ++m) {
             d += modes[m].a * sine(dot(modes[m].k, x) + modes[m].phase);
         }
-        placed[i] = Placed(rest + group.offset + d, particles[i].sigma * group.scale);
+        STORE_PLACED(i, rest + group.offset + d, particle.sigma * group.scale);
     }
 }

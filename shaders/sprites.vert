@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "particles.glsl"
 #include "blob.glsl"
 #include "shade.glsl"
 #include "strip.glsl"
@@ -16,8 +17,8 @@
 
 #include "sprites.glsl"
 READS(0, uvec2, entries)
-READS(1, Placed, placed)
-READS(2, Particle, particles)
+TEXELS(1, placed)
+TEXELS(2, particles)
 READS(3, Lit, lit)
 READS(4, uint, i_facet)
 READS(5, uint, i_group)
@@ -66,10 +67,12 @@ void main() {
         draw_nothing();
         return;
     }
-    vec3 c = placed[i].position - push.camera.eye;
-    float sigma = placed[i].sigma;
+    Placed blob = PLACED_AT(i);
+    Particle particle = PARTICLE_AT(i);
+    vec3 c = blob.position - push.camera.eye;
+    float sigma = blob.sigma;
     vec3 v = along_camera(push.camera, c);
-    float tau = SQRT_TAU * particles[i].kappa * sigma;
+    float tau = SQRT_TAU * particle.kappa * sigma;
     if (WEIGHTED != 0) {
         tau *= weight_of(drawn[i_group[i]], i);
     }
@@ -78,9 +81,7 @@ void main() {
     Shape shape = upright_shape(push.camera, 1.0);
     out_lean = vec2(0.0);
     if (ELLIPSOIDS != 0) {
-        shape = shape_of(
-            push.camera, particles[i].aspect, particles[i].aspect_z, particles[i].turn
-        );
+        shape = shape_of(push.camera, particle.aspect, particle.aspect_z, particle.turn);
         out_conic = vec4(conic_of(shape, v.xy / v.z, scale), shape.inverse);
         tau *= shape.wider;
     }
@@ -97,12 +98,12 @@ void main() {
     out_place = texture_sample.place;
     out_gain = texture_sample.gain;
     uint facet = GROUPED != 0 ? i_facet[i] : push.i_first_facet + i;
-    vec3 radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color;
+    vec3 radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particle.color;
     float most = 1.0;
     out_shade = vec3(0.0);
     if (SHADED != 0) {
         Shade shade =
-            shade_of(push.camera, slopes[facet], shape, placed[i].position, v, sigma);
+            shade_of(push.camera, slopes[facet], shape, blob.position, v, sigma);
         radiance *= shade.base;
         out_shade = shade.seen;
         most = BRIGHTER;

@@ -25,7 +25,8 @@ READS(0, uvec2, reach)
 READS(1, uint, n_before)
 READS(2, uint, n_pairs)
 READS(3, Round, rounds)
-READS(5, Splat, splats)
+// A Splat is two texels.
+TEXELS(5, splats)
 WRITES(4, uvec2, pairs)
 READS(6, Kept, kept)
 
@@ -71,10 +72,11 @@ void main() {
     if (low.x == high.x) {
         return;
     }
-    vec2 center = splats[r].center;
-    float scale = splats[r].scale, cut = push.cut;
+    // center, scale and tau
+    vec4 splat = uintBitsToFloat(TEXEL(splats, int(2 * r)));
+    float cut = push.cut;
     if (THRESHOLD != 0) {
-        cut = min(cut, max(log2(splats[r].tau * push.inv_threshold), push.least_cut));
+        cut = min(cut, max(log2(splat.w * push.inv_threshold), push.least_cut));
     }
     uvec2 first = low / TILES_ACROSS, last = (high - 1u) / TILES_ACROSS;
     uint n_x = last.x - first.x + 1u;
@@ -93,7 +95,7 @@ void main() {
         uint tiles = spread * columns;
         if (ELLIPSOIDS == 0) {
             // For ellipsoids the rectangle alone decides.
-            tiles &= near(center, scale, cut, corner);
+            tiles &= near(splat.xy, splat.z, cut, corner);
         }
         pairs[at + k] = uvec2(bin.y * push.n_bins_x + bin.x | tiles << BIN_BITS, r);
         bool wraps = bin.x == last.x;

@@ -2,6 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
+#include "particles.glsl"
 #include "blob.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
@@ -41,8 +42,7 @@ layout(push_constant) uniform Push {
     float least_cut;
 } push;
 READS(0, uvec2, entries)
-// Texels, which llvmpipe fetches for all invocations at once: a Placed is one texel, a Particle
-// three, a Lit four.
+// A Lit is four texels.
 TEXELS(1, placed)
 TEXELS(2, particles)
 TEXELS(3, lit)
@@ -50,22 +50,22 @@ READS(4, uint, i_facet)
 READS(5, uint, i_group)
 READS(6, Drawn, drawn)
 READS(7, Textured, textured)
-WRITES(8, uvec4, splats)
+// A Splat is two texels.
+TEXEL_STORES(8, splats)
 // Tiles that the splat can reach: (first, end) of columns and of rows, 16 bits each; 0 for none.
 WRITES(9, uvec2, reach)
 // Pairs of the splats before it in its block, and of each block.
 WRITES(10, uint, n_before)
 WRITES(11, uint, n_pairs)
-// The texture of each splat; only with textures.
-WRITES(12, SplatTexture, splat_textures)
-
+// The SplatTexture of each splat, three texels; only with textures.
+TEXEL_STORES(12, sheets)
 READS(13, Kept, kept)
 // Ellipsoids' conics, in powers of two, and 1/a^2. Where they are turned: that and a Lean, the
 // number |M s|^2 first.
-WRITES(14, vec4, conics)
+TEXEL_STORES(14, conics)
 // Slopes of the light by facet, and the changes of the splats' light; only where blobs are shaded.
 READS(15, Slope, slopes)
-WRITES(16, vec4, shades)
+TEXEL_STORES(16, shades)
 
 #if !ONE_SUBGROUP
 shared uint sums[INVOCATIONS];
@@ -80,11 +80,11 @@ uint project(uint i, uint r) {
     if (i == NO_PARTICLE) {
         return 0u;
     }
-    vec4 place = uintBitsToFloat(TEXEL(placed, int(i))),
-         shade = uintBitsToFloat(TEXEL(particles, int(3 * i + 1)));
-    vec3 v = along_camera(push.camera, place.xyz - push.camera.eye);
-    float sigma = place.w;
-    float tau = SQRT_TAU * shade.w * sigma;
+    Placed blob = PLACED_AT(i);
+    Particle particle = PARTICLE_AT(i);
+    vec3 v = along_camera(push.camera, blob.position - push.camera.eye);
+    float sigma = blob.sigma;
+    float tau = SQRT_TAU * particle.kappa * sigma;
     if (WEIGHTED != 0) {
         tau *= weight_of(drawn[i_group[i]], i);
     }
@@ -94,8 +94,7 @@ uint project(uint i, uint r) {
     float deepest = tau;
     Shape shape;
     if (ELLIPSOIDS != 0) {
-        uvec4 of = TEXEL(particles, int(3 * i + 2));
-        shape = shape_of(push.camera, uintBitsToFloat(of.x), uintBitsToFloat(of.y), of.zw);
+        shape = shape_of(push.camera, particle.aspect, particle.aspect_z, particle.turn);
         deepest *= shape.wider;
     }
     float reach_in_sigma = push.cutoff;
@@ -118,7 +117,7 @@ uint project(uint i, uint r) {
     // b^2/(2 sigma^2) = scale (d.x^2 + d.y^2 + (s.x d.y - s.y d.x)^2) / (1 + |ray|^2), d = ray - s;
     // in powers of two.
     float scale = 0.5 * LOG2_E * (v.z / sigma) * (v.z / sigma);
-    vec3 radiance = shade.xyz;
+    vec3 radiance = particle.color;
     if (LIT != 0) {
         int facet = int(GROUPED != 0 ? i_facet[i] : push.i_first_facet + i);
 #if CELLS
@@ -128,31 +127,33 @@ uint project(uint i, uint r) {
                    + uintBitsToFloat(TEXEL(lit, 4 * facet + 3).xyz);
 #endif
         if (SHADED != 0) {
-            Shade shade = shade_of(push.camera, slopes[facet], shape, place.xyz, v, sigma);
+            Shade shade = shade_of(push.camera, slopes[facet], shape, blob.position, v, sigma);
             radiance *= shade.base;
-            shades[r] = vec4(shade.seen, 0.0);
+            STORE_TEXEL(shades, int(r), floatBitsToUint(vec4(shade.seen, 0.0)));
         }
     }
-    // A Splat, by fours.
-    splats[2 * r] = floatBitsToUint(vec4(s, scale, tau));
-    splats[2 * r + 1] = floatBitsToUint(vec4(radiance, push.camera.near / v.z));
+    STORE_TEXEL(splats, int(2 * r), floatBitsToUint(vec4(s, scale, tau)));
+    vec4 seen = vec4(radiance, push.camera.near / v.z);
+    STORE_TEXEL(splats, int(2 * r + 1), floatBitsToUint(seen));
     if (ELLIPSOIDS != 0) {
-        conics[ELLIPSOIDS * r] = vec4(conic_of(shape, s, scale), shape.inverse);
-    }
-    if (ELLIPSOIDS == 2) {
-        Lean lean = lean_of(shape, s);
-        conics[2 * r].w = lean.white;
-        bool is_ball = shape.square == 1.0 && shape.square_z == 1.0;
-        conics[2 * r + 1] = vec4(lean.lean, is_ball ? 1.0 : 0.0, 0.0);
+        vec4 conic = vec4(conic_of(shape, s, scale), shape.inverse);
+        if (ELLIPSOIDS == 2) {
+            Lean lean = lean_of(shape, s);
+            conic.w = lean.white;
+            bool is_ball = shape.square == 1.0 && shape.square_z == 1.0;
+            vec4 further = vec4(lean.lean, is_ball ? 1.0 : 0.0, 0.0);
+            STORE_TEXEL(conics, int(2 * r + 1), floatBitsToUint(further));
+        }
+        STORE_TEXEL(conics, int(ELLIPSOIDS * r), floatBitsToUint(conic));
     }
     uvec2 tile = uvec2(push.tile_width, push.tile_height);
     if (TEXTURED != 0) {
         TextureSample texture_sample =
             texture_sample_of(textured[i_group[i]], i, v.z / sigma, push.pixel.y);
-        splat_textures[r] = SplatTexture(
-            texture_sample.turn, texture_sample.gain, texture_sample.place.x,
-            texture_sample.place.y, 0u, uvec2(0)
-        );
+        STORE_TEXEL(sheets, int(3 * r), floatBitsToUint(texture_sample.turn));
+        uvec3 gain = floatBitsToUint(texture_sample.gain);
+        STORE_TEXEL(sheets, int(3 * r + 1), uvec4(gain, texture_sample.place.x));
+        STORE_TEXEL(sheets, int(3 * r + 2), uvec4(texture_sample.place.y, 0u, 0u, 0u));
     }
     // In tiles: a rectangle of them, ends included.
     uvec2 first = uvec2(columns.x, rows.x) / tile, last = (uvec2(columns.y, rows.y) - 1u) / tile;

@@ -15,9 +15,9 @@ use glam::DVec3;
 use harness::Gpu;
 use nimbus::model::basis::{Basis, evaluate};
 use nimbus::model::material::Brdf;
+use nimbus::model::parallel::parallel_map;
 use nimbus::model::scene::Scene;
 use nimbus::reference::area::{Accuracy, AreaScene, Estimate};
-use nimbus::reference::parallel::parallel_map;
 use rooms::{Frame, HEAD, Plate, frame, plates_text, random_plates, sun_and_lamp};
 use scene_text::load_with;
 

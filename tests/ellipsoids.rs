@@ -222,7 +222,7 @@ fn faulty_shaders_exceed_the_bounds() {
             "deep[j] = place.w * sqrt((across[j] + along[j]) * inv_white);",
             "deep[j] = place.w;",
         ),
-        ("tiles_splat.comp", "uintBitsToFloat(of.x)", "uintBitsToFloat(of.y)"),
+        ("include/particles.glsl", "aspects.x, aspects.y", "aspects.y, aspects.y"),
     ];
     let of = |way: Way, mutations: &[(&str, &str, &str)], gpu: &mut Gpu| {
         for (file, from, to) in mutations {

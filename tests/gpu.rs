@@ -153,6 +153,63 @@ fn sizes_beyond_the_device_are_refused_before_anything_is_allocated() {
     assert!(nimbus::gpu::storage_bytes(&odd, "test", 97, 1).is_err());
 }
 
+/// Shaders reach the last texel of a buffer that is too large to be bound as records.
+#[test]
+fn a_buffer_of_texels_may_be_larger_than_one_of_records() {
+    let mut gpu = Gpu::new();
+    let limits = *gpu.device.limits();
+    let n = limits.max_storage_buffer_bytes / 16 + 1;
+    assert!(nimbus::gpu::storage_bytes(&limits, "test.wide", n, 16).is_err());
+    let few = nimbus::gpu::Limits { max_texels: 65_536, ..limits };
+    assert!(nimbus::gpu::texel_bytes(&few, "test.wide", n, 16).is_err());
+    if limits.max_texel_buffer_bytes(16).min(limits.max_buffer_bytes) < 16 * n {
+        // Some devices read fewer bytes by texels than as records.
+        assert!(nimbus::gpu::texel_bytes(&limits, "test.wide", n, 16).is_err());
+        return;
+    }
+    let text = r#"#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+layout(local_size_x = 1) in;
+layout(push_constant) uniform Push { uint i; } push;
+TEXEL_STORES(0, wide)
+void main() { STORE_TEXEL(wide, int(push.i), uvec4(push.i, 2u, 3u, 4u)); }
+"#;
+    let store = gpu.test_kernel("store", text, &[("i", 0, 4)]);
+    let text = r#"#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+layout(local_size_x = 1) in;
+layout(push_constant) uniform Push { uint i; } push;
+TEXELS(0, wide)
+WRITES(1, uvec4, copies)
+void main() { copies[0] = TEXEL(wide, int(push.i)); }
+"#;
+    let load = gpu.test_kernel("load", text, &[("i", 0, 4)]);
+    let wide =
+        Buffer::of_texels::<[u32; 4]>(&gpu.device, "test.wide", n, MemoryUsage::Device).unwrap();
+    let copy = gpu.buffer::<[u32; 4]>(1);
+    let i = n as u32 - 1;
+    gpu.run(|rec| {
+        rec.dispatch_groups(&store, &[&wide], &i, 1)?;
+        rec.dispatch_groups(&load, &[&wide, &copy], &i, 1)
+    });
+    assert_eq!(gpu.download::<[u32; 4]>(&copy, 1), [[i, 2, 3, 4]]);
+    let text = r#"#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+layout(local_size_x = 1) in;
+WRITES(0, uvec4, wide)
+void main() { wide[0] = uvec4(0u); }
+"#;
+    let records = gpu.test_kernel("records", text, &[]);
+    gpu.run(|rec| {
+        let refused = rec.dispatch_groups(&records, &[&wide], &(), 1).unwrap_err().to_string();
+        assert!(refused.contains("test.wide") && refused.contains("maxStorageBufferRange"));
+        Ok(())
+    });
+}
+
 #[test]
 fn an_unknown_device_is_refused_with_a_list_of_all() {
     let instance = Instance::new(true).unwrap();
@@ -288,7 +345,8 @@ fn work_beyond_the_limit_of_a_submission_is_submitted_in_parts() {
 }
 
 /// The workgroups of an indirect dispatch count from 0, wherever those of the dispatch before it
-/// began. At some of the limits, a dispatch's last part and the indirect one are submitted together.
+/// began. At some of the limits, a dispatch's last part and the indirect one are submitted
+/// together.
 #[test]
 fn indirect_dispatches_after_a_dispatch_in_parts_begin_at_the_first_workgroup() {
     let mut n_parts = vec![];

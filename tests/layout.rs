@@ -21,8 +21,9 @@ use nimbus::layout::particle::{
     FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, ParticleRecord, PlacedRecord,
 };
 use nimbus::layout::second::{PackedRecord, SourceRecord};
-use nimbus::layout::tiles::SplatRecord;
+use nimbus::layout::tiles::{SplatRecord, SplatTextureRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, LEVEL_SIGMA, MAX_CELLS};
+use nimbus::model::lod;
 use nimbus::passes::{self, SHADERS, cull, generate, sort, texture, tiles, transmit};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -76,6 +77,7 @@ fn compare(file: &str, found: &Reflection, push: &[Field], elements: &str) -> Ve
         let plain = match binding.kind {
             BindingKind::Storage => binding.stride.to_string(),
             BindingKind::Texels => "T".to_owned(),
+            BindingKind::TexelStores => "S".to_owned(),
             BindingKind::Floats => "F".to_owned(),
         };
         match &binding.element {
@@ -177,16 +179,11 @@ void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
         .unwrap();
     gpu.run(|rec| rec.dispatch_groups(&kernel, &[&from, &to], &(), 3));
     assert_eq!(to.read::<u32>(words.len()).unwrap(), words);
-    // tiles_splat.comp reads the second of a Particle's three texels and the last half of a Lit,
-    // and writes a Splat by fours.
-    let texels = [
-        size_of::<PlacedRecord>(),
-        size_of::<ParticleRecord>(),
-        size_of::<LitRecord>(),
-        size_of::<SplatRecord>(),
-    ];
-    assert_eq!(texels, [16, 48, 64, 32]);
-    assert!(text_of("tiles_splat.comp").contains("TEXEL(particles, int(3 * i + 1))"));
+    // tiles_splat.comp reads the last half of a Lit, and stores a Splat by two texels and a
+    // SplatTexture by three.
+    let texels =
+        [size_of::<LitRecord>(), size_of::<SplatRecord>(), size_of::<SplatTextureRecord>()];
+    assert_eq!(texels, [64, 32, 48]);
     assert!(text_of("tiles_splat.comp").contains("TEXEL(lit, 4 * facet + 2)"));
     let gather = text_of("include/gather.glsl");
     for (record, n_texels) in [
@@ -198,6 +195,79 @@ void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
         let stride = first.rsplit_once("* ").unwrap().1.split(';').next().unwrap();
         assert_eq!(stride.parse(), Ok(n_texels), "{record}");
     }
+}
+
+/// Particles and their places are read and stored by texels. The test reads them by the shaders'
+/// own functions and writes them as records, stores others, and compares every word.
+#[test]
+fn particles_by_texels_equal_their_records() {
+    let mut gpu = Gpu::new();
+    let text = r#"#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "particles.glsl"
+layout(local_size_x = 1) in;
+TEXELS(0, placed)
+TEXELS(1, particles)
+WRITES(2, Placed, placed_records)
+WRITES(3, Particle, records)
+void main() {
+    uint i = gl_WorkGroupID.x;
+    placed_records[i] = PLACED_AT(i);
+    records[i] = PARTICLE_AT(i);
+}
+"#;
+    let reads = gpu.test_kernel("reads", text, &[]);
+    const N: usize = 3;
+    // Normal floats keep their bits where the shader takes words for floats.
+    let number = |i: usize, k: usize| (100 * i + k) as f32 + 1.0;
+    let place = |i| PlacedRecord { position: [0, 1, 2].map(|k| number(i, k)), sigma: number(i, 3) };
+    let particle = |i| ParticleRecord {
+        position: [4, 5, 6].map(|k| number(i, k)),
+        sigma: number(i, 7),
+        color: [8, 9, 10].map(|k| number(i, k)),
+        kappa: number(i, 11),
+        aspect: number(i, 12),
+        aspect_z: number(i, 13),
+        turn: [14, 15].map(|k| number(i, k).to_bits()),
+    };
+    let (places, particles): (Vec<_>, Vec<_>) = (0..N).map(|i| (place(i), particle(i))).unzip();
+    let from = [gpu.upload(&places), gpu.upload(&particles)];
+    let to = [gpu.buffer::<PlacedRecord>(N), gpu.buffer::<ParticleRecord>(N)];
+    let all = [&from[0], &from[1], &to[0], &to[1]];
+    gpu.run(|rec| rec.dispatch_groups(&reads, &all, &(), N as u32));
+    assert_eq!(gpu.download::<PlacedRecord>(&to[0], N), places);
+    assert_eq!(gpu.download::<ParticleRecord>(&to[1], N), particles);
+
+    let text = r#"#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "particles.glsl"
+layout(local_size_x = 1) in;
+READS(0, Particle, records)
+TEXEL_STORES(1, placed)
+TEXEL_STORES(2, particles)
+void main() {
+    uint i = gl_WorkGroupID.x;
+    Particle of = records[i];
+    STORE_PLACED(i, of.position, of.sigma);
+    STORE_BALL(i, of.position, of.sigma, of.kappa);
+}
+"#;
+    let stores = gpu.test_kernel("stores", text, &[]);
+    gpu.run(|rec| rec.dispatch_groups(&stores, &[&from[1], &to[0], &to[1]], &(), N as u32));
+    let placed = |p: &ParticleRecord| PlacedRecord { position: p.position, sigma: p.sigma };
+    let ball = |p: &ParticleRecord| ParticleRecord {
+        color: [1.0; 3],
+        aspect: 1.0,
+        aspect_z: 1.0,
+        turn: [0; 2],
+        ..*p
+    };
+    let placed: Vec<_> = particles.iter().map(placed).collect();
+    let balls: Vec<_> = particles.iter().map(ball).collect();
+    assert_eq!(gpu.download::<PlacedRecord>(&to[0], N), placed);
+    assert_eq!(gpu.download::<ParticleRecord>(&to[1], N), balls);
 }
 
 fn text_of(name: &str) -> &'static str {
@@ -250,6 +320,9 @@ fn shared_constants_have_one_value() {
         ("include/tiles.glsl", "BLOCK", f64::from(tiles::BLOCK)),
         ("include/tiles.glsl", "TILES_ACROSS", f64::from(tiles::TILES_ACROSS)),
         ("tiles.comp", "RUN", f64::from(tiles::RUN)),
+        ("include/lod.glsl", "RUN", f64::from(nimbus::model::lod::RUN)),
+        ("include/lod.glsl", "CLASSES_PER_OCTAVE", lod::CLASSES_PER_OCTAVE),
+        ("include/lod.glsl", "CELLS_PER_AXIS", f64::from(lod::CELLS_PER_AXIS)),
         ("include/upsample.glsl", "ALIKE", nimbus::model::resolution::ALIKE),
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
@@ -300,9 +373,9 @@ fn wrong_declarations_are_reported() {
         (
             "place.comp",
             RECORDS,
-            "struct Placed { vec3 position; float sigma;",
-            "float sigma",
-            "float s",
+            "struct Mode { vec3 k; float phase; vec3 a; uint unused;",
+            "uint unused",
+            "uint padding",
         ),
         ("place.comp", RECORDS, "struct Group { vec3 offset; uint i_region;", "uint i_region;", ""),
         (

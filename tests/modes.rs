@@ -271,7 +271,8 @@ fn a_still_scene_skips_and_a_moving_one_does_not() {
         .map(|p| p.name())
         .filter(|p| {
             let others = ["live", "contract", "texture", "terrain", "impostors", "sprites"];
-            !others.contains(p) && !["upsample", "diffusion", "scatter"].contains(p)
+            let unused = ["upsample", "diffusion", "scatter", "harmonics", "lod"];
+            !others.contains(p) && !unused.contains(p)
         })
         .collect();
     assert_eq!(moving, all);

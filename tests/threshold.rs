@@ -224,7 +224,7 @@ fn faulty_shaders_exceed_the_bounds() {
         (Way::Sprites, "sprites.vert", "if (THRESHOLD != 0) {", "if (THRESHOLD > 1) {"),
         (Way::Sprites, "sprites.frag", "lowest = in_lowest", "lowest = 1.02 * in_lowest"),
         (tiled, "tiles_splat.comp", "sqrt(2.0 * cut)", "sqrt(1.5 * cut)"),
-        (tiled, "tiles_pairs.comp", "log2(splats[r].tau", "0.7 * log2(splats[r].tau"),
+        (tiled, "tiles_pairs.comp", "log2(splat.w", "0.7 * log2(splat.w"),
         (tiled, "tiles.comp", "max(log2(uintBits", "max(0.98 * log2(uintBits"),
         (tiled, "tiles.comp", "max(min_exponent, -cut)", "min(min_exponent, -cut)"),
         // A blob's least reach.

@@ -2,6 +2,7 @@
 // Needs records.glsl.
 
 #include "key.glsl"
+#include "particles.glsl"
 
 layout(push_constant) uniform Push {
     // The camera's forward axis, or the eye.
@@ -13,10 +14,10 @@ layout(push_constant) uniform Push {
     // Distance of the eye from the lighting origin; negative where depths are view depths.
     float eye_distance;
 } push;
-READS(0, Placed, placed)
+TEXELS(0, placed)
 
 uint key_at(uint i) {
-    vec3 p = placed[i].position;
+    vec3 p = PLACED_AT(i).position;
     float z = dot(push.from, p);
     if (push.eye_distance >= 0.0) {
         // |p - e| - |e|, but small differences of great distances keep their accuracy.

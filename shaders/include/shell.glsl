@@ -1,13 +1,15 @@
 // The facet on a blob's shell (passes.md "facets"). Needs
 // records.glsl and functions.glsl.
 
+#include "particles.glsl"
+
 layout(push_constant) uniform Push {
     Grid grid;
     uint n_facets;
     uint i_first_facet;
 } push;
-READS(0, Placed, placed)
-READS(1, Particle, particles)
+TEXELS(0, placed)
+TEXELS(1, particles)
 READS(2, uint, i_group)
 READS(3, Group, groups)
 FLOATS(4, density)
@@ -46,10 +48,10 @@ struct Form {
 
 Form upright_form(float aspect) { return Form(vec3(1.0, aspect, 1.0), mat3(1.0)); }
 
-Form form_of(uint i) {
+Form form_of(Particle particle) {
     vec3 y, z;
-    axes_of(particles[i].turn, y, z);
-    return Form(vec3(1.0, particles[i].aspect, particles[i].aspect_z), mat3(cross(y, z), y, z));
+    axes_of(particle.turn, y, z);
+    return Form(vec3(1.0, particle.aspect, particle.aspect_z), mat3(cross(y, z), y, z));
 }
 
 float volume_of(Form form) { return form.lengths.y * form.lengths.z; }
@@ -60,7 +62,7 @@ struct Form {
 
 Form upright_form(float aspect) { return Form(aspect); }
 
-Form form_of(uint i) { return Form(particles[i].aspect); }
+Form form_of(Particle particle) { return Form(particle.aspect); }
 
 float volume_of(Form form) { return form.aspect; }
 #endif

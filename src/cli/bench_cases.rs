@@ -43,7 +43,7 @@ pub fn bench_cases(args: &BenchArgs, path: &Path, options: &SceneArgs) -> Result
     };
     let axes = axes(args)?;
     check_cases("--sweep", axes.iter().map(|axis| axis.values.len()))?;
-    let mut memory = SceneMemory::default();
+    let mut memory = SceneMemory::of_machine();
     let loops = LoopChoice { modes, skip: !options.no_skip, saved: !args.no_saved };
     let loaded = load(path, options)?;
     let (scene_hash, resolved) = (loaded.hash.clone(), loaded.resolved.clone());

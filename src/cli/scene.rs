@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::args::SceneArgs;
+use super::progress::spinner;
 use crate::error::{Error, Result};
 use crate::frame::limits::{self, advice};
 use crate::frame::{DeviceChoice, DrawnFrame, GpuContext, Stage, light_notes, unseen};
@@ -44,8 +45,10 @@ pub fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
 /// # Errors
 /// Fails if the scene or a file that it names is faulty.
 pub fn load_with_files(path: &Path, args: &SceneArgs) -> Result<(LoadedScene, Vec<PathBuf>)> {
+    let reading = spinner("reading", args.quiet);
     let (loaded, files) =
         scene_file::load_and_list(path, &typed_overrides(&args.set, args.size), args.seed);
+    drop(reading);
     let loaded = loaded?;
     print_warnings(&loaded, args.quiet);
     Ok((loaded, files))

@@ -1,7 +1,7 @@
 //! The buffers that passes share.
 
 use super::features::{
-    has_bounces, has_diffusion, has_second, has_slopes, is_grouped, is_lit, is_medium,
+    colored_runs, has_bounces, has_diffusion, has_second, has_slopes, is_grouped, is_lit, is_medium,
 };
 use super::packet::Packet;
 use super::staging::StagedBuffer;
@@ -11,6 +11,7 @@ use crate::layout::cull::KeptRecord;
 use crate::layout::diffusion::N_PATCHES;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord, SlopeRecord};
 use crate::layout::frame::LightRecord;
+use crate::layout::harmonics::n_texels;
 use crate::layout::medium::MediumRecord;
 use crate::layout::particle::{
     BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, TexturedRecord,
@@ -22,6 +23,7 @@ use crate::model::material::Material;
 use crate::model::scene::Scene;
 use crate::passes::blobs::BlobBuffers;
 use crate::passes::diffusion::Room;
+use crate::passes::harmonics::Colored;
 use crate::passes::texture::POOL_TEXELS;
 
 buffers! {
@@ -32,13 +34,14 @@ buffers! {
         /// Group by particle.
         i_group: Buffer => u32, scene.n_particles(), "generate.i_group";
         /// Particles relative to their groups.
-        particles: Buffer => ParticleRecord, scene.n_particles(), "generate.particles";
+        particles: Buffer => ParticleRecord, scene.n_particles(), "generate.particles",
+            TexelStores;
         /// Attempts by particle, and whether it was folded back.
         status: Buffer => u32, scene.n_particles(), "generate.status";
         groups: StagedBuffer => GroupRecord, n_groups(scene), "place.groups";
         /// Gusts of all clouds.
         modes: StagedBuffer => ModeRecord, n_modes(scene), "place.modes";
-        placed: Buffer => PlacedRecord, scene.n_particles(), "place.placed";
+        placed: Buffer => PlacedRecord, scene.n_particles(), "place.placed", TexelStores;
         /// Extinction by cell.
         density: Buffer => f32, n_cells(scene), "grid.density", Floats;
         facets: Buffer => FacetRecord, scene.n_facets(), "facets.facets";
@@ -81,6 +84,9 @@ buffers! {
         /// Texture by group.
         textured: Buffer => TexturedRecord, n_if(scene.is_textured(), n_groups(scene)),
             "texture.groups";
+        /// Coefficients of harmonics of the particles that have some.
+        harmonics: Buffer => [f32; 4], n_harmonic_texels(scene), "harmonics.coefficients",
+            TexelStores;
         /// Texels of the pool of textures.
         pool: Buffer => [u32; 4], n_if(scene.is_textured(), POOL_TEXELS.into()),
             "texture.pool", Texels;
@@ -133,6 +139,11 @@ fn n_if(is_used: bool, n: u64) -> u64 {
 
 fn n_groups(scene: &Scene) -> u64 {
     scene.clouds.iter().map(|c| c.n_groups()).sum()
+}
+
+fn n_harmonic_texels(scene: &Scene) -> u64 {
+    let of_run = |run: &Colored| u64::from(run.n_particles) * u64::from(n_texels(run.degree));
+    colored_runs(scene).iter().map(of_run).sum()
 }
 
 fn n_modes(scene: &Scene) -> u64 {

@@ -5,12 +5,14 @@ use crate::gpu::TargetFormat;
 use crate::model::cloud::{Cloud, CloudSource, Group, SQRT_TAU};
 use crate::model::disc::Disc;
 use crate::model::film::FilmFormat;
+use crate::model::lod::RUN;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{
     Cull, DrawPath, Gather, Impostors, LightingMode, Overlap, Scene, Simulate,
 };
 use crate::passes::blobs::BlobVariant;
 use crate::passes::blobs::THIN;
+use crate::passes::harmonics::Colored;
 
 /// Properties of a scene in which no knob is "auto".
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +37,10 @@ pub struct SceneFeatures {
     pub is_grouped: bool,
     /// Some cloud has a texture.
     pub is_textured: bool,
+    /// Blobs stand for others.
+    pub has_lod: bool,
+    /// Some colours change with the direction of view.
+    pub has_harmonics: bool,
     /// Number of surfaces.
     pub n_surfaces: u32,
     /// Number of terrains.
@@ -87,6 +93,8 @@ impl SceneFeatures {
             has_diffusion: has_diffusion(scene),
             is_grouped: is_grouped(scene),
             is_textured: scene.is_textured(),
+            has_lod: has_lod(scene),
+            has_harmonics: !colored_runs(scene).is_empty(),
             n_surfaces: scene.surfaces.len() as u32,
             n_terrains: scene.terrains.len() as u32,
             is_glossy: has_glossy(scene) || is_medium(scene),
@@ -140,6 +148,28 @@ pub fn has_slopes(scene: &Scene) -> bool {
 /// Returns whether lit facets stand for several particles.
 pub fn is_grouped(scene: &Scene) -> bool {
     is_lit(scene) && scene.groups_facets()
+}
+
+/// Returns whether blobs stand for others.
+pub fn has_lod(scene: &Scene) -> bool {
+    scene.draw.lod > 0.0 && scene.n_particles() > 0
+}
+
+/// Returns the particles whose colours change with the direction of view: none where light decides
+/// what they show.
+pub fn colored_runs(scene: &Scene) -> Vec<Colored> {
+    if is_lit(scene) {
+        return vec![];
+    }
+    let run = |g: &Group| match &scene.clouds[g.i_cloud].source {
+        CloudSource::Particles(list) => list.harmonics().map(|of| Colored {
+            i_first: g.i_first,
+            n_particles: g.n_particles,
+            degree: of.degree,
+        }),
+        _ => None,
+    };
+    scene.groups().iter().filter_map(run).collect()
 }
 
 /// Returns whether distant blobs may be shown from a picture of them.
@@ -253,5 +283,11 @@ pub(super) fn tau_bound(scene: &Scene, group: &Group) -> f64 {
 /// Returns a bound of the factor on the extinction of `group` where few particles stand for all.
 pub(super) fn denser_at_most(scene: &Scene, group: &Group) -> f64 {
     let conserves = scene.draw.count.is_some_and(|c| c.conserve);
-    if conserves { f64::from(group.n_particles) } else { 1.0 }
+    let by_count = if conserves { f64::from(group.n_particles) } else { 1.0 };
+    by_count * heavier_at_most(scene)
+}
+
+/// Returns the most blobs that one stands for.
+pub(super) fn heavier_at_most(scene: &Scene) -> f64 {
+    if has_lod(scene) { (scene.n_particles() as f64).min(f64::from(RUN)) } else { 1.0 }
 }

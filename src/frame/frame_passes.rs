@@ -4,10 +4,12 @@ use super::buffers::{SceneBuffers, diffusion_room, has_levels, n_cells};
 use super::constants::FrameConstants;
 use super::culling::Culling;
 use super::features::{
-    SceneFeatures, has_bounces, has_diffusion, has_second, has_slopes, is_grouped, is_medium,
+    SceneFeatures, colored_runs, has_bounces, has_diffusion, has_second, has_slopes, is_grouped,
+    is_medium,
 };
 use super::gather::IndirectGather;
 use super::live::{LiveParticles, PlacedUploads, unmoved};
+use super::merging::Merging;
 use super::morton_sort::FacetRuns;
 use super::packet::Packet;
 use super::picture::Picture;
@@ -21,6 +23,7 @@ use crate::passes::facets::Facets;
 use crate::passes::first::First;
 use crate::passes::generate::Generate;
 use crate::passes::grid::Grid;
+use crate::passes::harmonics::{Colored, Harmonics};
 use crate::passes::place::Place;
 use crate::passes::scatter::{Scatter, ScatterVariant};
 use crate::passes::sort::Sort;
@@ -34,6 +37,10 @@ pub(super) struct FramePasses {
     pub place: Place,
     /// Places of particles that the game thread moves.
     pub placed_uploads: Option<PlacedUploads>,
+    pub harmonics: Option<Harmonics>,
+    /// The particles whose colours change with the direction of view.
+    pub colored: Vec<Colored>,
+    pub merging: Option<Merging>,
     pub grid: Grid,
     pub runs: Option<FacetRuns>,
     pub facets: Facets,
@@ -84,6 +91,7 @@ impl FramePasses {
             .transpose()?;
         let is_moved_by_host = scene.threads.simulate == Simulate::Cpu;
         let sums = scene.lighting.sums.into();
+        let colored = colored_runs(scene);
         let passes = FramePasses {
             generate: Generate::new(device, compiler)?,
             live: LiveParticles::new(device, compiler, scene)?,
@@ -91,6 +99,11 @@ impl FramePasses {
             placed_uploads: is_moved_by_host
                 .then(|| PlacedUploads::new(device, scene))
                 .transpose()?,
+            harmonics: (!colored.is_empty())
+                .then(|| Harmonics::new(device, compiler))
+                .transpose()?,
+            colored,
+            merging: Merging::new(device, compiler, scene)?,
             grid: Grid::new(device, compiler, n_cells(scene), has_levels(scene), scene.shapes())?,
             runs,
             facets: Facets::new(device, compiler, scene.shapes(), is_medium(scene))?,

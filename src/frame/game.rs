@@ -8,7 +8,9 @@ use glam::{DVec3, Vec3};
 use tracing::info_span;
 
 use super::clock::ms;
-use super::features::{denser_at_most, has_impostors, has_live, is_glossy, tau_bound};
+use super::features::{
+    denser_at_most, has_impostors, has_live, heavier_at_most, is_glossy, tau_bound,
+};
 use super::live::{disc_records, live_particles};
 use super::media::{self, KeptMedium};
 use super::packet::Packet;
@@ -25,6 +27,7 @@ use crate::model::frame_state::FrameState;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::gust::Mode;
 use crate::model::gust_lanes::{LANES, Lanes, Waves};
+use crate::model::lod::widened;
 use crate::model::material::{Brdf, Material};
 use crate::model::overlap::slice_length;
 use crate::model::scene::Scene;
@@ -184,6 +187,7 @@ impl Game {
                 .collect(),
             grid: GridRecord::from(&setting.grid),
             heaviest,
+            sigma_max: grown.iter().map(Group::sigma_widest).fold(0.0, f64::max),
             n_levels: setting.grid.n_used_levels(self.scene.n_particles(), widest),
             radius: setting.radius,
             sort_bits: self.sort_bits(&grown, setting.radius),
@@ -211,7 +215,7 @@ impl Game {
             .filter(|_| self.scene.is_animated())
             .map_or(0.0, |all| all.iter().map(mass_of).fold(0.0, f64::max));
         let scale = groups.iter().map(|g| g.scale.powi(3)).fold(1.0, f64::max);
-        max_blob_mass(groups).max(scale * moved)
+        heavier_at_most(&self.scene) * max_blob_mass(groups).max(scale * moved)
     }
 
     /// Returns the bits of a sort key.
@@ -242,7 +246,7 @@ impl Game {
         let of = |g: &Group| Extent {
             center: origins[g.i_cloud] + g.center,
             half: g.half_extent + DVec3::splat(g.gust_reach),
-            sigma_max: g.sigma_widest(),
+            sigma_max: widened(g.sigma_widest(), self.scene.draw.lod),
             sigma_mean: g.sigma_mean * g.aspects[0].min(1.0),
             reach: self.scene.draw.edge().reach(tau_of_group(g)),
             n_particles: g.n_particles,

@@ -5,6 +5,7 @@
 //! are sums over the layers of a pixel, which one draw call adds up by blending.
 
 use super::features::{blob_variant, has_second, is_lit};
+use super::merging::drawn;
 use super::packet::Packet;
 use super::plan::{Pass, Plan};
 use super::readback::floats;
@@ -18,7 +19,7 @@ use crate::layout::facet::LitRecord;
 use crate::model::layers::Layers;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{DrawPath, Impostors, Scene};
-use crate::passes::blobs::BlobCount;
+use crate::passes::blobs::{BlobBuffers, BlobCount};
 use crate::passes::sprites::{SUMS_FORMAT, Sprites};
 
 /// Greatest number of a 24-bit depth.
@@ -109,6 +110,8 @@ impl Renderer {
     ) -> Result<Sums> {
         let Renderer { host, passes, .. } = self;
         let (c, b, picture) = (&passes.constants, &passes.buffers, &mut passes.picture);
+        let [placed, particles] = drawn(&passes.merging, b);
+        let blobs = BlobBuffers { placed, particles, ..b.of_blobs() };
         let [width, height] = c.size;
         let n_pixels = u64::from(width) * u64::from(height);
         let has_depth = scene.has_solids();
@@ -125,7 +128,7 @@ impl Renderer {
         let view = c.view(&packet.camera, packet);
         host.run(|rec| {
             let target = Target { color: &mut color, depth: picture.full.depth() };
-            sprites.record(rec, &b.of_blobs(), (target, LoadOp::ClearColor), &view, count)?;
+            sprites.record(rec, &blobs, (target, LoadOp::ClearColor), &view, count)?;
             rec.copy_image(&mut color, &of_blobs);
             picture.full.record_copy_solids(rec, picture.i, None, &of_solids);
             Ok(())

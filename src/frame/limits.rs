@@ -5,14 +5,15 @@ use glam::DVec3;
 
 use super::buffers::{SceneBuffers, diffusion_room, has_levels, n_cells};
 use super::culling::Culling;
-use super::features::{has_bounces, has_second, is_grouped, is_lit};
+use super::features::{has_bounces, has_lod, has_second, is_grouped, is_lit};
 use super::gather::IndirectGather;
 use super::live;
+use super::merging::Merging;
 use super::morton_sort::FacetRuns;
 use super::picture::Picture;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferSpec, Limits};
-use crate::model::cloud::Group;
+use crate::model::cloud::{Cloud, CloudSource, Group};
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Draw, Scene};
@@ -89,6 +90,7 @@ fn specs(scene: &Scene) -> Vec<BufferSpec> {
         diffusion_room(&exact).map_or(vec![], diffusion::specs),
         when(is_grouped(&exact), FacetRuns::specs),
         when(has_second(&exact), IndirectGather::specs),
+        when(has_lod(&exact), Merging::specs),
         Culling::specs(&exact),
         sort::Scratch::specs_of_bytes(exact.n_particles()),
         when(exact.is_textured(), |_| texture::Scratch::specs()),
@@ -124,7 +126,20 @@ pub fn n_deposits(scene: &Scene) -> f64 {
 /// Returns sentences about a demanding scene for the user to read before it runs; none for most
 /// scenes.
 pub fn advice(scene: &Scene) -> Vec<String> {
-    [grid_advice(scene), bounce_advice(scene), ground_advice(scene)].into_iter().flatten().collect()
+    let all = [grid_advice(scene), bounce_advice(scene), ground_advice(scene), color_advice(scene)];
+    all.into_iter().flatten().collect()
+}
+
+fn color_advice(scene: &Scene) -> Option<String> {
+    let has_harmonics = |cloud: &Cloud| match &cloud.source {
+        CloudSource::Particles(list) => list.harmonics().is_some(),
+        _ => false,
+    };
+    (is_lit(scene) && scene.clouds.iter().any(has_harmonics)).then(|| {
+        "light falls on the mean colours of the splats; those that change with the view (f_rest) \
+         are drawn with lighting.mode = \"none\""
+            .to_owned()
+    })
 }
 
 fn ground_advice(scene: &Scene) -> Option<String> {

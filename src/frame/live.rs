@@ -67,7 +67,8 @@ buffers! {
 buffers! {
     /// Staging buffers of particles that the game thread recomputes.
     pub(super) struct LiveUploads(scene: &Scene) {
-        particles: UploadBuffers => ParticleRecord, scene.n_particles(), "live.upload";
+        particles: UploadBuffers => ParticleRecord, scene.n_particles(), "live.upload",
+            TexelStores;
     }
 }
 

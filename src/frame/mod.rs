@@ -27,6 +27,7 @@ pub mod limits;
 mod live;
 mod low_res;
 mod media;
+mod merging;
 mod morton_sort;
 mod packet;
 pub mod parallel;

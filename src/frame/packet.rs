@@ -57,6 +57,8 @@ pub struct Packet {
     pub grid: GridRecord,
     /// Bound of every blob's mass κ (2π)^{3/2} σ³.
     pub heaviest: f64,
+    /// Bound of every particle's σ.
+    pub sigma_max: f64,
     /// Number of grids that any blob may be deposited on ([`GridSpec::n_levels`]).
     ///
     /// [`GridSpec::n_levels`]: crate::model::grid::GridSpec::n_levels

@@ -1,13 +1,15 @@
 //! Records that never change during a run, and their upload.
 
 use super::buffers::SceneBuffers;
-use super::features::is_lit;
-use super::staging::upload;
+use super::features::{colored_runs, is_lit};
+use super::staging::{per_upload, upload, upload_parts};
 use crate::error::Result;
 use crate::gpu::{Commands, Device};
 use crate::layout::facet::{FacetRecord, LitRecord};
+use crate::layout::harmonics::{n_texels, push_texels};
 use crate::layout::particle::{BoxRecord, ParticleRecord, TexturedRecord};
 use crate::model::cloud::{CloudSource, Group};
+use crate::model::particle_list::ParticleList;
 use crate::model::scene::Scene;
 
 /// Fills the buffers whose content never changes: boxes, each particle's group, listed particles,
@@ -34,7 +36,21 @@ pub(super) fn fill(
     if !is_lit(scene) {
         upload(device, commands, &unlit_records(scene), &b.lit)?;
     }
-    upload(device, commands, &listed_particles(scene, groups), &b.particles)
+    for group in groups {
+        if let CloudSource::Particles(list) = &scene.clouds[group.i_cloud].source {
+            let i_first = group.i_first.into();
+            upload_parts(device, commands, listed_records(list, group), &b.particles, i_first)?;
+        }
+    }
+    let mut i_texel = 0;
+    for run in colored_runs(scene) {
+        let group = groups.iter().find(|g| g.i_first == run.i_first && g.n_particles > 0);
+        let cloud = group.map(|g| &scene.clouds[g.i_cloud].source);
+        let Some(CloudSource::Particles(list)) = cloud else { continue };
+        upload_parts(device, commands, harmonic_texels(list), &b.harmonics, i_texel)?;
+        i_texel += u64::from(run.n_particles) * u64::from(n_texels(run.degree));
+    }
+    Ok(())
 }
 
 /// Uploads the boxes and textures of `groups`.
@@ -106,15 +122,29 @@ fn textured_records(scene: &Scene, groups: &[Group]) -> Vec<TexturedRecord> {
     clouds.flat_map(|boxes| boxes.iter().zip(0u32..).map(record)).collect()
 }
 
-/// Returns the particles that come from lists at their places, and zeros for generated ones; empty
-/// without lists.
-fn listed_particles(scene: &Scene, groups: &[Group]) -> Vec<ParticleRecord> {
-    let mut records = Vec::new();
-    for group in groups {
-        if let CloudSource::Particles(list) = &scene.clouds[group.i_cloud].source {
-            records.resize(group.i_first as usize, ParticleRecord::default());
-            records.extend(list.iter().map(|p| ParticleRecord::new(p, group)));
+/// Returns the records of the particles of a list, in parts of an upload.
+fn listed_records<'a>(
+    list: &'a ParticleList,
+    group: &'a Group,
+) -> impl Iterator<Item = Vec<ParticleRecord>> + 'a {
+    let n = per_upload::<ParticleRecord>();
+    let mut rest = list.iter();
+    std::iter::from_fn(move || {
+        let part: Vec<_> = rest.by_ref().take(n).map(|p| ParticleRecord::new(p, group)).collect();
+        (!part.is_empty()).then_some(part)
+    })
+}
+
+/// Returns the texels of a list's harmonics, in parts of an upload.
+fn harmonic_texels(list: &ParticleList) -> impl Iterator<Item = Vec<[f32; 4]>> + '_ {
+    let degree = list.harmonics().map_or(0, |of| of.degree);
+    let n = per_upload::<[f32; 4]>() / n_texels(degree) as usize;
+    let by_particle = list.harmonics().map_or(&[][..], |of| &of.by_particle);
+    list.chunks(n).zip(by_particle.chunks(n)).map(move |(particles, coefficients)| {
+        let mut texels = Vec::with_capacity(n_texels(degree) as usize * particles.len());
+        for (p, of) in particles.iter().zip(coefficients) {
+            push_texels(&mut texels, of, p.kappa, degree);
         }
-    }
-    records
+        texels
+    })
 }

@@ -7,6 +7,7 @@ use super::buffers::SceneBuffers;
 use super::culling::{cull_view, key_depths};
 use super::frame_passes::FramePasses;
 use super::live::LiveParticles;
+use super::merging::drawn;
 use super::morton_sort::{FacetRuns, KEY_BITS, MortonBuffers, MortonSort, RunBuffers};
 use super::packet::Packet;
 use super::plan::{Pass, Plan};
@@ -80,6 +81,7 @@ impl FramePasses {
         let SceneBuffers {
             boxes, i_group, particles, status, groups, modes, placed, density, ..
         } = &self.buffers;
+        let coefficients = &self.buffers.harmonics;
         let n = c.n_particles;
         pass(rec, plan, Pass::Generate, |rec| {
             generate.record(rec, [boxes, i_group, particles, status], [0, n], MAX_ATTEMPTS)
@@ -104,6 +106,16 @@ impl FramePasses {
                 place.record(rec, &PlaceBuffers { particles, i_group, groups, modes, placed }, n)
             }
         })?;
+        pass(rec, plan, Pass::Harmonics, |rec| {
+            let all = [placed, coefficients, particles];
+            let mut harmonics = self.harmonics.iter();
+            harmonics.try_for_each(|h| h.record(rec, all, packet.camera.eye, &self.colored))
+        })?;
+        pass(rec, plan, Pass::Lod, |rec| {
+            let mut merging = self.merging.iter();
+            merging.try_for_each(|m| m.record(rec, &self.buffers, n, packet.sigma_max))
+        })?;
+        let [placed, particles] = drawn(&self.merging, &self.buffers);
         pass(rec, plan, Pass::Grid, |rec| {
             let Packet { grid: of, heaviest, n_levels, .. } = packet;
             let deposit =
@@ -164,8 +176,11 @@ impl FramePasses {
         packet: &Packet,
         plan: &Plan,
     ) -> Result<()> {
-        let FramePasses { culling, sort, texture, picture, buffers: b, constants: c, .. } = self;
-        let SceneBuffers { placed, particles, i_group, drawn, entries, kept, .. } = &*b;
+        let FramePasses {
+            merging, culling, sort, texture, picture, buffers: b, constants: c, ..
+        } = self;
+        let [placed, particles] = drawn(merging, b);
+        let SceneBuffers { i_group, drawn, entries, kept, .. } = &*b;
         let (blob_camera, blob_size) = picture.blob_camera(&packet.camera, c);
         let depths = key_depths(packet, c);
         pass(rec, plan, Pass::Cull, |rec| {
@@ -206,7 +221,8 @@ impl FramePasses {
             RecordCount::Known(packet.n_drawn)
         };
         let count = BlobCount { n, i_first_facet: c.n_solid_facets };
-        let (view, all) = (c.view(camera, packet), b.of_blobs());
+        let view = c.view(camera, packet);
+        let all = BlobBuffers { placed, particles, ..b.of_blobs() };
         pass(rec, plan, Pass::Impostors, |rec| {
             match (&mut picture.impostors, picture.full.target(i)) {
                 (Some(impostors), Some(target)) => {

@@ -6,7 +6,7 @@ use std::ops::Deref;
 use bytemuck::Pod;
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, DeclaredBuffer, Device, MemoryUsage, Recorder};
+use crate::gpu::{BindingKind, Buffer, Commands, DeclaredBuffer, Device, MemoryUsage, Recorder};
 
 /// The most frames on the device at once: one executing, one recorded and ready.
 pub const IN_FLIGHT: usize = 2;
@@ -15,9 +15,16 @@ fn pair<T: Pod>(
     device: &Device,
     name: &str,
     n: u64,
+    texels: Option<BindingKind>,
     place: MemoryUsage,
 ) -> Result<[Buffer; IN_FLIGHT]> {
-    let buffer = |i: usize| Buffer::new::<T>(device, &format!("{name}.{i}"), n, place);
+    let buffer = |i: usize| {
+        let name = format!("{name}.{i}");
+        match texels {
+            Some(BindingKind::TexelStores) => Buffer::of_texels::<T>(device, &name, n, place),
+            _ => Buffer::new::<T>(device, &name, n, place),
+        }
+    };
     Ok([buffer(0)?, buffer(1)?])
 }
 
@@ -36,8 +43,13 @@ macro_rules! declared_pair {
         impl DeclaredBuffer for $Name {
             const N_COPIES: u64 = IN_FLIGHT as u64;
 
-            fn allocate<T: Pod>(device: &Device, name: &str, n: u64) -> Result<$Name> {
-                Ok($Name(pair::<T>(device, name, n, MemoryUsage::$place)?))
+            fn allocate<T: Pod>(
+                device: &Device,
+                name: &str,
+                n: u64,
+                texels: Option<BindingKind>,
+            ) -> Result<$Name> {
+                Ok($Name(pair::<T>(device, name, n, texels, MemoryUsage::$place)?))
             }
         }
     )*};
@@ -56,8 +68,13 @@ pub struct Staging {
 impl DeclaredBuffer for Staging {
     const N_COPIES: u64 = UploadBuffers::N_COPIES;
 
-    fn allocate<T: Pod>(device: &Device, name: &str, n: u64) -> Result<Staging> {
-        let buffers = UploadBuffers::allocate::<T>(device, &format!("{name}.upload"), n)?;
+    fn allocate<T: Pod>(
+        device: &Device,
+        name: &str,
+        n: u64,
+        texels: Option<BindingKind>,
+    ) -> Result<Staging> {
+        let buffers = UploadBuffers::allocate::<T>(device, &format!("{name}.upload"), n, texels)?;
         Ok(Staging { buffers, last: vec![], is_new: false })
     }
 }
@@ -95,10 +112,15 @@ pub struct StagedBuffer {
 impl DeclaredBuffer for StagedBuffer {
     const N_COPIES: u64 = 1 + Staging::N_COPIES;
 
-    fn allocate<T: Pod>(device: &Device, name: &str, n: u64) -> Result<StagedBuffer> {
+    fn allocate<T: Pod>(
+        device: &Device,
+        name: &str,
+        n: u64,
+        texels: Option<BindingKind>,
+    ) -> Result<StagedBuffer> {
         Ok(StagedBuffer {
-            buffer: Buffer::allocate::<T>(device, name, n)?,
-            staging: Staging::allocate::<T>(device, name, n)?,
+            buffer: Buffer::allocate::<T>(device, name, n, texels)?,
+            staging: Staging::allocate::<T>(device, name, n, texels)?,
         })
     }
 }
@@ -126,6 +148,10 @@ impl Deref for StagedBuffer {
     }
 }
 
+/// The most bytes that are uploaded at once: 10 million particles have 480 MiB, which the host need
+/// not hold twice.
+const UPLOAD_BYTES: usize = 32 << 20;
+
 /// Fills a device buffer with `data` and waits.
 pub(super) fn upload<T: Pod>(
     device: &Device,
@@ -133,16 +159,42 @@ pub(super) fn upload<T: Pod>(
     data: &[T],
     to: &Buffer,
 ) -> Result<()> {
-    if data.is_empty() {
-        return Ok(());
+    let parts = data.chunks(per_upload::<T>()).map(|part| part.to_vec());
+    upload_parts(device, commands, parts, to, 0)
+}
+
+/// Returns the most records of one upload.
+pub(super) const fn per_upload<T>() -> usize {
+    UPLOAD_BYTES / size_of::<T>()
+}
+
+/// Writes parts of at most [`per_upload`] records, one after the other, to a device buffer from
+/// record `i_first` on, and waits.
+pub(super) fn upload_parts<T: Pod>(
+    device: &Device,
+    commands: &mut Commands,
+    parts: impl Iterator<Item = Vec<T>>,
+    to: &Buffer,
+    i_first: u64,
+) -> Result<()> {
+    let mut staging: Option<Buffer> = None;
+    let mut at = i_first * size_of::<T>() as u64;
+    for part in parts.filter(|part| !part.is_empty()) {
+        let n = part.len() as u64;
+        let bytes = n * size_of::<T>() as u64;
+        let kept = staging.take().filter(|kept| kept.bytes() >= bytes);
+        let mut from = match kept {
+            Some(kept) => kept,
+            None => Buffer::new::<T>(device, "frame.staging", n, MemoryUsage::Upload)?,
+        };
+        from.write(&part)?;
+        commands.run(|rec| {
+            rec.copy_runs(&from, to, &[[0, at, bytes]]);
+            Ok(())
+        })?;
+        at += bytes;
+        staging = Some(from);
     }
-    let mut staging =
-        Buffer::new::<T>(device, "frame.staging", data.len() as u64, MemoryUsage::Upload)?;
-    staging.write(data)?;
-    commands.run(|rec| {
-        rec.copy(&staging, to);
-        Ok(())
-    })?;
     Ok(())
 }
 
@@ -153,7 +205,8 @@ pub(super) fn download<T: Pod>(
     from: &Buffer,
     n: u32,
 ) -> Result<Vec<T>> {
-    let readback = Buffer::new::<T>(device, "frame.readback", u64::from(n), MemoryUsage::Readback)?;
+    let readback =
+        Buffer::of_texels::<T>(device, "frame.readback", n.into(), MemoryUsage::Readback)?;
     commands.run(|rec| {
         rec.copy(from, &readback);
         Ok(())

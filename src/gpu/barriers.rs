@@ -57,7 +57,7 @@ impl Scope {
         let when = |is_used, stage| if is_used { stage } else { Stages::NONE };
         let runs = |shader| interface.stages.contains(shader);
         let read = match access.kind {
-            BindingKind::Storage => Accesses::SHADER_STORAGE_READ,
+            BindingKind::Storage | BindingKind::TexelStores => Accesses::SHADER_STORAGE_READ,
             BindingKind::Texels | BindingKind::Floats => Accesses::SHADER_SAMPLED_READ,
         };
         let made = |is_made, access| if is_made { access } else { Accesses::NONE };

@@ -23,28 +23,32 @@ pub enum MemoryUsage {
     Readback,
 }
 
-/// Texel formats: words of any bits, and floats. Every device reads both.
-const TEXELS: [(BindingKind, vk::Format); 2] = [
-    (BindingKind::Texels, vk::Format::R32G32B32A32_UINT),
-    (BindingKind::Floats, vk::Format::R32_SFLOAT),
-];
+/// Returns the format of texels: words of any bits, which every device reads and stores, or floats,
+/// which every device reads.
+fn format_of(kind: BindingKind) -> vk::Format {
+    match kind {
+        BindingKind::Floats => vk::Format::R32_SFLOAT,
+        _ => vk::Format::R32G32B32A32_UINT,
+    }
+}
 
 /// Bytes of the larger of the two texels.
 const MAX_TEXEL_BYTES: u64 = 16;
 
-/// A buffer that shaders read and write as records or read as texels, and that can be copied and
+/// A buffer that shaders read and write as records or as texels, and that can be copied and
 /// dispatched from.
 // Fields drop in order: views before their buffer, the buffer before its memory.
 pub struct Buffer {
-    /// A view of the whole buffer for each kind of texel; none where it has more texels than the
-    /// device reads.
-    views: [Option<Owned<vk::BufferView>>; 2],
+    /// A view of the whole buffer by words, and one by floats; none where it has more texels than
+    /// the device reads.
+    words: Option<Owned<vk::BufferView>>,
+    floats: Option<Owned<vk::BufferView>>,
     handle: Owned<vk::Buffer>,
     memory: Memory,
     bytes: u64,
     /// The bytes that shaders see: whole texels, and the guard band on a device that has them.
     shader_bytes: u64,
-    max_texels: u64,
+    limits: Limits,
     name: String,
 }
 
@@ -56,16 +60,39 @@ impl Buffer {
     /// The size breaks a limit of the device, or its memory is used up.
     pub fn new<T: Pod>(device: &Device, name: &str, n: u64, usage: MemoryUsage) -> Result<Buffer> {
         let bytes = storage_bytes(device.limits(), name, n, size_of::<T>() as u64)?;
+        Buffer::of_bytes(device, name, bytes, usage)
+    }
+
+    /// Allocates a buffer that shaders read and write by texels alone, or that is only copied. It
+    /// may be larger than one of records ([`texel_bytes`]).
+    ///
+    /// # Errors
+    /// As for [`Buffer::new`].
+    pub fn of_texels<T: Pod>(
+        device: &Device,
+        name: &str,
+        n: u64,
+        usage: MemoryUsage,
+    ) -> Result<Buffer> {
+        let bytes = texel_bytes(device.limits(), name, n, size_of::<T>() as u64)?;
+        Buffer::of_bytes(device, name, bytes, usage)
+    }
+
+    fn of_bytes(device: &Device, name: &str, bytes: u64, usage: MemoryUsage) -> Result<Buffer> {
         let (shared, limits) = (device.shared(), device.limits());
         // Whole texels, so that texel reads reach the last words too.
         let mut shader_bytes = bytes.next_multiple_of(MAX_TEXEL_BYTES);
         if shared.guards.is_some() {
-            let most = limits.max_storage_buffer_bytes.min(shader_bytes + BAND_BYTES);
+            // A band must not make a buffer too large to be bound.
+            let records = limits.max_storage_buffer_bytes;
+            let bound = if shader_bytes <= records { records } else { u64::MAX };
+            let most = bound.min(limits.max_buffer_bytes).min(shader_bytes + BAND_BYTES);
             shader_bytes = shader_bytes.max(most - most % MAX_TEXEL_BYTES);
         }
         let info = vk::BufferCreateInfo::default().size(shader_bytes).usage(
             vk::BufferUsageFlags::STORAGE_BUFFER
                 | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+                | vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER
                 | vk::BufferUsageFlags::TRANSFER_SRC
                 | vk::BufferUsageFlags::TRANSFER_DST
                 | vk::BufferUsageFlags::INDIRECT_BUFFER,
@@ -86,17 +113,18 @@ impl Buffer {
         unsafe { shared.raw.bind_buffer_memory(raw, block, offset) }
             .of_call("vkBindBufferMemory", name)?;
         let max_texels = if limits.has_texel_buffers() { limits.max_texels } else { 0 };
-        let mut views = [None, None];
-        for (view, (kind, format)) in views.iter_mut().zip(TEXELS) {
-            let texel_bytes = u64::from(kind.texel_bytes());
-            if bytes.div_ceil(texel_bytes) <= max_texels {
-                let range = (shader_bytes / texel_bytes).min(max_texels) * texel_bytes;
-                let info = vk::BufferViewCreateInfo::default().buffer(raw).format(format);
-                let raw = unsafe { shared.raw.create_buffer_view(&info.range(range), None) }
-                    .of_call("vkCreateBufferView", name)?;
-                *view = Some(shared.own(raw, name, ash::Device::destroy_buffer_view));
+        let view = |kind: BindingKind| {
+            let (format, texel_bytes) = (format_of(kind), u64::from(kind.texel_bytes()));
+            if bytes.div_ceil(texel_bytes) > max_texels {
+                return Ok(None);
             }
-        }
+            let range = (shader_bytes / texel_bytes).min(max_texels) * texel_bytes;
+            let info = vk::BufferViewCreateInfo::default().buffer(raw).format(format);
+            let view = unsafe { shared.raw.create_buffer_view(&info.range(range), None) }
+                .of_call("vkCreateBufferView", name)?;
+            Ok(Some(shared.own(view, name, ash::Device::destroy_buffer_view)))
+        };
+        let (words, floats) = (view(BindingKind::Texels)?, view(BindingKind::Floats)?);
         if let Some(guards) = &shared.guards
             && let Some(mapped) =
                 memory.mapped_mut().and_then(|m| m.get_mut(..shader_bytes as usize))
@@ -104,33 +132,45 @@ impl Buffer {
             guards.watch(raw, name, mapped, bytes as usize);
         }
         let name = name.to_owned();
-        Ok(Buffer { views, handle, memory, bytes, shader_bytes, max_texels, name })
+        let limits = *limits;
+        Ok(Buffer { words, floats, handle, memory, bytes, shader_bytes, limits, name })
     }
 
     pub(super) fn raw(&self) -> vk::Buffer {
         self.handle.raw
     }
 
-    /// Returns the view by which shaders read the buffer as texels; null for records.
+    /// Returns the view by which shaders read or store the buffer as texels; null for records.
     pub(super) fn texels(&self, kind: BindingKind) -> Result<vk::BufferView> {
-        let Some(i) = TEXELS.iter().position(|(k, _)| *k == kind) else {
-            return Ok(vk::BufferView::null());
+        let view = match kind {
+            BindingKind::Storage => return Ok(vk::BufferView::null()),
+            BindingKind::Texels | BindingKind::TexelStores => &self.words,
+            BindingKind::Floats => &self.floats,
         };
-        self.views[i].as_ref().map(|view| view.raw).ok_or_else(|| {
+        view.as_ref().map(|view| view.raw).ok_or_else(|| {
             Error::limit(format!(
                 "{}: {} bytes are to be read by {}, this device takes {} such texels at most \
                  (maxTexelBufferElements)",
                 self.name,
                 self.bytes,
                 kind.texel_bytes(),
-                self.max_texels
+                self.limits.max_texels
             ))
         })
     }
 
-    /// Returns the bytes that shaders see: whole texels, and the guard band if there is one.
-    pub(super) fn shader_bytes(&self) -> u64 {
-        self.shader_bytes
+    /// Returns what shaders read and write as records: whole texels, and the guard band if there is
+    /// one.
+    pub(super) fn records(&self) -> Result<vk::DescriptorBufferInfo> {
+        if self.shader_bytes > self.limits.max_storage_buffer_bytes {
+            return Err(Error::limit(format!(
+                "{}: {} bytes are to be bound as records, this device takes {} at most \
+                 (maxStorageBufferRange)",
+                self.name, self.shader_bytes, self.limits.max_storage_buffer_bytes
+            )));
+        }
+        let (buffer, range) = (self.raw(), self.shader_bytes);
+        Ok(vk::DescriptorBufferInfo { buffer, offset: 0, range })
     }
 
     /// Returns the size in bytes, as it was asked for.
@@ -190,17 +230,42 @@ impl Drop for Buffer {
 /// # Errors
 /// The device takes fewer; the message names the limit.
 pub fn storage_bytes(limits: &Limits, name: &str, n: u64, record_bytes: u64) -> Result<u64> {
+    let most = limits.max_storage_buffer_bytes;
+    bytes_within(limits, name, [n, record_bytes], most, "maxStorageBufferRange")
+}
+
+/// Returns the bytes of a buffer of `n` records that shaders read and store by texels alone. Where
+/// the device has too few texels, shaders read records in their place.
+///
+/// # Errors
+/// As for [`storage_bytes`].
+pub fn texel_bytes(limits: &Limits, name: &str, n: u64, record_bytes: u64) -> Result<u64> {
+    if !limits.has_texel_buffers() {
+        return storage_bytes(limits, name, n, record_bytes);
+    }
+    let most = limits.max_texel_buffer_bytes(MAX_TEXEL_BYTES);
+    let limit = format!("maxTexelBufferElements {}, in bytes", limits.max_texels);
+    bytes_within(limits, name, [n, record_bytes], most, &limit)
+}
+
+fn bytes_within(
+    limits: &Limits,
+    name: &str,
+    [n, record_bytes]: [u64; 2],
+    most: u64,
+    limit: &str,
+) -> Result<u64> {
+    let Limits { max_buffer_bytes, device_memory_bytes, .. } = *limits;
+    let fitting = most.min(max_buffer_bytes).min(device_memory_bytes);
     // Shaders see whole texels, which must fit, too.
-    let most = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes);
-    let most = most - most % MAX_TEXEL_BYTES;
+    let fitting = fitting - fitting % MAX_TEXEL_BYTES;
     match n.max(1).checked_mul(record_bytes) {
-        Some(bytes) if bytes <= most => Ok(bytes.next_multiple_of(4)),
+        Some(bytes) if bytes <= fitting => Ok(bytes.next_multiple_of(4)),
         _ => Err(Error::limit(format!(
             "{name}: {n} records of {record_bytes} bytes are wanted, this device takes {} at most \
-             (maxStorageBufferRange {}, memory {} bytes)",
-            most / record_bytes,
-            limits.max_storage_buffer_bytes,
-            limits.device_memory_bytes
+             ({limit} {most}, maxBufferSize {max_buffer_bytes}, memory {device_memory_bytes} \
+             bytes)",
+            fitting / record_bytes
         ))),
     }
 }

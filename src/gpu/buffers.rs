@@ -3,7 +3,7 @@
 
 use bytemuck::Pod;
 
-use super::buffer::{Buffer, MemoryUsage, storage_bytes};
+use super::buffer::{Buffer, MemoryUsage, storage_bytes, texel_bytes};
 use super::device::Device;
 use super::limits::Limits;
 use super::reflect::BindingKind;
@@ -20,7 +20,8 @@ pub struct BufferSpec {
     pub record_bytes: u64,
     /// Buffers of this size that are allocated, staging included.
     pub n_copies: u64,
-    /// The kind of texels that shaders read it by, if any.
+    /// The kind of texels that shaders read it by, if any; [`BindingKind::TexelStores`] if they
+    /// read and store it by texels alone.
     pub texels: Option<BindingKind>,
 }
 
@@ -31,13 +32,16 @@ impl BufferSpec {
     /// Fails if one of them exceeds a limit of the device.
     pub fn bytes(&self, limits: &Limits) -> Result<u64> {
         let BufferSpec { name, n, record_bytes, n_copies, texels } = *self;
+        if texels == Some(BindingKind::TexelStores) {
+            return Ok(texel_bytes(limits, name, n, record_bytes)? * n_copies);
+        }
         let bytes = storage_bytes(limits, name, n, record_bytes)?;
-        let texel_bytes = texels.map_or(0, |kind| u64::from(kind.texel_bytes()));
-        if texel_bytes > 0 && n * record_bytes > limits.max_texel_buffer_bytes(texel_bytes) {
+        let each = texels.map_or(0, |kind| u64::from(kind.texel_bytes()));
+        if each > 0 && n * record_bytes > limits.max_texel_buffer_bytes(each) {
             return Err(Error::limit(format!(
-                "{name}: {} texels of {texel_bytes} bytes are wanted, this device takes {} at most \
+                "{name}: {} texels of {each} bytes are wanted, this device takes {} at most \
                  (maxTexelBufferElements)",
-                n * record_bytes / texel_bytes,
+                n * record_bytes / each,
                 limits.max_texels
             )));
         }
@@ -50,18 +54,34 @@ pub trait DeclaredBuffer: Sized {
     /// Buffers of the declared size that it consists of.
     const N_COPIES: u64;
 
-    /// Allocates room for `n` records of type `T`.
+    /// Allocates room for `n` records of type `T`, which shaders access by `texels`
+    /// ([`BufferSpec::texels`]).
     ///
     /// # Errors
     /// Fails if the device cannot hold it.
-    fn allocate<T: Pod>(device: &Device, name: &str, n: u64) -> Result<Self>;
+    fn allocate<T: Pod>(
+        device: &Device,
+        name: &str,
+        n: u64,
+        texels: Option<BindingKind>,
+    ) -> Result<Self>;
 }
 
 impl DeclaredBuffer for Buffer {
     const N_COPIES: u64 = 1;
 
-    fn allocate<T: Pod>(device: &Device, name: &str, n: u64) -> Result<Buffer> {
-        Buffer::new::<T>(device, name, n, MemoryUsage::Device)
+    fn allocate<T: Pod>(
+        device: &Device,
+        name: &str,
+        n: u64,
+        texels: Option<BindingKind>,
+    ) -> Result<Buffer> {
+        match texels {
+            Some(BindingKind::TexelStores) => {
+                Buffer::of_texels::<T>(device, name, n, MemoryUsage::Device)
+            }
+            _ => Buffer::new::<T>(device, name, n, MemoryUsage::Device),
+        }
     }
 }
 
@@ -69,7 +89,8 @@ impl DeclaredBuffer for Buffer {
 ///
 /// The struct gets `new`, which allocates them, and `specs`, which lists their sizes. Both evaluate
 /// the counts from the arguments that follow the struct's name. A fourth item, `Texels` or
-/// `Floats`, names the kind of texels that shaders read a buffer by.
+/// `Floats`, names the kind of texels that shaders read a buffer by; `TexelStores` says that they
+/// read and store it by texels alone.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! __buffers {
@@ -92,7 +113,12 @@ macro_rules! __buffers {
             ) -> $crate::error::Result<$name> {
                 use $crate::gpu::DeclaredBuffer;
                 Ok($name {
-                    $($field: <$Kind>::allocate::<$Record>(device, $label, $n)?),*
+                    $($field: <$Kind>::allocate::<$Record>(
+                        device,
+                        $label,
+                        $n,
+                        [$($crate::gpu::BindingKind::$texels)?].first().copied(),
+                    )?),*
                 })
             }
 

@@ -58,6 +58,7 @@ impl DescriptorPools {
         let sizes = [
             size(vk::DescriptorType::STORAGE_BUFFER, 8),
             size(vk::DescriptorType::UNIFORM_TEXEL_BUFFER, 2),
+            size(vk::DescriptorType::STORAGE_TEXEL_BUFFER, 1),
         ];
         let info =
             vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);

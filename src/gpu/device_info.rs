@@ -117,11 +117,13 @@ impl DeviceInfo {
         let mut id = vk::PhysicalDeviceIDProperties::default();
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut sizes = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
+        let mut buffers = vk::PhysicalDeviceMaintenance4Properties::default();
         let mut all = vk::PhysicalDeviceProperties2::default()
             .push_next(&mut driver)
             .push_next(&mut id)
             .push_next(&mut subgroup)
-            .push_next(&mut sizes);
+            .push_next(&mut sizes)
+            .push_next(&mut buffers);
         unsafe { vulkan.get_physical_device_properties2(physical, &mut all) };
         let properties = all.properties;
         let families = unsafe { vulkan.get_physical_device_queue_family_properties(physical) };
@@ -166,9 +168,8 @@ impl DeviceInfo {
             unusable: unusable(vulkan, physical, version, family),
             limits: Limits {
                 max_storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
-                max_storage_buffers: limits
-                    .max_per_stage_descriptor_storage_buffers
-                    .min(limits.max_descriptor_set_storage_buffers),
+                max_buffer_bytes: buffers.max_buffer_size,
+                max_storage_buffers: features::max_storage_buffers(&limits),
                 max_texels: u64::from(limits.max_texel_buffer_elements),
                 max_workgroups_x: limits.max_compute_work_group_count[0],
                 max_workgroup_invocations: limits.max_compute_work_group_invocations,

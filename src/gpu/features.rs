@@ -57,3 +57,8 @@ pub(super) fn has_present_wait(instance: &ash::Instance, physical: vk::PhysicalD
     unsafe { instance.get_physical_device_features2(physical, &mut all) };
     [id.present_id, wait.present_wait] == [vk::TRUE; 2]
 }
+
+/// Returns the most storage buffers that one stage of a pipeline with one set can bind.
+pub(super) fn max_storage_buffers(limits: &vk::PhysicalDeviceLimits) -> u32 {
+    limits.max_per_stage_descriptor_storage_buffers.min(limits.max_descriptor_set_storage_buffers)
+}

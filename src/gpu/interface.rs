@@ -28,6 +28,7 @@ impl Access {
         match self.kind {
             BindingKind::Storage => vk::DescriptorType::STORAGE_BUFFER,
             BindingKind::Texels | BindingKind::Floats => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+            BindingKind::TexelStores => vk::DescriptorType::STORAGE_TEXEL_BUFFER,
         }
     }
 }

@@ -5,6 +5,8 @@
 pub struct Limits {
     /// Bytes of one storage buffer that a shader can address.
     pub max_storage_buffer_bytes: u64,
+    /// Bytes of one buffer.
+    pub max_buffer_bytes: u64,
     /// Storage buffers that one stage of a pipeline can bind.
     pub max_storage_buffers: u32,
     /// Texels of one texel buffer.

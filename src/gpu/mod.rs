@@ -64,7 +64,7 @@ mod validation;
 
 pub use advice::no_permission;
 pub use barriers::Barriers;
-pub use buffer::{Buffer, MemoryUsage, storage_bytes};
+pub use buffer::{Buffer, MemoryUsage, storage_bytes, texel_bytes};
 pub use buffers::{BufferSpec, DeclaredBuffer, buffers};
 pub use capture::Captured;
 pub use clocks::{ClockFit, ClockSample};

@@ -314,13 +314,12 @@ impl Recorder<'_> {
         let views = bindings()
             .map(|(buffer, access)| Ok([buffer.texels(access.kind)?]))
             .collect::<Result<Vec<_>>>()?;
-        let infos: Vec<_> = buffers
-            .iter()
-            .map(|b| {
-                let (buffer, range) = (b.raw(), b.shader_bytes());
-                [vk::DescriptorBufferInfo { buffer, offset: 0, range }]
+        let infos = bindings()
+            .map(|(buffer, access)| match access.kind {
+                BindingKind::Storage => Ok([buffer.records()?]),
+                _ => Ok([vk::DescriptorBufferInfo::default()]),
             })
-            .collect();
+            .collect::<Result<Vec<_>>>()?;
         let set = self.commands.descriptors.allocate(interface.set_layout.raw)?;
         let writes: Vec<_> = (0..)
             .zip(&interface.access)

@@ -48,6 +48,8 @@ pub enum BindingKind {
     Storage,
     /// `usamplerBuffer`: reads four words at a time.
     Texels,
+    /// `uimageBuffer`: writes four words at a time.
+    TexelStores,
     /// `samplerBuffer`: reads single floats.
     Floats,
 }
@@ -57,7 +59,7 @@ impl BindingKind {
     pub fn texel_bytes(self) -> u32 {
         match self {
             BindingKind::Storage => 0,
-            BindingKind::Texels => 16,
+            BindingKind::Texels | BindingKind::TexelStores => 16,
             BindingKind::Floats => 4,
         }
     }
@@ -250,17 +252,26 @@ impl Reader<'_> {
         }
     }
 
-    /// Reflects a texel buffer: an image of dimension "buffer". The sampled type tells its texels.
+    /// Reflects a texel buffer: an image of dimension "buffer". The sampled type tells its texels,
+    /// and the operand after the dimension's three whether they are stored.
     fn texels(&self, id: u32, image: u32) -> Binding {
+        /// "Sampled" of an image that shaders store to.
+        const STORED: u32 = 2;
         let sampled = self.operand_of(image, 0);
         let is_float = sampled.is_some_and(|t| t.class.opcode == Op::TypeFloat);
-        let kind = if is_float { BindingKind::Floats } else { BindingKind::Texels };
+        let is_stored =
+            self.definition(image).is_some_and(|i| literal(i.operands.get(5)) == STORED);
+        let kind = match (is_stored, is_float) {
+            (true, _) => BindingKind::TexelStores,
+            (false, true) => BindingKind::Floats,
+            (false, false) => BindingKind::Texels,
+        };
         Binding {
             binding: self.binding(id),
             kind,
             name: self.name(id, None),
-            reads: true,
-            writes: false,
+            reads: !is_stored,
+            writes: is_stored,
             stride: kind.texel_bytes(),
             element: None,
         }

@@ -10,7 +10,7 @@ use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::cloud::{Particle, SIGMA_PER_RADIUS};
 use crate::model::scene::Scene;
 use crate::reference::Blob;
-use crate::reference::picture::{FrameReference, colors};
+use crate::reference::picture::FrameReference;
 
 /// A particle, in scene coordinates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -70,7 +70,7 @@ pub fn list_reference(scene: &Scene, i_frame: u32) -> Result<Vec<Particle>> {
         kappa: b.kappa,
         color,
     };
-    Ok(truth.blobs.iter().zip(colors(scene)).map(of).collect())
+    Ok(truth.blobs.iter().zip(truth.colors.iter().copied()).map(of).collect())
 }
 
 /// Returns a row for each particle of a scene.

@@ -23,7 +23,7 @@ pub mod image;
 pub mod input_file;
 pub mod layers;
 pub mod mapped_file;
-mod memory;
+pub mod memory;
 mod near_file;
 mod particle_digest;
 pub mod particle_file;

@@ -6,6 +6,7 @@ pub mod diffusion;
 pub mod disc;
 pub mod facet;
 pub mod frame;
+pub mod harmonics;
 pub mod medium;
 pub mod particle;
 pub mod roof;

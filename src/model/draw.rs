@@ -85,6 +85,9 @@ pub struct Draw {
     pub cull: Cull,
     /// Width in pixels of σ below which particles are left out. It needs culling.
     pub smallest: Cutoff,
+    /// Edge of the cells in which one blob stands for all of about its size, over their σ; 0 keeps
+    /// every blob.
+    pub lod: f64,
     /// Width of the sort keys.
     pub sort_bits: SortBits,
     /// Law of the number of drawn particles; `None` draws all.

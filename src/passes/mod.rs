@@ -32,8 +32,10 @@ pub mod facets;
 pub mod first;
 pub mod generate;
 pub mod grid;
+pub mod harmonics;
 pub mod impostors;
 pub mod live;
+pub mod lod;
 pub mod morton;
 pub mod place;
 pub mod present;
@@ -90,6 +92,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "grid_resolve.comp",
     "grid_spread.comp",
     "grid_turned.comp",
+    "harmonics.comp",
     "impostors.frag",
     "impostors.vert",
     "impostors_part.comp",
@@ -115,11 +118,13 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/key.glsl",
     "include/light.glsl",
     "include/lobe.glsl",
+    "include/lod.glsl",
     "include/march.glsl",
     "include/medium.glsl",
     "include/occlude.glsl",
     "include/occluders.glsl",
     "include/one_subgroup.glsl",
+    "include/particles.glsl",
     "include/patches.glsl",
     "include/philox.glsl",
     "include/pixels.glsl",
@@ -153,6 +158,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/walk.glsl",
     "include/ways.glsl",
     "live.comp",
+    "lod_key.comp",
+    "lod_merge.comp",
     "morton_key.comp",
     "morton_order.comp",
     "place.comp",

@@ -66,14 +66,16 @@ buffers! {
     struct Scratch(n_max: u64, division: Division, rounds: Rounds, variant: Variant) {
         /// Number of splats (`KeptRecord`) where the host knows it.
         known: Buffer => KeptRecord, 1, "tiles.known";
-        splats: Buffer => SplatRecord, n_max, "tiles.splats";
+        splats: Buffer => SplatRecord, n_max, "tiles.splats", TexelStores;
         /// Texture coordinates of splats.
         sheets: Buffer => SplatTextureRecord, one_unless(variant.blobs.textured, n_max),
-            "tiles.sheets";
+            "tiles.sheets", TexelStores;
         /// Shapes of ellipsoids.
-        conics: Buffer => [u32; 4], n_conics(variant.blobs.shapes, n_max), "tiles.conics";
+        conics: Buffer => [u32; 4], n_conics(variant.blobs.shapes, n_max), "tiles.conics",
+            TexelStores;
         /// Changes of the light of shaded splats.
-        shades: Buffer => [u32; 4], one_unless(variant.blobs.shaded, n_max), "tiles.shades";
+        shades: Buffer => [u32; 4], one_unless(variant.blobs.shaded, n_max), "tiles.shades",
+            TexelStores;
         reaches: Buffer => [u32; 2], n_max, "tiles.reaches";
         before: Buffer => u32, n_max, "tiles.before";
         blocks: Buffer => u32, rounds.n_blocks.into(), "tiles.blocks";

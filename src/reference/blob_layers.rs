@@ -8,10 +8,10 @@ use glam::{DVec2, DVec3};
 use super::Blob;
 use super::composite::{OpaquePixel, Rounding};
 use super::diffusion::SeenCells;
-use super::parallel::parallel_map;
 use super::shade::{SeenLight, SeenShade};
 use super::shine::Shine;
 use super::view::View;
+use crate::model::parallel::parallel_map;
 use crate::model::shade::Shade;
 
 /// A factor on τ of blob `j`, given the difference of the ray's slopes from its centre's.

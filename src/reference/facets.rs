@@ -11,9 +11,9 @@ use glam::DVec3;
 
 use super::Blob;
 use super::grid::{density, sample};
-use super::parallel::parallel_map;
 use crate::model::cloud::{SIGMA_PER_RADIUS, SQRT_TAU, Shape};
 use crate::model::grid::GridSpec;
+use crate::model::parallel::parallel_map;
 
 /// Radius of the quadrature's sphere, σ: points at √5 s integrate a Gaussian of standard deviation
 /// s = 2σ to degree 5.

@@ -8,9 +8,9 @@ use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use glam::DVec2;
 
+use crate::model::parallel::parallel_map;
 use crate::model::philox::{philox4x32_10, uniform};
 use crate::model::texture::N_FIELDS;
-use crate::reference::parallel::parallel_map;
 
 /// Philox stream "text".
 const STREAM: u32 = 0x7465_7874;

@@ -3,8 +3,10 @@
 use super::blocks::{BenchPlan, n_frames_at_least, n_rounds_at_least};
 use super::cases::Case;
 use crate::error::{Error, Result};
+use crate::io::memory;
 use crate::io::text_file::RECORD_LIMIT;
-use crate::model::cloud::CloudSource;
+use crate::model::cloud::{CloudSource, Particle};
+use crate::model::harmonics::Coefficients;
 use crate::model::scene::Scene;
 
 /// Most frames of a bench, warm-up included. A frame's record, its row and its text take about
@@ -17,7 +19,8 @@ pub const MOST_CASES: u64 = 4096;
 /// Most timed frames of a study. Each has a line of about 150 bytes in `times.csv`, all of which
 /// must fit into `TABLE_LIMIT`.
 pub const MOST_STUDY_FRAMES: u64 = 1_000_000;
-/// Most bytes of the particles that all scenes of a run hold, and of the pictures that it keeps.
+/// Most bytes of the pictures that a run keeps, and of the particles that all its scenes hold where
+/// memory is short.
 pub const MOST_BYTES: u64 = 512 << 20;
 
 /// Bytes of a loop in `run.json`, as measured: the times of all passes.
@@ -25,7 +28,9 @@ const LOOP_BYTES: u64 = 12 << 10;
 /// Bytes of a block in `run.json`.
 const BLOCK_BYTES: u64 = 100;
 /// Bytes of a particle of a list.
-const PARTICLE_BYTES: u64 = 128;
+const PARTICLE_BYTES: u64 = size_of::<Particle>() as u64;
+/// Bytes of a particle's harmonics.
+const HARMONICS_BYTES: u64 = size_of::<Coefficients>() as u64;
 
 /// Returns an error unless a sweep or a study has few enough cases. `flag` names the argument that
 /// multiplies them.
@@ -58,24 +63,35 @@ pub fn check_study(n_configurations: u64, n_rounds: u32, n_frames: u32) -> Resul
 }
 
 /// Sums what the scenes of a run hold in memory.
-#[derive(Debug, Default)]
-pub struct SceneMemory(u64);
+#[derive(Debug)]
+pub struct SceneMemory {
+    used: u64,
+    most: u64,
+}
 
 impl SceneMemory {
+    /// Returns the memory of no scene, which may grow to half of what is free.
+    pub fn of_machine() -> SceneMemory {
+        SceneMemory { used: 0, most: MOST_BYTES.max(memory::available() / 2) }
+    }
+
     /// Adds a scene.
     ///
     /// # Errors
-    /// Fails if all scenes together hold more than [`MOST_BYTES`].
+    /// Fails if all scenes together hold too much.
     pub fn add(&mut self, scene: &Scene) -> Result<()> {
         let of_list = |source: &CloudSource| match source {
-            CloudSource::Particles(list) => list.len() as u64 * PARTICLE_BYTES,
+            CloudSource::Particles(list) => {
+                let of_harmonics = list.harmonics().map_or(0, |_| HARMONICS_BYTES);
+                list.len() as u64 * (PARTICLE_BYTES + of_harmonics)
+            }
             _ => 0,
         };
-        self.0 += scene.clouds.iter().map(|cloud| of_list(&cloud.source)).sum::<u64>();
-        if self.0 > MOST_BYTES {
+        self.used += scene.clouds.iter().map(|cloud| of_list(&cloud.source)).sum::<u64>();
+        if self.used > self.most {
             return Err(Error::limit(format!(
                 "the particle lists of all cases take more than {} MiB; run the cases in parts",
-                MOST_BYTES >> 20
+                self.most >> 20
             )));
         }
         Ok(())

@@ -42,15 +42,19 @@ const WRITES: &[(Fault, &str, &str)] = &[
     (
         fault(
             "live.comp",
-            "particles[d.i_first + slot] =",
-            "particles[d.i_first + slot + push.n_particles] =",
+            "STORE_BALL(d.i_first + slot,",
+            "STORE_BALL(d.i_first + slot + push.n_particles,",
             "puff",
             &[],
         ),
         "live",
         "generate.particles",
     ),
-    (fault("place.comp", "placed[i] =", "placed[i + 1u] =", "hello", &[]), "place", "place.placed"),
+    (
+        fault("place.comp", "STORE_PLACED(i,", "STORE_PLACED(i + 1u,", "hello", &[]),
+        "place",
+        "place.placed",
+    ),
     (
         fault(
             "facets_surfaces.comp",

@@ -10,10 +10,10 @@ use nimbus::model::frame_state::FrameState;
 use nimbus::model::grid::DEPOSIT_CUT_SIGMA;
 use nimbus::model::light::Light;
 use nimbus::model::pairings::pairings;
+use nimbus::model::parallel::parallel_map;
 use nimbus::model::scene::{Gather, Scene};
 use nimbus::reference::deposit::deposit;
 use nimbus::reference::occlude::Rectangle;
-use nimbus::reference::parallel::parallel_map;
 use nimbus::reference::transmit::{Obstacles, Receiver};
 use nimbus::reference::{morton, place, sort};
 

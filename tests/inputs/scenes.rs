@@ -250,7 +250,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             },
             "draw": { "path": "tiles", "impostors": "off", "impostor_error": 0.5, "cutoff": "auto",
             "threshold": 0.0, "overlap": "thin", "slice": 1.25, "chunks": 0, "cull": "on",
-            "smallest": 0.0, "sort_bits": "auto",
+            "smallest": 0.0, "lod": 0.0, "sort_bits": "auto",
             "resolution": 1.0, "error": 1.0 / 1020.0, "count": "all", "count_a": 280.0,
             "count_d0": 1.0,
                       "count_normalised": false, "count_conserve": true, "particles": 0,

@@ -15,9 +15,9 @@ use nimbus::layout::roof;
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 use nimbus::passes::{
-    blobs, chunks, contract, cull, diffusion, facets, first, generate, grid, impostors, live,
-    morton, place, present, scatter, second, sort, sprites, surfaces, terrain, texture, tiles,
-    transmit, upsample,
+    blobs, chunks, contract, cull, diffusion, facets, first, generate, grid, harmonics, impostors,
+    live, lod, morton, place, present, scatter, second, sort, sprites, surfaces, terrain, texture,
+    tiles, transmit, upsample,
 };
 
 /// A host record: GLSL's name of it, its fields, its size.
@@ -56,7 +56,8 @@ pub const RECORDS: [Record; 27] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers.
 /// An element is a record's name or the bytes of a plain element. `T` stands for texels of four
-/// words, `F` for texels of one float, `-` for a buffer that only the other shader reads.
+/// words, `S` for those that it stores, `F` for texels of one float, `-` for a buffer that only the
+/// other shader reads.
 #[rustfmt::skip]
 pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("chunks.frag", chunks::Push::FIELDS, "T"),
@@ -64,8 +65,8 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("chunks_order.comp", chunks::OrderPush::FIELDS, "8 Kept 8 16"),
     ("contract.comp", contract::Push::FIELDS, "Facet Light T T F F 8 Lit"),
     ("cull_scan.comp", cull::ScanPush::FIELDS, "4 Kept"),
-    ("cull_test.comp", cull::TestPush::FIELDS, "Placed Particle 4 Drawn 8 4"),
-    ("cull_write.comp", blobs::KeyPush::FIELDS, "Placed 8 4 8"),
+    ("cull_test.comp", cull::TestPush::FIELDS, "T T 4 Drawn 8 4"),
+    ("cull_write.comp", blobs::KeyPush::FIELDS, "T 8 4 8"),
     ("diffusion_bounce.comp", diffusion::BouncePush::FIELDS, "Light T 16 16"),
     ("diffusion_coarsen.comp", diffusion::PairPush::FIELDS, "16"),
     ("diffusion_coarsest.comp", diffusion::CoarsestPush::FIELDS, "T 16 16"),
@@ -80,24 +81,27 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("diffusion_spread.comp", diffusion::SpreadPush::FIELDS, "T T 16"),
     ("diffusion_sweep.comp", diffusion::SweepPush::FIELDS, "T T T 16"),
     ("diffusion_system.comp", diffusion::SystemPush::FIELDS, "Light F T 16 16 16"),
-    ("facets.comp", facets::Push::FIELDS, "Placed Particle 4 Group F Facet"),
-    ("facets_groups.comp", facets::Push::FIELDS, "Placed Particle 4 Group F Facet 4 Run 4"),
+    ("facets.comp", facets::Push::FIELDS, "T T 4 Group F Facet"),
+    ("facets_groups.comp", facets::Push::FIELDS, "T T 4 Group F Facet 4 Run 4"),
     ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, "T 4 Facet"),
     ("facets_terrain.comp", facets::TerrainPush::FIELDS, "T Facet Facet"),
     ("first.comp", first::Push::FIELDS, "Facet Light 4 T F Lit"),
     ("first_tensor.comp", first::TensorPush::FIELDS, "Facet Light 4 T F Lit 4"),
-    ("generate.comp", generate::Push::FIELDS, "Box 4 Particle 4"),
-    ("grid_deposit.comp", grid::DepositPush::FIELDS, "Placed Particle 4"),
-    ("grid_turned.comp", grid::DepositPush::FIELDS, "Placed Particle 4"),
+    ("generate.comp", generate::Push::FIELDS, "Box 4 S 4"),
+    ("grid_deposit.comp", grid::DepositPush::FIELDS, "T T 4"),
+    ("grid_turned.comp", grid::DepositPush::FIELDS, "T T 4"),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, "8 4"),
     ("grid_spread.comp", grid::SpreadPush::FIELDS, "8 4"),
+    ("harmonics.comp", harmonics::Push::FIELDS, "T T S"),
     ("impostors.frag", impostors::Push::FIELDS, "T"),
     ("impostors.vert", impostors::Push::FIELDS, ""),
-    ("impostors_part.comp", impostors::PartPush::FIELDS, "8 4 8 8 Placed"),
-    ("live.comp", live::Push::FIELDS, "Disc Particle"),
+    ("impostors_part.comp", impostors::PartPush::FIELDS, "8 4 8 8 T"),
+    ("live.comp", live::Push::FIELDS, "Disc S"),
+    ("lod_key.comp", lod::KeyPush::FIELDS, "T T 4 Textured 8"),
+    ("lod_merge.comp", lod::MergePush::FIELDS, "8 T T 4 Group S S"),
     ("morton_key.comp", morton::KeyPush::FIELDS, "Facet RegionBounds 8"),
     ("morton_order.comp", morton::OrderPush::FIELDS, "8 4"),
-    ("place.comp", place::Push::FIELDS, "Particle 4 Group Mode Placed"),
+    ("place.comp", place::Push::FIELDS, "T 4 Group Mode S"),
     ("present.frag", present::Push::FIELDS, "T T"),
     ("present.vert", &[], ""),
     ("scatter.comp", scatter::Push::FIELDS, "Facet Light 4 T F Lit Medium"),
@@ -118,13 +122,13 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ),
     ("sort_bases.comp", sort::DigitPush::FIELDS, "4 4"),
     ("sort_count.comp", sort::DigitPush::FIELDS, "4 8 4"),
-    ("sort_key.comp", blobs::KeyPush::FIELDS, "Placed 4 Drawn 8"),
+    ("sort_key.comp", blobs::KeyPush::FIELDS, "T 4 Drawn 8"),
     ("sort_scan.comp", sort::DigitPush::FIELDS, "4 4"),
     ("sort_scatter.comp", sort::DigitPush::FIELDS, "4 8 4 8"),
     ("sort_spread.comp", sort::DigitPush::FIELDS, "4 4 4"),
     ("sort_sums.comp", sort::DigitPush::FIELDS, "4 4 4"),
     ("sprites.frag", sprites::Push::FIELDS, "- - - - - - - - T -"),
-    ("sprites.vert", sprites::Push::FIELDS, "8 Placed Particle Lit 4 4 Drawn Textured - Slope"),
+    ("sprites.vert", sprites::Push::FIELDS, "8 T T Lit 4 4 Drawn Textured - Slope"),
     ("surfaces.frag", surfaces::Push::FIELDS, "Region Lit"),
     ("surfaces.vert", surfaces::Push::FIELDS, "Region"),
     ("terrain.frag", terrain::Push::FIELDS, ""),
@@ -133,13 +137,13 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("texture_transform.comp", texture::TransformPush::FIELDS, "8"),
     ("tiles.comp", tiles::Push::FIELDS, "T 8 Round 16 16 4"),
     ("tiles_clear.comp", tiles::ClearPush::FIELDS, "Round 16"),
-    ("tiles_pairs.comp", tiles::PairsPush::FIELDS, "8 4 4 Round 8 Splat Kept"),
+    ("tiles_pairs.comp", tiles::PairsPush::FIELDS, "8 4 4 Round 8 T Kept"),
     ("tiles_ranges.comp", tiles::RangesPush::FIELDS, "8 Round 16"),
     ("tiles_rounds.comp", tiles::RoundsPush::FIELDS, "4 Round Kept"),
     (
         "tiles_splat.comp",
         tiles::SplatPush::FIELDS,
-        "8 T T T 4 4 Drawn Textured 16 8 4 4 SplatTexture Kept 16 Slope 16",
+        "8 T T T 4 4 Drawn Textured S 8 4 4 S Kept S Slope S",
     ),
     ("transmit.comp", transmit::Push::FIELDS, "Facet Light T F 4 4"),
     ("upsample.comp", upsample::Push::FIELDS, "T 4"),

@@ -155,7 +155,7 @@ fn facets_of_ellipsoids_are_within_their_bounds() {
     }
     let runs = Runs::new(&scene, [100, 400]);
     for (from, to) in [
-        ("* (sigma * particles[i].aspect_z);", "* sigma;"),
+        ("* (sigma * particle.aspect_z);", "* sigma;"),
         ("0.5 * dot(squares, 1.0 - upward * upward)", "0.5 * dot(squares, upward * upward)"),
     ] {
         let compiler = Gpu::wrong_compiler("facets_groups.comp", from, to);
@@ -177,7 +177,7 @@ fn a_wrong_shader_is_noticed() {
         ("include/shell.glsl", "-gradient / slope", "gradient / slope"),
         ("include/shell.glsl", "float radius = 3.0 * sigma", "float radius = 3.0001 * sigma"),
         ("facets.comp", "group.i_region,", "i_group[i],"),
-        ("facets.comp", "particles[i].color", "particles[0].color"),
+        ("facets.comp", "particle.color", "PARTICLE_AT(0u).color"),
         ("facets.comp", "push.i_first_facet + i]", "push.i_first_facet + (i + 1) % push.n_facets]"),
         ("include/density.glsl", "mix(low, high, f.x)", "mix(low, high, f.y)"),
     ];
@@ -387,7 +387,7 @@ fn wrong_facets_of_runs_are_noticed() {
     let scene = Scene::new();
     let runs = Runs::new(&scene, [100, 400]);
     let mutations = [
-        ("particles[i].kappa * sigma * sigma * sigma", "particles[i].kappa * sigma * sigma"),
+        ("particle.kappa * sigma * sigma * sigma", "particle.kappa * sigma * sigma"),
         ("dot(d, d) * (1.0 / 3.0)", "dot(d, d) * (1.0 / 2.9)"),
         ("s.area += a;", "s.area = a;"),
         ("s.color += a * c;", "s.color += m * c;"),

@@ -15,12 +15,14 @@ mod functions;
 mod gathers;
 mod generate;
 mod grid;
+mod harmonics;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod impostors;
 #[path = "../harness/lights.rs"]
 mod lights;
 mod live;
+mod lod;
 #[path = "../harness/march.rs"]
 mod march;
 #[path = "../harness/media.rs"]

@@ -226,8 +226,8 @@ fn gusts(gpu: &mut Gpu, growth: Growth) {
     // it does not.
     let mut wrong = vec![("+ modes[m].phase", "- modes[m].phase")];
     if !growth.is_none() {
-        wrong.push(("particles[i].position * group.scale", "particles[i].position"));
-        wrong.push(("particles[i].sigma * group.scale", "particles[i].sigma"));
+        wrong.push(("particle.position * group.scale", "particle.position"));
+        wrong.push(("particle.sigma * group.scale", "particle.sigma"));
     }
     for (from, to) in wrong {
         let placed = run(gpu, &Gpu::wrong_compiler("place.comp", from, to), &scene);

@@ -11,7 +11,7 @@ mod solids;
 mod wrong;
 
 use glam::DVec3;
-use nimbus::reference::parallel::parallel_map;
+use nimbus::model::parallel::parallel_map;
 use nimbus::reference::transport::{
     Estimator, Medium, PathLight, Ray, Stream, TransportScene, Unbiased,
 };

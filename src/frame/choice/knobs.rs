@@ -166,6 +166,7 @@ pub mod tests {
         smallest: Cutoff::Auto,
         sort_bits: SortBits::Wide,
         count: None,
+        lod: 0.0,
         texture_seed: 1,
         n_particles: 0,
     };

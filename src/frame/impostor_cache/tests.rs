@@ -45,6 +45,7 @@ fn packet(x: f64, z: f64) -> Packet {
         lights: vec![],
         grid: Default::default(),
         heaviest: 1.0,
+        sigma_max: 1.0,
         n_levels: 1,
         radius: 12.0,
         sort_bits: 32,

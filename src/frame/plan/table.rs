@@ -82,6 +82,14 @@ passes! {
     Place "place", Particles,
         needs |_, _| None,
         unless |same| same.places => "nothing moved, or all as one";
+    /// Computes the colours that change with the direction of view.
+    Harmonics "harmonics", Particles,
+        needs |f, _| unless(f.has_harmonics, "no colours change with the view"),
+        unless |same| same.colors => "nothing moved, nor did the eye";
+    /// Merges blobs that lie close together.
+    Lod "lod", Particles,
+        needs |f, _| unless(f.has_lod, "draw.lod is 0"),
+        unless |same| same.merged => "nothing moved";
     /// Deposits the density grid.
     Grid "grid", Particles,
         needs unlit,

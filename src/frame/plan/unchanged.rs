@@ -37,6 +37,10 @@ pub(super) struct Unchanged {
     pub live: bool,
     /// Places of particles.
     pub places: bool,
+    /// Colours of particles that change with the direction of view.
+    pub colors: bool,
+    /// Blobs that stand for others.
+    pub merged: bool,
     /// Density grid.
     pub grid: bool,
     /// Morton order of particles.
@@ -78,6 +82,7 @@ impl Unchanged {
         let same_groups = |a: &Packet, b: &Packet| a.groups == b.groups && a.modes == b.modes;
         let places =
             live && same(&|a, b| a.placed == b.placed && (b.placed.is_some() || same_groups(a, b)));
+        let colors = places && same(&|a, b| a.camera.eye == b.camera.eye);
         let grid = places && same(&|a, b| a.grid == b.grid);
         let morton = places && same(&|a, b| a.bounds == b.bounds);
         let geometry = same(&|a, b| {
@@ -121,6 +126,8 @@ impl Unchanged {
             made: has_made && (skipping.is_on || skipping.keeps_made),
             live,
             places,
+            colors,
+            merged: places && (colors || !features.has_harmonics),
             grid,
             morton,
             geometry,
@@ -142,6 +149,7 @@ impl Unchanged {
         let changes = [
             (self.has_last, "there is no frame before"),
             (self.places, "particles moved"),
+            (self.colors || !features.has_harmonics, "colours changed"),
             (self.drawn, "other particles are drawn"),
             (self.geometry, "surfaces moved"),
             ((self.light && self.eye) || !features.is_lit, "light changed"),

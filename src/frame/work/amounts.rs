@@ -6,8 +6,8 @@ use super::layers::{Rays, layers};
 use super::marches::march_samples;
 use crate::error::Result;
 use crate::frame::features::{
-    gathers_from_tree, has_bounces, has_diffusion, has_glossy, has_impostors, has_live, has_second,
-    is_lit, is_medium, region_sizes, target_format,
+    colored_runs, gathers_from_tree, has_bounces, has_diffusion, has_glossy, has_impostors,
+    has_live, has_second, is_lit, is_medium, region_sizes, target_format,
 };
 use crate::frame::packet::Packet;
 use crate::frame::renderer::Renderer;
@@ -18,6 +18,7 @@ use crate::layout::facet::{FacetRecord, RegionRecord};
 use crate::layout::particle::GroupRecord;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
+use crate::model::harmonics::n_rest;
 use crate::model::scene::{Scene, Simulate};
 use crate::passes::blobs::Extent;
 use crate::passes::texture::POOL_TEXELS;
@@ -57,6 +58,10 @@ pub struct Amounts {
     pub is_medium: bool,
     /// Cycles of the diffusion solver; 0 without.
     pub cycles: f64,
+    /// Particles whose colours change with the direction of view.
+    pub colored_particles: f64,
+    /// Harmonics of all of them, the mean included.
+    pub harmonics: f64,
     /// Visits of cells by ways along which bounces gather.
     pub gathered: f64,
     /// Whether some material has a lobe.
@@ -161,6 +166,11 @@ impl Amounts {
             },
             is_moved_by_host,
             waves: if is_moved_by_host { 0.0 } else { waves(scene, packet) },
+            colored_particles: colored_runs(scene).iter().map(|r| f64::from(r.n_particles)).sum(),
+            harmonics: colored_runs(scene)
+                .iter()
+                .map(|r| f64::from(r.n_particles) * f64::from(1 + n_rest(r.degree)))
+                .sum(),
             cells: if lit { x * y * z } else { 0.0 },
             deposits: if lit { deposits(scene, packet) } else { 0.0 },
             facets,

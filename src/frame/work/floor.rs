@@ -55,6 +55,16 @@ pub fn floor(pass: Pass, of: &Amounts) -> Option<Work> {
         // (5), its phase and sine (2), and three multiply-adds (6).
         Pass::Place if of.is_moved_by_host => work(2.0 * n * PLACED, 0.0),
         Pass::Place => work(2.0 * n * PLACED, 3.0 * n + 13.0 * of.waves),
+        // Reads position, κ and coefficients, writes a colour. A direction takes 8, a harmonic's
+        // value 2 at least, and its three channels a multiply-add each.
+        Pass::Harmonics => {
+            let of_coefficients = 3.0 * of.harmonics * NUMBER;
+            let n = of.colored_particles;
+            work(n * (2.0 * VECTOR + NUMBER) + of_coefficients, 8.0 * n + 8.0 * of.harmonics)
+        }
+        // Reads and writes position, σ, κ and colour. A mean takes a multiply-add for each of eight
+        // numbers, and mass and spread 9.
+        Pass::Lod => work(2.0 * n * (PLACED + NUMBER + VECTOR), 25.0 * n),
         // Reads position, σ and κ, writes the cells. Each cell that a blob reaches is the sum of
         // the products of a row's weight and its own: a multiply-add.
         Pass::Grid => work(n * (PLACED + NUMBER) + of.cells * NUMBER, 2.0 * of.deposits),

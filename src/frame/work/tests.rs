@@ -31,6 +31,8 @@ const SMALL: Amounts = Amounts {
     culls: true,
     key_bytes: 2.0,
     texels: 0.0,
+    colored_particles: 10.0,
+    harmonics: 160.0,
     film_pixels: 32.0,
     pixel_bytes: 8.0,
     has_solids: false,
@@ -50,6 +52,10 @@ fn floors_are_those_worked_out_by_hand() {
         (Pass::Live, 0.0, 0.0),
         // 10 × 16 bytes in, 10 × 16 out; 10 × 3 sums.
         (Pass::Place, 320.0, 30.0),
+        // 10 × 16 and 160 × 12 bytes in, 10 × 12 out; 10 directions of 8, 160 harmonics of 8.
+        (Pass::Harmonics, 2200.0, 1360.0),
+        // 10 × 32 bytes in, 10 × 32 out; 10 × 25.
+        (Pass::Lod, 640.0, 250.0),
         // 10 × 20 bytes in, 120 × 4 out; 270 multiply-adds.
         (Pass::Grid, 680.0, 540.0),
         // 10 × 12 bytes in, 10 × 4 out.

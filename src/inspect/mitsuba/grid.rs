@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
+use crate::model::parallel::parallel_map;
 use crate::reference::Blob;
-use crate::reference::parallel::parallel_map;
 use crate::reference::picture::TransportParts;
 
 /// Optical depth of any line that a blob keeps beyond the grid's cells.

@@ -19,7 +19,8 @@ pub use write::{ENDING, write};
 
 use super::memory;
 use crate::error::{Error, Place, Result};
-use crate::model::cloud::{Particle, Shape};
+use crate::model::cloud::Particle;
+use crate::model::harmonics::{Coefficients, Harmonics};
 
 /// The element whose rows are particles.
 const ELEMENT: &str = "vertex";
@@ -29,8 +30,8 @@ const ELEMENT: &str = "vertex";
 pub struct Read {
     /// The particles, in the order of the file.
     pub particles: Vec<Particle>,
-    /// Notes for the user.
-    pub notes: Vec<String>,
+    /// How their colours change with the direction of view.
+    pub harmonics: Option<Harmonics>,
 }
 
 /// Returns whether a file is named as a PLY file.
@@ -53,12 +54,15 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Read> {
     let columns = Columns::find(element)
         .map_err(|what| Error::scene(Place::line(path, element.line, 1), what))?;
     let rows = Rows::new(&header, bytes, i, path)?;
-    let n_bytes = element.n.saturating_mul(size_of::<Particle>() as u64);
+    let of_harmonics = columns.harmonics().map_or(0, |_| size_of::<Coefficients>());
+    let n_bytes = element.n.saturating_mul((size_of::<Particle>() + of_harmonics) as u64);
     memory::check(n_bytes, || format!("{}: {} particles", path.display(), element.n))?;
-    let blank = Particle { sigma: 0.0, shape: Shape::BALL, ..Particle::default() };
-    let particles = rows.map(blank, &columns)?;
-    let notes = columns.notes();
-    Ok(Read { particles, notes })
+    let particles = rows.map(&columns)?;
+    let harmonics = columns.harmonics().map(|of| -> Result<Harmonics> {
+        let by_particle = rows.map(of)?;
+        Ok(Harmonics { degree: of.degree(), by_particle })
+    });
+    Ok(Read { particles, harmonics: harmonics.transpose()? })
 }
 
 #[cfg(test)]

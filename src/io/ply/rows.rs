@@ -2,14 +2,11 @@
 
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use std::thread;
 
 use super::header::{Element, Format, Header, Scalar};
 use crate::error::{Error, Place, Result};
 use crate::io::document::suggest::shown;
-
-/// The fewest rows of a part: less is not worth a thread.
-const LEAST_PART: usize = 1 << 14;
+use crate::model::parallel::parallel_map;
 
 /// The outcome of reading a row.
 pub type Made<T> = std::result::Result<T, Fault>;
@@ -95,7 +92,7 @@ impl<'a> Rows<'a> {
     ///
     /// # Errors
     /// The fault of the first wrong row, with its place.
-    pub fn map<T: Clone + Send>(&self, blank: T, of: &(impl OfRow<T> + Sync)) -> Result<Vec<T>> {
+    pub fn map<T: Default + Send>(&self, of: &(impl OfRow<T> + Sync)) -> Result<Vec<T>> {
         if self.format == Format::Ascii {
             return self.map_lines(of);
         }
@@ -113,19 +110,22 @@ impl<'a> Rows<'a> {
             })
             .collect();
         let is_big = self.format == Format::Big;
-        let of_part = |first: usize, part: &mut [T]| {
-            for (k, to) in part.iter_mut().enumerate() {
-                let row = &self.bytes[(first + k) * row_bytes..];
-                let value = |i: usize| {
-                    let (offset, scalar) = columns[i];
-                    number(&row[offset..], scalar, is_big)
-                };
-                *to = of.made(value).map_err(|fault| (first + k, fault))?;
-            }
-            Ok(())
-        };
-        let mut made = vec![blank; n];
-        match in_parts(&mut made, of_part) {
+        let first_fault: Mutex<Option<(usize, Fault)>> = Mutex::new(None);
+        let made = parallel_map(n, |k| {
+            let row = &self.bytes[k * row_bytes..];
+            let value = |i: usize| {
+                let (offset, scalar) = columns[i];
+                number(&row[offset..], scalar, is_big)
+            };
+            of.made(value).unwrap_or_else(|fault| {
+                let mut first = first_fault.lock().unwrap_or_else(PoisonError::into_inner);
+                if first.as_ref().is_none_or(|(row, _)| k < *row) {
+                    *first = Some((k, fault));
+                }
+                T::default()
+            })
+        });
+        match first_fault.into_inner().unwrap_or_else(PoisonError::into_inner) {
             Some((row, fault)) => Err(self.fault_of_row(row, &fault)),
             None => Ok(made),
         }
@@ -186,36 +186,6 @@ impl<'a> Rows<'a> {
         }
         Ok(made)
     }
-}
-
-/// Calls `work` with parts of `all` and the number of the first of each, on all threads; on the
-/// caller's where no others can be started. Returns the failure of the first row.
-fn in_parts<T: Send, E: Send>(
-    all: &mut [T],
-    work: impl Fn(usize, &mut [T]) -> std::result::Result<(), (usize, E)> + Sync,
-) -> Option<(usize, E)> {
-    let n_threads = thread::available_parallelism().map_or(1, usize::from);
-    let size = all.len().div_ceil(4 * n_threads).max(LEAST_PART);
-    let parts = Mutex::new(all.chunks_mut(size).enumerate());
-    let failed = Mutex::new(None);
-    let next = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let take = || {
-        while let Some((i, part)) = next() {
-            let Err((row, error)) = work(i * size, part) else { continue };
-            let mut failed = failed.lock().unwrap_or_else(PoisonError::into_inner);
-            if failed.as_ref().is_none_or(|(first, _)| row < *first) {
-                *failed = Some((row, error));
-            }
-        }
-    };
-    thread::scope(|scope| {
-        for _ in 1..n_threads {
-            // Without another thread this one does all.
-            let _ = thread::Builder::new().spawn_scoped(scope, take);
-        }
-        take();
-    });
-    failed.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Returns where `part`, which is a part of `text`, begins in it.

@@ -9,6 +9,7 @@ use crate::io::bounds::{AMOUNT, DIVISOR, GREATEST, LEAST, wrong_coordinate, wron
 use crate::io::document::suggest::list;
 use crate::io::particle_file::wrong_height;
 use crate::model::cloud::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, Shape, unit_quaternion};
+use crate::model::harmonics::{Coefficients, MAX_DEGREE, n_rest};
 
 /// Greatest opacity of a splat, as in the rasterizer of Kerbl et al.: no splat hides all behind it.
 const MOST_OPACITY: f64 = 0.99;
@@ -47,8 +48,69 @@ pub struct Columns {
     size: Size,
     density: Density,
     color: Color,
-    /// Properties that belong to harmonics of higher degrees.
-    n_harmonics: usize,
+    harmonics: Option<HarmonicColumns>,
+}
+
+/// The properties of which colours are made that change with the direction of view.
+pub struct HarmonicColumns {
+    degree: u32,
+    mean: Three,
+    /// Of each harmonic from degree 1 on, by channel.
+    rest: Vec<Three>,
+}
+
+impl HarmonicColumns {
+    /// Finds the properties `f_rest_0`…, which have all harmonics of a channel together.
+    fn find(element: &Element, mean: Three) -> Result<Option<HarmonicColumns>, String> {
+        let n = element.properties.iter().filter(|p| p.name.starts_with("f_rest_")).count();
+        if n == 0 {
+            return Ok(None);
+        }
+        let expected = || {
+            let counts: Vec<String> =
+                (1..=MAX_DEGREE).map(|d| (3 * n_rest(d) - 1).to_string()).collect();
+            format!("expected f_rest_0 to f_rest_{}, of degree 1 to 3, found {n}", counts.join("/"))
+        };
+        let degree =
+            (1..=MAX_DEGREE).find(|d| 3 * n_rest(*d) as usize == n).ok_or_else(expected)?;
+        let of = |k: usize| {
+            let name = format!("f_rest_{k}");
+            element.properties.iter().position(|p| p.name == name).ok_or_else(expected)
+        };
+        let n_harmonics = n / 3;
+        let rest: Result<Vec<Three>, String> = (0..n_harmonics)
+            .map(|k| Ok([of(k)?, of(k + n_harmonics)?, of(k + 2 * n_harmonics)?]))
+            .collect();
+        Ok(Some(HarmonicColumns { degree, mean, rest: rest? }))
+    }
+
+    /// Returns the greatest degree.
+    pub fn degree(&self) -> u32 {
+        self.degree
+    }
+}
+
+impl OfRow<Coefficients> for HarmonicColumns {
+    fn made(&self, value: impl Fn(usize) -> f64) -> Made<Coefficients> {
+        let number = |i: usize| {
+            let v = value(i);
+            let finite = (!v.is_finite()).then(|| "a finite number".to_owned());
+            match finite.or_else(|| wrong_coordinate(v)) {
+                None => Ok(v),
+                Some(of) => Err(Fault { i, what: format!("expected {of}, found `{v}`") }),
+            }
+        };
+        let mut made = Coefficients::default();
+        for (channel, i) in self.mean.into_iter().enumerate() {
+            made[0][channel] = (0.5 + HARMONIC * number(i)?) as f32;
+        }
+        for (to, of) in made[1..].iter_mut().zip(&self.rest) {
+            for (channel, i) in of.iter().enumerate() {
+                to[channel] = number(*i)? as f32;
+            }
+        }
+        Ok(made)
+    }
 }
 
 impl Columns {
@@ -93,26 +155,16 @@ impl Columns {
             (None, Some(of)) => Color::Harmonics(of),
             (None, None) => Color::White,
         };
-        let is_harmonic = |name: &str| name.starts_with("f_rest_");
-        let n_harmonics = match color {
-            Color::Harmonics(_) => {
-                element.properties.iter().filter(|p| is_harmonic(&p.name)).count()
-            }
-            _ => 0,
+        let harmonics = match color {
+            Color::Harmonics(mean) => HarmonicColumns::find(element, mean)?,
+            _ => None,
         };
-        Ok(Columns { position, size, density, color, n_harmonics })
+        Ok(Columns { position, size, density, color, harmonics })
     }
 
-    /// Returns notes for the user about the particles that were made.
-    pub fn notes(&self) -> Vec<String> {
-        let mut notes = vec![];
-        if self.n_harmonics > 0 {
-            notes.push(format!(
-                "colours do not change with the view: f_rest_0 to f_rest_{} are left out",
-                self.n_harmonics - 1
-            ));
-        }
-        notes
+    /// Returns the properties of colours that change with the direction of view.
+    pub fn harmonics(&self) -> Option<&HarmonicColumns> {
+        self.harmonics.as_ref()
     }
 }
 

@@ -107,10 +107,46 @@ fn a_splat_has_its_opacity_through_the_middle() {
     // ½ + f/(2√π), not below 0.
     assert!(is_near(p.color.y, 0.5 + 0.5 / std::f64::consts::PI.sqrt()));
     assert_eq!((p.color.x, p.color.z), (0.5, 0.0));
-    assert_eq!(found.notes, [""; 0]);
+    assert_eq!(found.harmonics, None);
     // No splat has more than 0.99.
     let opaque = one("x y z scale_0 scale_1 scale_2 opacity", "0 0 0 0 0 0 90").particles[0];
     assert!(is_near(opaque.kappa, 100f64.ln() / ROOT), "{opaque:?}");
+}
+
+#[test]
+fn harmonics_are_read_by_channel() {
+    let of = |n: u32, more: &str| {
+        let rest: Vec<String> = (0..n).map(|k| format!("f_rest_{k}")).collect();
+        let names = format!("x y z sigma kappa f_dc_0 f_dc_1 f_dc_2 {}{more}", rest.join(" "));
+        let values: Vec<String> = (0..n).map(|k| (k + 1).to_string()).collect();
+        let owned = floats(&names);
+        let properties: Vec<&str> = owned.iter().map(String::as_str).collect();
+        let more = if more.is_empty() { "" } else { " 0" };
+        ascii(&properties, &format!("0 0 0 1 1 1 0 -3 {}{more}", values.join(" ")))
+    };
+    for (degree, n) in [(1, 9), (2, 24), (3, 45)] {
+        let read = of(n, "").expect("a list");
+        let harmonics = read.harmonics.expect("harmonics");
+        assert_eq!((harmonics.degree, harmonics.by_particle.len()), (degree, 1));
+        let found = harmonics.by_particle[0];
+        // All of red, then all of green, then all of blue.
+        let third = n as f32 / 3.0;
+        assert_eq!(found[1], [1.0, 1.0 + third, 1.0 + 2.0 * third]);
+        assert_eq!(found[n as usize / 3], [third, 2.0 * third, 3.0 * third]);
+        assert!(found[n as usize / 3 + 1..].iter().all(|c| *c == [0.0; 3]));
+        // The mean may be below 0 where the colour is not.
+        let y = 0.5 / std::f32::consts::PI.sqrt();
+        assert!((found[0][0] - (0.5 + y)).abs() < 1e-6 && found[0][1] == 0.5);
+        assert!((found[0][2] - (0.5 - 3.0 * y)).abs() < 1e-6);
+        assert_eq!(read.particles[0].color.z, 0.0);
+    }
+    let expected = "a.ply:3:1: expected f_rest_0 to f_rest_8/23/44, of degree 1 to 3, found";
+    for (n, more, found) in [(3, "", 3), (72, "", 72), (8, " f_rest_9", 9)] {
+        let error = of(n, more).expect_err("harmonics").to_string();
+        assert_eq!(error, format!("{expected} {found}"));
+    }
+    let names = "x y z sigma kappa r g b f_rest_0";
+    assert_eq!(one(names, "0 0 0 1 1 1 1 1 7").harmonics, None);
 }
 
 #[test]
@@ -124,7 +160,6 @@ fn ellipsoids_have_their_axes() {
         is_near(p.sigma, 1.0) && is_near(p.shape.aspect, 3.0) && is_near(p.kappa, 2.0),
         "{p:?}"
     );
-    assert_eq!(upright.notes, [""; 0]);
     // By half of that, variances along y and z are (1 + 9)/2.
     let (cos, sin) = (std::f64::consts::FRAC_PI_8.cos(), std::f64::consts::FRAC_PI_8.sin());
     let askew = one(names, &format!("0 0 0 0 0 {ln3} {cos} {sin} 0 0 2"));
@@ -133,7 +168,6 @@ fn ellipsoids_have_their_axes() {
     let expected = DMat3::from_cols_array(&[1.0, 0.0, 0.0, 0.0, 5.0, -4.0, 0.0, -4.0, 5.0]);
     assert!(found.abs_diff_eq(expected, 9.0 * 1e-5), "{found}");
     assert!(is_near(p.sigma, 3.0) && is_near(p.kappa, 2.0), "{p:?}");
-    assert_eq!(askew.notes, [""; 0]);
     // A splat of any shape: its opacity times its area, in the mean over directions.
     let flat = one("x y z scale_0 scale_1 scale_2 opacity", &format!("0 0 0 {ln3} 0 {ln3} 0"));
     let p = flat.particles[0];
@@ -212,7 +246,10 @@ fn what_is_written_is_read_again() {
     write(&path, &all).expect("room");
     assert!(is_named(&path));
     let file = MappedFile::open(&path).expect("a file");
-    assert_eq!(parse(file.bytes(), &path).expect("a list"), Read { particles: all, notes: vec![] });
+    assert_eq!(
+        parse(file.bytes(), &path).expect("a list"),
+        Read { particles: all, harmonics: None }
+    );
 }
 
 #[test]

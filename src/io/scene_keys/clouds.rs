@@ -29,6 +29,7 @@ use crate::model::boxes::{BoxLaw, Form};
 use crate::model::cloud::{Cloud, CloudSource, Facing};
 use crate::model::growth::Growth;
 use crate::model::material::Material;
+use crate::model::particle_list::ParticleList;
 use crate::model::scene::{Simulate, Time};
 use crate::model::terrain::Terrain;
 
@@ -277,21 +278,19 @@ fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource>
             reading.found.digests.push(Sha256::digest(&text).into());
             let (particles, lines) = particle_file::parse(&text, &path)?;
             reading.found.lines = lines;
-            particles
+            particles.into()
         }
         Opened::Ply(file) => {
-            let ply::Read { particles, notes } = ply::parse(file.bytes(), &path)?;
-            let cloud = reading.i_cloud;
-            let found = &mut *reading.found;
-            found.digests.push(digest(&particles));
-            found.notes.extend(notes.into_iter().map(|note| format!("cloud {cloud}: {note}")));
-            particles
+            let ply::Read { particles, harmonics } = ply::parse(file.bytes(), &path)?;
+            let list = ParticleList::with_harmonics(particles, harmonics);
+            reading.found.digests.push(digest(&list));
+            list
         }
     };
     if particles.is_empty() {
         reading.note_empty(&path, "it has a header and no particles");
     }
-    Ok(CloudSource::Particles(particles.into()))
+    Ok(CloudSource::Particles(particles))
 }
 
 fn read_weather(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
@@ -314,7 +313,7 @@ fn read_weather(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
         found.digests.push(file.digest()?);
         return Ok(CloudSource::Animated(moving::moving(file, settings, seed)?));
     }
-    let particles = blobs::particles(&file, &settings, seed)?;
-    found.digests.push(digest(&particles));
-    Ok(CloudSource::Particles(particles.into()))
+    let list = ParticleList::from(blobs::particles(&file, &settings, seed)?);
+    found.digests.push(digest(&list));
+    Ok(CloudSource::Particles(list))
 }

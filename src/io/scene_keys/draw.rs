@@ -64,6 +64,10 @@ keys! { DRAW: fn draw(s) -> Draw { Draw;
     cull: choice("on", &Cull::NAMES);
     /// With `cull`, σ on the screen below which a particle is left out.
     smallest: cutoff(Bounds::Within(0.0, 1000.0)), "px";
+    /// Edge of cells, over σ: in each of them one particle stands for all of about its size, in the
+    /// picture and in the density grid. With 0 every particle is drawn. Particles with a texture
+    /// and those that are no balls stay.
+    lod: number(0.0, Bounds::Within(0.0, 2.0)), "σ";
     /// Bits of the depth keys that particles are sorted by.
     sort_bits: sort_bits();
     /// Pixels of the picture that particles are drawn into, along a side, for each of the film's.
@@ -118,6 +122,10 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
             };
             let what = format!("expected 0 where cull = \"off\", found {found}");
             return Err(s.fault("smallest", what));
+        }
+        if draw.lod > 0.0 && draw.count.is_some() {
+            let what = "expected 0 where count = \"distance\", which draws a part of the particles";
+            return Err(s.fault("lod", what));
         }
         let is_full = draw.resolution == Resolution::Full;
         if draw.impostors != Impostors::Off && (has_smallest || !is_full) {

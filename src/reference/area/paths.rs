@@ -8,10 +8,10 @@ use glam::DVec3;
 
 use super::scene::{AreaScene, Receiver};
 use super::visibility::met;
+use crate::model::parallel::parallel_map;
 use crate::model::philox::{philox4x32_10, uniform};
 use crate::reference::brdf::{density, direction, reflectance};
 use crate::reference::occlude::{Rectangle, Source};
-use crate::reference::parallel::parallel_map;
 
 /// Second word of the Philox key: paths share no random numbers with particles.
 const KEY: u32 = 0x7061_7468;

@@ -10,11 +10,11 @@ use super::clip::{self, Line, Polygon, WHOLE};
 use super::visibility;
 use crate::model::light::Light;
 use crate::model::material::Brdf;
+use crate::model::parallel::parallel_map;
 use crate::model::surface::Surface;
 use crate::reference::Blob;
 use crate::reference::brdf::reflectance;
 use crate::reference::occlude::{Rectangle, Source, source_of};
-use crate::reference::parallel::parallel_map;
 
 /// A diffuse facet of a cloud or of the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,7 +9,7 @@ use super::system::System;
 use super::ways::Ways;
 use crate::model::grid::GridSpec;
 use crate::model::medium::MeanMedium;
-use crate::reference::parallel::parallel_map;
+use crate::model::parallel::parallel_map;
 
 /// Returns 24 directions. The means of 1, of a cosine over its half and of its square over them are
 /// those over the sphere.

@@ -10,8 +10,8 @@ use super::ways::Ways;
 use crate::model::grid::GridSpec;
 use crate::model::light::UP;
 use crate::model::medium::MeanMedium;
+use crate::model::parallel::parallel_map;
 use crate::model::phase::Phase;
-use crate::reference::parallel::parallel_map;
 
 /// Places on a way to the eye on which a blob is seen, and their distance, σ.
 const N_PLACES: u32 = 4;

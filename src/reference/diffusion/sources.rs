@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 use crate::model::medium::MeanMedium;
-use crate::reference::parallel::parallel_map;
+use crate::model::parallel::parallel_map;
 use crate::reference::scatter::BARRED;
 use crate::reference::transmit::{Obstacles, Receiver};
 

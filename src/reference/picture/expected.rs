@@ -9,8 +9,8 @@ use super::renderer::with_picture;
 use super::scene_light::PixelSample;
 use super::transport::TransportPicture;
 use crate::error::Result;
+use crate::model::parallel::parallel_map;
 use crate::model::scene::Scene;
-use crate::reference::parallel::parallel_map;
 
 /// Time for which points are lit to estimate the time of all.
 const PROBE: Duration = Duration::from_secs(1);

@@ -11,6 +11,7 @@ use crate::model::cloud::{Cloud, CloudSource, Group};
 use crate::model::frame_state::FrameState;
 use crate::model::light::Light;
 use crate::model::medium::{MeanMedium, Medium, ScatterLaw};
+use crate::model::parallel::parallel_map;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::shade::FacetSlope;
 use crate::reference::area::adaptive::{Accuracy, Estimate};
@@ -18,7 +19,6 @@ use crate::reference::area::{AreaScene, DiscFacet, Receiver};
 use crate::reference::facets::{Facet, FacetPlace, FacetSources};
 use crate::reference::generate::Generated;
 use crate::reference::occlude::Rectangle;
-use crate::reference::parallel::parallel_map;
 use crate::reference::transmit::{self, Obstacles};
 use crate::reference::{self, Blob};
 
@@ -145,9 +145,9 @@ impl FrameReference {
         reference::place::add_gusts(&mut placed, &positions, &groups, &scene.clouds, time_s);
         let blobs = reference::place::blobs(&generated, &placed);
         Ok(FrameReference {
+            colors: colors(scene, &blobs, state.pose.position - state.light_origin),
             state,
             groups,
-            colors: colors(scene),
             blobs,
             facets: vec![],
             facet_colors: vec![],
@@ -373,11 +373,24 @@ impl FrameReference {
 /// Relative accuracy of the second reflection: a hundredth of the 1 % that devices are held to.
 const SECOND_ACCURACY: f64 = 1e-4;
 
-/// Returns every particle's own colour, linear RGB.
-pub fn colors(scene: &Scene) -> Vec<DVec3> {
-    let of_cloud = |cloud: &Cloud| match &cloud.source {
-        CloudSource::Particles(list) => list.iter().map(|p| p.color).collect(),
-        _ => vec![DVec3::ONE; cloud.n_particles() as usize],
-    };
-    scene.clouds.iter().flat_map(of_cloud).collect()
+/// Returns every particle's own colour, linear RGB: toward `eye` where it changes with the
+/// direction of view and no light decides what it shows.
+fn colors(scene: &Scene, blobs: &[Blob], eye: DVec3) -> Vec<DVec3> {
+    let is_lit = scene.lighting.mode != LightingMode::None;
+    let mut all = Vec::with_capacity(blobs.len());
+    for cloud in &scene.clouds {
+        let first = all.len();
+        match &cloud.source {
+            CloudSource::Particles(list) => match list.harmonics().filter(|_| !is_lit) {
+                Some(of) => {
+                    all.extend(blobs[first..].iter().zip(&of.by_particle).map(|(b, of)| {
+                        reference::harmonics::color(of, (b.position - eye).normalize_or_zero())
+                    }))
+                }
+                None => all.extend(list.iter().map(|p| p.color)),
+            },
+            _ => all.resize(first + cloud.n_particles() as usize, DVec3::ONE),
+        }
+    }
+    all
 }

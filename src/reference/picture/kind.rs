@@ -97,6 +97,7 @@ impl ReferenceKind {
             threshold: Cutoff::NONE,
             cull: Cull::On,
             smallest: Cutoff::NONE,
+            lod: 0.0,
             sort_bits: SortBits::Wide,
             count: None,
             ..scene.draw

@@ -5,11 +5,11 @@ use glam::DVec3;
 use super::local_scene::LocalScene;
 use crate::model::light::{Light, UP};
 use crate::model::medium::{MeanMedium, ScatterLaw};
+use crate::model::parallel::parallel_map;
 use crate::model::scene::{DiffusionSettings, Scene};
 use crate::reference::diffusion::{BoxLight, DiffuseLight, DiffusionMedium, FaceLight, SeenCells};
 use crate::reference::facets::Facet;
 use crate::reference::first;
-use crate::reference::parallel::parallel_map;
 use crate::reference::scatter::{self, BARRED};
 use crate::reference::transmit::{Obstacles, Receiver};
 

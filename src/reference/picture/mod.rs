@@ -34,7 +34,7 @@ mod transport_layers;
 pub use background::view;
 pub use error_estimate::ErrorEstimate;
 pub use expected::{PictureTime, expected_path_s, expected_time};
-pub use frame::{FrameReference, SecondOf, colors};
+pub use frame::{FrameReference, SecondOf};
 pub use kind::{ReferenceKind, n_reflections};
 pub use layers::{PictureLayers, layers_as_set, sums_by_settings};
 pub use limits::check_memory;

@@ -32,18 +32,19 @@ impl FrameReference {
         Some(CellLight { cells: &of.cells, means: means.collect() })
     }
 
-    /// Returns the light inside of every particle; `None` where it is the same throughout, or that
-    /// of cells.
-    pub fn particle_shades(&self, scene: &Scene) -> Option<Vec<Shade>> {
+    /// Returns the light inside of every one of `blobs`, as they are drawn; `None` where it is the
+    /// same throughout, or that of cells.
+    pub fn particle_shades(&self, scene: &Scene, blobs: &[Blob]) -> Option<Vec<Shade>> {
         if scene.has_light_of_cells() {
             return None;
         }
         let shade = |(blob, i): (&Blob, u32)| {
             let FacetSlope { relative, position } = self.slopes[i as usize];
-            let apart = if scene.groups_facets() { blob.position - position } else { DVec3::ZERO };
+            let is_apart = scene.groups_facets() || scene.draw.lod > 0.0;
+            let apart = if is_apart { blob.position - position } else { DVec3::ZERO };
             Shade::new(relative, apart, blob.sigma, &blob.shape)
         };
-        let shades = || self.blobs.iter().zip(self.particle_facets(scene)).map(shade).collect();
+        let shades = || blobs.iter().zip(self.particle_facets(scene)).map(shade).collect();
         (!self.slopes.is_empty()).then(shades)
     }
 

@@ -7,10 +7,10 @@ use super::error_estimate::{ErrorEstimate, root_mean_square};
 use super::frame::FrameReference;
 use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
-use super::sprites::{drawn_blobs, raster, with_textures};
+use super::sprites::{drawn_blobs, drawn_radiance, raster, with_textures};
+use crate::model::parallel::parallel_map;
 use crate::model::scene::Scene;
 use crate::reference::composite::OpaquePixel;
-use crate::reference::parallel::parallel_map;
 use crate::reference::sprites::{self, Sprites};
 use crate::reference::view::View;
 use crate::reference::volume::{Pixel, Volume};
@@ -84,7 +84,7 @@ pub fn render_lit_scene(
             errors: vec![ErrorEstimate::from_quadrature(error); pixels.at.len()],
         };
     }
-    let shades = frame.particle_shades(scene);
+    let shades = frame.particle_shades(scene, &frame.blobs);
     let volume = Volume::new(&view, &frame.blobs, &radiance).shaded(shades.as_deref());
     let found = volume_at(&volume, pixels, &opaque, on_progress);
     RenderedPixels::from_volume(found, |_, p| ErrorEstimate::from_quadrature(p.error + light_error))
@@ -106,7 +106,8 @@ fn drawn(
     on_progress: OnProgress,
 ) -> Vec<[f64; 4]> {
     let (blobs, order) = drawn_blobs(scene, frame);
-    let (raster, shades) = (raster(pixels), frame.particle_shades(scene));
+    let radiance = &drawn_radiance(scene, frame, radiance.to_vec());
+    let (raster, shades) = (raster(pixels), frame.particle_shades(scene, &blobs));
     let cells = frame.particle_cells(scene);
     with_textures(scene, frame, view, |factor| {
         let (shades, cells) = (shades.as_deref(), cells.as_ref());

@@ -9,12 +9,12 @@ use super::background::{solid_radiance, view};
 use super::frame::FrameReference;
 use super::local_scene;
 use super::pixels::Pixels;
-use super::sprites::{drawn_blobs, raster, set_order, with_textures};
+use super::sprites::{drawn_blobs, drawn_radiance, raster, set_order, with_textures};
+use crate::model::parallel::parallel_map;
 use crate::model::scene::{DrawPath, LightingMode, Scene};
 use crate::model::terrain::Terrain;
 use crate::reference::Blob;
 use crate::reference::composite::{OpaquePixel, Rounding};
-use crate::reference::parallel::parallel_map;
 use crate::reference::sprites::{self, Bounded, Sprites};
 use crate::reference::surfaces;
 use crate::reference::terrain::ByRow;
@@ -83,7 +83,7 @@ pub fn pixel_shares(
     let view = view(scene, frame);
     let (opaque, behind) = solid_shares(scene, frame, &view, pixels);
     let (blobs, order) = drawn_blobs(scene, frame);
-    let (raster, shades) = (raster(pixels), frame.particle_shades(scene));
+    let (raster, shades) = (raster(pixels), frame.particle_shades(scene, &blobs));
     let cells = frame.particle_cells(scene);
     let found = with_textures(scene, frame, &view, |factor| {
         let (shades, cells) = (shades.as_deref(), cells.as_ref());
@@ -183,8 +183,8 @@ pub fn drawn_by_settings(
         *pixel = rounding.stored(*pixel);
     }
     let order = set_order(scene, frame, &blobs);
-    let radiance = emitters.of_particles(radiance);
-    let (raster, shades) = (raster(pixels), frame.particle_shades(scene));
+    let radiance = drawn_radiance(scene, frame, emitters.of_particles(radiance));
+    let (raster, shades) = (raster(pixels), frame.particle_shades(scene, &blobs));
     let cells = frame.particle_cells(scene);
     with_textures(scene, frame, &view, |factor| {
         let (shades, cells) = (shades.as_deref(), cells.as_ref());

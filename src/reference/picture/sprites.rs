@@ -7,7 +7,8 @@ use super::pixels::Pixels;
 use crate::model::cloud::Group;
 use crate::model::count::MIN_DRAWN;
 use crate::model::frame_state::FrameState;
-use crate::model::scene::{Overlap, Scene};
+use crate::model::scene::{LightingMode, Overlap, Scene};
+use crate::reference::lod::{self, Merged};
 use crate::reference::sprites::{Factor, Raster};
 use crate::reference::texture::{Pool, SplatTexture, Textured};
 use crate::reference::view::View;
@@ -49,17 +50,56 @@ pub(super) fn with_textures<T>(
     take(Some(&|j, delta| splats[j].factor(&pool, delta)))
 }
 
-/// Returns the blobs with κ scaled by the count law, and the order that the drawn ones are drawn
-/// in: far to near by exact depth, ties by index.
+/// Returns the blobs of which some stand for others; `None` where each is drawn.
+fn merged(scene: &Scene, frame: &FrameReference) -> Option<Merged> {
+    if scene.draw.lod == 0.0 {
+        return None;
+    }
+    let regions = place::regions(&frame.groups);
+    let boxes = frame.groups.chunk_by(|a, b| a.i_cloud == b.i_cloud);
+    let is_textured = |(g, i_box): (&Group, u32)| {
+        let (_, strength) = scene.clouds[g.i_cloud].texture.of_box(i_box);
+        std::iter::repeat_n(strength != 0.0, g.n_particles as usize)
+    };
+    let textured: Vec<bool> =
+        boxes.flat_map(|boxes| boxes.iter().zip(0u32..).flat_map(is_textured)).collect();
+    let keys = lod::keys(&frame.blobs, |i| textured[i], scene.draw.lod);
+    let order = lod::order(&keys);
+    Some(lod::merge(&frame.blobs, &keys, &order, |i| regions[i as usize]))
+}
+
+/// Returns the blobs, merged or with κ scaled by the count law, and the order that the drawn ones
+/// are drawn in: far to near by exact depth, ties by index.
 pub(super) fn drawn_blobs(scene: &Scene, frame: &FrameReference) -> (Vec<Blob>, Vec<u32>) {
-    let weights = weights(scene, frame);
-    let weighed = |(b, w): (&Blob, &f64)| Blob { kappa: b.kappa * w, ..*b };
-    let blobs: Vec<Blob> = frame.blobs.iter().zip(&weights).map(weighed).collect();
+    let (blobs, weights): (Vec<Blob>, Vec<f64>) = match merged(scene, frame) {
+        Some(Merged { blobs, .. }) => {
+            let weights = blobs.iter().map(|b| if b.kappa > 0.0 { 1.0 } else { 0.0 }).collect();
+            (blobs, weights)
+        }
+        None => {
+            let weights = weights(scene, frame);
+            let weighed = |(b, w): (&Blob, &f64)| Blob { kappa: b.kappa * w, ..*b };
+            (frame.blobs.iter().zip(&weights).map(weighed).collect(), weights)
+        }
+    };
     let depths = depths(scene, frame, &blobs);
     let mut order: Vec<u32> =
         (0..blobs.len() as u32).filter(|&i| weights[i as usize] > 0.0).collect();
     order.sort_by(|&i, &j| depths[j as usize].total_cmp(&depths[i as usize]));
     (blobs, order)
+}
+
+/// Returns the radiance of the drawn blobs, where each has `radiance` alone. What stands for
+/// several shows their mean colour, and where it is lit, the light of the one whose place it takes.
+pub(super) fn drawn_radiance(
+    scene: &Scene,
+    frame: &FrameReference,
+    radiance: Vec<DVec3>,
+) -> Vec<DVec3> {
+    match merged(scene, frame) {
+        Some(merged) if scene.lighting.mode == LightingMode::None => merged.means(&radiance),
+        _ => radiance,
+    }
 }
 
 /// Returns the depths that blobs are sorted by.

@@ -15,10 +15,10 @@ use crate::error::Result;
 use crate::model::light::Light;
 use crate::model::material::Brdf;
 use crate::model::medium::Medium;
+use crate::model::parallel::parallel_map;
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
 use crate::reference::Blob;
-use crate::reference::parallel::parallel_map;
 use crate::reference::transport::{
     BlobMedium, Lights, PathLight, Ray, Scatterer, Solids, Stream, TransportScene,
 };

@@ -11,8 +11,8 @@ use super::samples::{Grown, shift};
 use super::scene_light::PixelSample;
 use super::transport::TransportPicture;
 use crate::error::Result;
+use crate::model::parallel::parallel_map;
 use crate::model::scene::Scene;
-use crate::reference::parallel::parallel_map;
 use crate::reference::transport::N_LAYERS;
 
 /// Numbers of a pixel in the sums of layers: R, G, B, A; the layers' RGB; the squares of R, G, B.

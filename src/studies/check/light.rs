@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 
+use crate::model::parallel::parallel_map;
 use crate::model::philox::{philox4x32_10, uniform};
 use crate::model::shade::FacetSlope;
-use crate::reference::parallel::parallel_map;
 use crate::reference::picture::{FrameReference, PixelShares, SecondOf};
 
 /// Second word of the Philox key: a check shares no random numbers with pixels and paths.

@@ -21,6 +21,7 @@ const KNOBS: &[Knob] = &[
         values: &["0.0", "0.001", "0.01", "0.03"],
         applies: has_particles,
     },
+    Knob { key: "draw.lod", values: &["0.0", "0.25", "0.5", "1.0"], applies: has_many },
     Knob { key: "draw.overlap", values: &["thin", "slices"], applies: draws_tiles },
     Knob { key: "draw.slice", values: &["0.75", "1.25", "2.0"], applies: draws_slices },
     Knob { key: "draw.sort_bits", values: &["16", "32"], applies: has_particles },
@@ -78,6 +79,11 @@ fn draws_tiles(scene: &Scene) -> bool {
 
 fn draws_slices(scene: &Scene) -> bool {
     draws_tiles(scene) && scene.draw.overlap == Overlap::Slices
+}
+
+/// Returns whether there are so many particles that some may stand for others.
+fn has_many(scene: &Scene) -> bool {
+    scene.n_particles() >= 1 << 16 && scene.draw.count.is_none() && !scene.is_textured()
 }
 
 fn has_particles(scene: &Scene) -> bool {

@@ -66,12 +66,18 @@ type Describe = fn(&Scene) -> String;
 type Remove = fn(&mut Scene);
 
 /// The approximations in order: drawing first, the sources of light last.
-const ALL: [(&str, Part, Describe, Remove); 10] = [
+const ALL: [(&str, Part, Describe, Remove); 11] = [
     (
         "resolution",
         Part::Particles,
         |s| s.draw.resolution.name().into(),
         |s| s.draw.resolution = Resolution::Full,
+    ),
+    (
+        "merged blobs",
+        Part::Particles,
+        |s| format!("cells of {} sigma", s.draw.lod),
+        |s| s.draw.lod = 0.0,
     ),
     (
         "smallest",

@@ -2,8 +2,8 @@
 
 use super::*;
 use nimbus::model::basis::{Basis, Sampling};
+use nimbus::model::parallel::parallel_map;
 use nimbus::model::philox::{philox4x32_10, uniform};
-use nimbus::reference::parallel::parallel_map;
 use nimbus::reference::transmit::{Obstacles, Receiver as Place};
 
 const EYE: DVec3 = DVec3::new(2.0, 3.0, 6.0);

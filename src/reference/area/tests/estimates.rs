@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::model::cloud::Shape;
+use crate::model::parallel::parallel_map;
 use crate::model::philox::{philox4x32_10, uniform};
-use crate::reference::parallel::parallel_map;
 
 /// Twelve random rectangles in a box of half edge 2, four of them glossy, and lights.
 fn random_scene(seed: u32) -> (Vec<Surface>, Vec<Brdf>, Vec<Light>) {

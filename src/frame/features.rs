@@ -284,10 +284,7 @@ pub(super) fn tau_bound(scene: &Scene, group: &Group) -> f64 {
 pub(super) fn denser_at_most(scene: &Scene, group: &Group) -> f64 {
     let conserves = scene.draw.count.is_some_and(|c| c.conserve);
     let by_count = if conserves { f64::from(group.n_particles) } else { 1.0 };
-    by_count * heavier_at_most(scene)
-}
-
-/// Returns the most blobs that one stands for.
-pub(super) fn heavier_at_most(scene: &Scene) -> f64 {
-    if has_lod(scene) { (scene.n_particles() as f64).min(f64::from(RUN)) } else { 1.0 }
+    // With merged blobs, one stands for a run at most.
+    let by_run = (scene.n_particles() as f64).min(f64::from(RUN));
+    if has_lod(scene) { by_count * by_run } else { by_count }
 }

@@ -8,9 +8,7 @@ use glam::{DVec3, Vec3};
 use tracing::info_span;
 
 use super::clock::ms;
-use super::features::{
-    denser_at_most, has_impostors, has_live, heavier_at_most, is_glossy, tau_bound,
-};
+use super::features::{denser_at_most, has_impostors, has_live, is_glossy, tau_bound};
 use super::live::{disc_records, live_particles};
 use super::media::{self, KeptMedium};
 use super::packet::Packet;
@@ -154,7 +152,8 @@ impl Game {
         };
         let heaviest = self.heaviest(&grown, live.as_ref());
         let extents = self.extents(&grown, &origins, live.as_deref());
-        let widest = extents.iter().map(|e| e.sigma_max).fold(0.0, f64::max);
+        let filled = grown.iter().filter(|g| g.n_particles > 0);
+        let sigma_max = filled.map(Group::sigma_widest).fold(0.0, f64::max);
         Ok(Packet {
             i_frame,
             time_s,
@@ -187,8 +186,8 @@ impl Game {
                 .collect(),
             grid: GridRecord::from(&setting.grid),
             heaviest,
-            sigma_max: grown.iter().map(Group::sigma_widest).fold(0.0, f64::max),
-            n_levels: setting.grid.n_used_levels(self.scene.n_particles(), widest),
+            sigma_max,
+            n_levels: setting.grid.n_used_levels(self.scene.n_particles(), sigma_max),
             radius: setting.radius,
             sort_bits: self.sort_bits(&grown, setting.radius),
             slice: slice_length(self.scene.draw.slice, &grown, setting.radius),
@@ -215,7 +214,7 @@ impl Game {
             .filter(|_| self.scene.is_animated())
             .map_or(0.0, |all| all.iter().map(mass_of).fold(0.0, f64::max));
         let scale = groups.iter().map(|g| g.scale.powi(3)).fold(1.0, f64::max);
-        heavier_at_most(&self.scene) * max_blob_mass(groups).max(scale * moved)
+        max_blob_mass(groups).max(scale * moved)
     }
 
     /// Returns the bits of a sort key.

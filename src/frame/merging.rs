@@ -71,7 +71,7 @@ impl Merging {
     }
 }
 
-/// Returns the places and the particles that are drawn and deposited.
+/// Returns the places and the particles that are drawn.
 pub(super) fn drawn<'a>(merging: &'a Option<Merging>, b: &'a SceneBuffers) -> [&'a Buffer; 2] {
     match merging {
         Some(Merging { buffers, .. }) => [&buffers.placed, &buffers.particles],

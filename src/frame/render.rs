@@ -115,7 +115,6 @@ impl FramePasses {
             let mut merging = self.merging.iter();
             merging.try_for_each(|m| m.record(rec, &self.buffers, n, packet.sigma_max))
         })?;
-        let [placed, particles] = drawn(&self.merging, &self.buffers);
         pass(rec, plan, Pass::Grid, |rec| {
             let Packet { grid: of, heaviest, n_levels, .. } = packet;
             let deposit =

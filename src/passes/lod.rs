@@ -1,6 +1,6 @@
 //! lod: one blob in place of many that lie close together.
 //!
-//! In: placed particles. Out: places and particles to draw and to deposit: of each run of blobs of
+//! In: placed particles. Out: places and particles to draw. Of each run of blobs of
 //! about one size in one cell, a member has mass, mean place and mean variance of all, and the
 //! others have no extinction and no other numbers. Law, and the error of the picture: passes.md
 //! "lod". Error of the pass: a few roundings; a blob within rounding of a border of cells may

@@ -312,7 +312,7 @@ fn frames_show_the_merged_blobs() {
     let (_, all) = frame(&gpu, &["lighting.mode='none'"]);
     let off = rms_apart(&tiles, &all);
     assert!((1e-4..4e-3).contains(&off), "{off:.1e}");
-    // Lit: the grid has the merged blobs, too.
+    // Lit: a blob has the light of the member nearest to its centre.
     let lit = frame(&gpu, &[merged]).1;
     let all_lit = frame(&gpu, &[]).1;
     let brightest = all_lit.iter().copied().fold(0.0, f64::max);

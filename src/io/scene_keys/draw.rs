@@ -64,9 +64,9 @@ keys! { DRAW: fn draw(s) -> Draw { Draw;
     cull: choice("on", &Cull::NAMES);
     /// With `cull`, σ on the screen below which a particle is left out.
     smallest: cutoff(Bounds::Within(0.0, 1000.0)), "px";
-    /// Edge of cells, over σ: in each of them one particle stands for all of about its size, in the
-    /// picture and in the density grid. With 0 every particle is drawn. Particles with a texture
-    /// and those that are no balls stay.
+    /// Edge of cells, over σ: in each of them one particle is drawn for all of about its size. With
+    /// 0 every particle is drawn. Light is that of all particles. Particles with a texture and
+    /// those that are no balls stay.
     lod: number(0.0, Bounds::Within(0.0, 2.0)), "σ";
     /// Bits of the depth keys that particles are sorted by.
     sort_bits: sort_bits();

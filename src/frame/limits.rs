@@ -57,7 +57,8 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let n_blocks = scene.n_facets() / u64::from(MIN_BLOCK) + scene.n_regions() as u64;
     if has_second(scene) && n_blocks > u64::from(limits.max_workgroups_x) {
         return Err(Error::limit(format!(
-            "the second reflection of {} facets: {n_blocks} workgroups, this device takes {}",
+            "the second reflection of {} facets: {n_blocks} workgroups, this device takes {} \
+             (maxComputeWorkGroupCount); expected a lower lighting.facets_per_cloud, or \"auto\"",
             scene.n_facets(),
             limits.max_workgroups_x
         )));

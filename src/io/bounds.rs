@@ -52,6 +52,7 @@ pub enum Bounds {
 
 impl Bounds {
     /// Returns whether `v` is finite and in the range.
+    #[inline]
     pub fn contains(self, v: f64) -> bool {
         v.is_finite()
             && match self {
@@ -103,12 +104,14 @@ pub fn rounded(v: f64) -> String {
 }
 
 /// Returns the expected range when `v` is no coordinate.
+#[inline]
 pub fn wrong_coordinate(v: f64) -> Option<String> {
     (!COORDINATE.contains(v)).then(|| COORDINATE.to_string())
 }
 
 /// Returns the expected range when `v` is no size: neither 0 nor a number from `least` to
 /// [`GREATEST`]. With `least` 0 every number from 0 on is a size.
+#[inline]
 pub fn wrong_size(v: f64, least: f64) -> Option<String> {
     let range = Bounds::Within(least, GREATEST);
     if v == 0.0 || range.contains(v) {

@@ -18,7 +18,10 @@ pub fn digest(list: &ParticleList) -> [u8; 32] {
         list[part.clone()].iter().for_each(|p| add(&mut hash, p));
         if let Some(of) = list.harmonics() {
             let words = of.by_particle[part].as_flattened().as_flattened();
-            words.iter().for_each(|v| hash.update(v.to_le_bytes()));
+            match cfg!(target_endian = "little") {
+                true => hash.update(bytemuck::cast_slice(words)),
+                false => words.iter().for_each(|v| hash.update(v.to_le_bytes())),
+            }
         }
         hash.finalize().into()
     };

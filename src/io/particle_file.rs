@@ -3,48 +3,57 @@
 //! With `sigma_y` alone, sigma is the one along x and z; with `sigma_z`, the one along x. The
 //! quaternion q turns these axes.
 
+use std::ops::Range;
 use std::path::Path;
 
-use csv::{ReaderBuilder, StringRecord};
+use csv::{Reader, ReaderBuilder, StringRecord};
 use glam::{DQuat, DVec3};
 
 use super::bounds::{LEAST, rounded, wrong_coordinate, wrong_size};
 use super::document::suggest::{did_you_mean, list, shown};
+use super::memory;
 use super::text_file::line_column;
 use crate::error::{Error, Place, Result};
 use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS, Shape, unit_quaternion};
+use crate::model::parallel::parallel_map;
 
 const COLUMNS: [&str; 15] = [
     "x", "y", "z", "sigma", "radius", "sigma_y", "kappa", "r", "g", "b", "sigma_z", "qw", "qx",
     "qy", "qz",
 ];
-const POSITION: std::ops::Range<usize> = 0..3;
+const POSITION: Range<usize> = 0..3;
 const SIGMA: usize = 3;
 const RADIUS: usize = 4;
 const SIGMA_Y: usize = 5;
 const KAPPA: usize = 6;
-const COLOR: std::ops::Range<usize> = 7..10;
+const COLOR: Range<usize> = 7..10;
 const SIGMA_Z: usize = 10;
-const TURN: std::ops::Range<usize> = 11..15;
+const TURN: Range<usize> = 11..15;
 
 /// Beginning of a particle list, for messages.
 pub const FIRST: &str = "a header x,y,z,sigma (or radius),kappa[,r,g,b]";
 /// Hint about rows whose fields are separated by other characters.
 const COMMAS: &str = "; commas separate the columns";
 
+/// Bytes of a part of a list. Parts are read on all threads.
+const PART_BYTES: usize = 4 << 20;
+
+/// Particles, and the line of each.
+pub type Lines = (Vec<Particle>, Vec<usize>);
+
 /// Reads particles from text, and the line of each; `path` is the text's name in messages.
 ///
 /// # Errors
-/// When the text holds a fault, with line and column.
-pub fn parse(text: &str, path: &Path) -> Result<(Vec<Particle>, Vec<usize>)> {
-    let file = File { text, path };
-    let mut reader =
-        ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
-    let mut rows = reader.records();
-    let mut next = || rows.find(|row| row.as_ref().map_or(true, |row| !is_blank(row))).transpose();
-    let lost = |e: csv::Error| Error::scene(Place::file(path), format!("not readable as CSV: {e}"));
+/// When the text holds a fault, with line and column, and when the particles do not fit in memory.
+pub fn parse(text: &str, path: &Path) -> Result<Lines> {
+    parse_by(PART_BYTES, text, path)
+}
 
-    let Some(header) = next().map_err(lost)? else {
+/// Reads particles from parts of `part_bytes`.
+fn parse_by(part_bytes: usize, text: &str, path: &Path) -> Result<Lines> {
+    let file = File { text, begin: 0, path };
+    let mut rows = Rows::new(text);
+    let Some(header) = rows.next(path)?.cloned() else {
         return Err(Error::scene(
             Place::line(path, 1, 1),
             format!("the file is empty: expected {FIRST}"),
@@ -52,26 +61,70 @@ pub fn parse(text: &str, path: &Path) -> Result<(Vec<Particle>, Vec<usize>)> {
     };
     file.check_quotes(&header)?;
     let columns = Columns::find(&file, &header)?;
+    let begin = (rows.reader.position().byte() as usize).min(text.len());
+    let parts = parts_of(text, begin, part_bytes);
+    let n_lines: Vec<usize> = parallel_map(parts.len(), |k| count_lines(&text[parts[k].clone()]));
+    // A row has a line, and of each field a character and a separator.
+    let most = (text.len() / (2 * header.len())).min(n_lines.iter().sum::<usize>() + 1);
+    // Parts are joined when all are read.
+    let n_bytes = 2 * most * (size_of::<Particle>() + size_of::<usize>());
+    memory::check(n_bytes as u64, || format!("{}: {most} rows", path.display()))?;
+    let of_part = |k: usize| columns.part(text, parts[k].clone(), path, header.len());
+    let read = parallel_map(parts.len(), of_part);
     let (mut particles, mut lines) = (Vec::new(), Vec::new());
-    // Lines are counted on from row to row; counting from the start would take the square of the
-    // file's length.
-    let (mut line, mut counted) = (1, 0);
-    while let Some(row) = next().map_err(lost)? {
-        file.check_quotes(&row)?;
-        if row.len() != header.len() {
-            let i = row.len().min(header.len());
-            let (n, found) = (header.len(), row.len());
-            let hint = if row.iter().any(is_of_several) { COMMAS } else { "" };
-            let what = format!("expected {n} fields as in the header, found {found}{hint}");
-            return Err(Error::scene(file.place(&row, i), what));
-        }
-        particles.push(columns.particle(&file, &row)?);
-        let start = file.start(&row);
-        line += text[counted..start].bytes().filter(|b| *b == b'\n').count();
-        counted = start;
-        lines.push(line);
+    let mut before = 1 + count_lines(&text[..begin]);
+    for (part, n_lines) in read.into_iter().zip(n_lines) {
+        let (own, at) = part?;
+        particles.extend(own);
+        lines.extend(at.into_iter().map(|line| before + line));
+        before += n_lines;
     }
     Ok((particles, lines))
+}
+
+/// Returns the parts of `text` from `begin` on, which end where lines end.
+fn parts_of(text: &str, begin: usize, part_bytes: usize) -> Vec<Range<usize>> {
+    let (bytes, mut parts, mut start) = (text.as_bytes(), vec![], begin);
+    while start < bytes.len() {
+        let least = (start + part_bytes).min(bytes.len());
+        let rest = bytes[least..].iter().position(|b| *b == b'\n').map(|i| least + i + 1);
+        let end = rest.unwrap_or(bytes.len());
+        parts.push(start..end);
+        start = end;
+    }
+    parts
+}
+
+fn count_lines(text: &str) -> usize {
+    text.bytes().filter(|b| *b == b'\n').count()
+}
+
+/// Rows of a part of a text, without the blank ones.
+struct Rows<'a> {
+    reader: Reader<&'a [u8]>,
+    row: StringRecord,
+}
+
+impl<'a> Rows<'a> {
+    fn new(text: &'a str) -> Rows<'a> {
+        let mut builder = ReaderBuilder::new();
+        let reader = builder.has_headers(false).flexible(true).from_reader(text.as_bytes());
+        Rows { reader, row: StringRecord::new() }
+    }
+
+    fn next(&mut self, path: &Path) -> Result<Option<&StringRecord>> {
+        loop {
+            match self.reader.read_record(&mut self.row) {
+                Ok(false) => return Ok(None),
+                Ok(true) if is_blank(&self.row) => {}
+                Ok(true) => return Ok(Some(&self.row)),
+                Err(e) => {
+                    let what = format!("not readable as CSV: {e}");
+                    return Err(Error::scene(Place::file(path), what));
+                }
+            }
+        }
+    }
 }
 
 fn is_blank(row: &StringRecord) -> bool {
@@ -83,8 +136,11 @@ fn is_of_several(field: &str) -> bool {
     field.trim().contains(|c: char| c == ';' || c.is_whitespace())
 }
 
+/// A text of which a part is read.
 struct File<'a> {
     text: &'a str,
+    /// Where the part begins.
+    begin: usize,
     path: &'a Path,
 }
 
@@ -99,7 +155,8 @@ impl File<'_> {
 
     /// Returns the byte offset at which a row starts.
     fn start(&self, row: &StringRecord) -> usize {
-        let start = row.position().map_or(0, |p| p.byte() as usize).min(self.text.len());
+        let in_part = row.position().map_or(0, |p| p.byte() as usize);
+        let start = (self.begin + in_part).min(self.text.len());
         // The reader's position may be before line ends that it skips.
         start + self.text[start..].bytes().take_while(|b| matches!(b, b'\r' | b'\n')).count()
     }
@@ -159,7 +216,7 @@ impl Columns {
             }
         }
         let columns = COLUMNS.map(|column| names.iter().position(|name| *name == column));
-        let missing = |of: std::ops::Range<usize>| -> Vec<&str> {
+        let missing = |of: Range<usize>| -> Vec<&str> {
             of.filter(|i| columns[*i].is_none()).map(|i| COLUMNS[i]).collect()
         };
         match (columns[SIGMA], columns[RADIUS]) {
@@ -181,6 +238,33 @@ impl Columns {
             Some(name) => fault(0, &format!("missing column `{name}`")),
             None => Ok(Columns(columns)),
         }
+    }
+
+    /// Reads the rows of a part of `text`, and counts the lines before each. Rows have `n_fields`.
+    fn part(&self, text: &str, part: Range<usize>, path: &Path, n_fields: usize) -> Result<Lines> {
+        let file = File { text, begin: part.start, path };
+        let (mut particles, mut lines) = (Vec::new(), Vec::new());
+        // Lines are counted on from row to row; counting from the start would take the square of
+        // the part's length.
+        let (mut line, mut counted) = (0, part.start);
+        let mut rows = Rows::new(&text[part]);
+        while let Some(row) = rows.next(path)? {
+            file.check_quotes(row)?;
+            if row.len() != n_fields {
+                let i = row.len().min(n_fields);
+                let found = row.len();
+                let hint = if row.iter().any(is_of_several) { COMMAS } else { "" };
+                let what =
+                    format!("expected {n_fields} fields as in the header, found {found}{hint}");
+                return Err(Error::scene(file.place(row, i), what));
+            }
+            particles.push(self.particle(&file, row)?);
+            let start = file.start(row);
+            line += count_lines(&text[counted..start]);
+            counted = start;
+            lines.push(line);
+        }
+        Ok((particles, lines))
     }
 
     fn particle(&self, file: &File, row: &StringRecord) -> Result<Particle> {
@@ -256,145 +340,4 @@ pub(super) fn wrong_height(v: f64, sigma: f64) -> Option<String> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn good(text: &str) -> Vec<Particle> {
-        parse(text, Path::new("p.csv")).unwrap().0
-    }
-
-    #[test]
-    fn columns_come_in_any_order_and_colour_is_optional() {
-        let list = good("kappa, b,g,r, radius,z,y,x\n2,0.3,0.2,0.1,6,-3,2,1\n");
-        let position = DVec3::new(1.0, 2.0, -3.0);
-        let expected = Particle {
-            shape: Shape::BALL,
-            position,
-            sigma: 2.0,
-            kappa: 2.0,
-            color: DVec3::new(0.1, 0.2, 0.3),
-        };
-        assert_eq!(list, [expected]);
-        let flat = good("x,y,z,sigma,sigma_y,kappa\n1,2,-3,2,0.5,2\n0,0,0,0,7,1\n");
-        assert_eq!([flat[0].shape, flat[1].shape], [Shape::upright(0.25), Shape::BALL]);
-        // A turn by a third about the diagonal: x, y and z become y, z and x.
-        let turned = good("x,y,z,sigma,sigma_y,sigma_z,qw,qx,qy,qz,kappa\n0,0,0,3,2,1,2,2,2,2,1\n");
-        let extents = turned[0].sigma * turned[0].shape.extents();
-        assert!(extents.abs_diff_eq(DVec3::new(1.0, 3.0, 2.0), 3e-5), "{extents}");
-        let plain = good("\n\"x\",y,z,sigma,kappa\r\n\r\n1,2,-3, 2.0 ,\"2\"\r\n \r\n");
-        assert_eq!(plain, [Particle { color: DVec3::ONE, ..expected }]);
-        assert_eq!(good("x,y,z,sigma,kappa"), []);
-        let text = "\nx,y,z,sigma,kappa\r\n\r\n1,2,3,4,5\n \n1,2,3,4,5\n1,2,3,4,5";
-        assert_eq!(parse(text, Path::new("p.csv")).unwrap().1, [4, 6, 7]);
-    }
-
-    #[test]
-    fn faults_have_their_place_and_say_what_was_expected() {
-        let known = "(known: `x`, `y`, `z`, `sigma`, `radius`, `sigma_y`, `kappa`, `r`, `g`, `b`, \
-                     `sigma_z`, `qw`, `qx`, `qy`, `qz`)";
-        let row = |row: &str| format!("x,y,z,sigma,kappa\n0,0,0,1,1\r\n\r\n{row}\n");
-        for (text, expected) in [
-            (
-                "x,y,z,sigma,kapa".to_owned(),
-                format!(
-                    "1:13: unknown column `kapa`; did you mean \
-                `kappa`? {known}"
-                ),
-            ),
-            (
-                "x,y,z,sigma,kappa,".to_owned(),
-                format!(
-                    "1:19: unknown column ``; did you mean \
-                `x`? {known}"
-                ),
-            ),
-            ("x, x,y,z,sigma,kappa".to_owned(), "1:4: column `x` stands twice".to_owned()),
-            ("x,y,sigma,kappa".to_owned(), "1:1: missing column `z`".to_owned()),
-            (
-                "x,y,z,kappa".to_owned(),
-                "1:1: missing column `sigma` (or \
-                `radius` = 3 sigma)"
-                    .to_owned(),
-            ),
-            (
-                "x,y,z,sigma,kappa,radius".to_owned(),
-                "1:19: expected `sigma` or \
-                `radius`, found both"
-                    .to_owned(),
-            ),
-            (
-                "x,y,z,sigma,kappa,r,b".to_owned(),
-                "1:19: expected all of `r`, `g`, `b` or \
-                none; missing `g`"
-                    .to_owned(),
-            ),
-            (
-                "\n1,2,3,4,5\n".to_owned(),
-                "2:1: expected a header x,y,z,sigma (or radius),kappa[,r,g,b], found numbers"
-                    .to_owned(),
-            ),
-            (
-                "3\n1\n3, 1, 1, 1, 0, 0, 0, 1\n".to_owned(),
-                "1:1: expected a header x,y,z,sigma (or radius),kappa[,r,g,b], found numbers; a \
-                 box file needs from = \"boxes\""
-                    .to_owned(),
-            ),
-            (
-                "x;y;z;sigma;kappa\n0;0;0;1;1".to_owned(),
-                format!(
-                    "1:1: unknown column `x;y;z;sigma;kappa`; commas separate the columns {known}"
-                ),
-            ),
-            (
-                row("0\t0\t0\t1\t1"),
-                "4:10: expected 5 fields as in the header, found 1; commas separate the columns"
-                    .to_owned(),
-            ),
-            (row("0,0,0,1"), "4:8: expected 5 fields as in the header, found 4".to_owned()),
-            (row("0,0,0,1,1,7"), "4:11: expected 5 fields as in the header, found 6".to_owned()),
-            (
-                "x,y,z,sigma,sigma_y,kappa\n0,0,0,2,0.001,1".to_owned(),
-                "2:9: sigma_y: expected a number from 2.000e-3 to 2.000e3, a thousandth to a \
-                 thousand times the other, found `0.001`"
-                    .to_owned(),
-            ),
-            (row("0,0,zero,1,1"), "4:5: expected a finite number, found `zero`".to_owned()),
-            (row("0,0,,1,1"), "4:5: expected a finite number, found ``".to_owned()),
-            (row("0,\"0\", inf,1,1"), "4:8: expected a finite number, found `inf`".to_owned()),
-            (
-                row("0,0,0,-1,1"),
-                "4:7: sigma: expected 0 or a number from 1e-15 to \
-                1e15, found `-1`"
-                    .to_owned(),
-            ),
-            (
-                row("0,0,0,1,-2"),
-                "4:9: kappa: expected a number from 0 to \
-                1e15, found `-2`"
-                    .to_owned(),
-            ),
-            (
-                row("0,0,0,1e-300,1"),
-                "4:7: sigma: expected 0 or a number from 1e-15 to 1e15, \
-                found `1e-300`"
-                    .to_owned(),
-            ),
-            (
-                row("0,0,0,1,1e300"),
-                "4:9: kappa: expected a number from 0 to 1e15, \
-                found `1e300`"
-                    .to_owned(),
-            ),
-            (
-                row("0,1e30,0,1,1"),
-                "4:3: y: expected a number from -1e15 to 1e15, \
-                found `1e30`"
-                    .to_owned(),
-            ),
-            (row("0,0,\"0,1,1"), "4:5: the quote is not closed on its line".to_owned()),
-        ] {
-            let error = parse(&text, Path::new("p.csv")).expect_err(&text).to_string();
-            assert_eq!(error, format!("p.csv:{expected}"), "for\n{text}");
-        }
-    }
-}
+mod tests;

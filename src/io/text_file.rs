@@ -27,6 +27,14 @@ const BYTE_ORDER_MARK: char = '\u{feff}';
 /// line and column when it is empty or no text.
 pub fn read_text(path: &Path, limit: u64, first: &str) -> Result<String> {
     let bytes = input_file::read(path, limit).map_err(|e| Error::io(path, plain(&e, path)))?;
+    check_text(&bytes, path, first).map(str::to_owned)
+}
+
+/// Returns the text of an input file, whose kind begins with `first`, without a byte-order mark.
+///
+/// # Errors
+/// With line and column when it is empty or no text.
+pub fn check_text<'a>(bytes: &'a [u8], path: &Path, first: &str) -> Result<&'a str> {
     let text = decode(bytes, path)?;
     if text.trim().is_empty() {
         return Err(Error::scene(
@@ -57,27 +65,19 @@ pub fn read_result(path: &Path, limit: u64) -> Result<String> {
     input_file::read_string(path, limit).map_err(|cause| Error::io(path, cause))
 }
 
-fn decode(bytes: Vec<u8>, path: &Path) -> Result<String> {
-    let at = |bytes: &[u8], offset: usize| {
+fn decode<'a>(bytes: &'a [u8], path: &Path) -> Result<&'a str> {
+    let at = |offset: usize| {
         // The bytes before the offset may be no text either. They count as the replacement
         // characters that an editor would show.
         let (line, column) = line_column(&String::from_utf8_lossy(&bytes[..offset]), usize::MAX);
         Place::line(path, line, column)
     };
     if let Some(offset) = bytes.iter().position(|b| *b == 0) {
-        return Err(Error::scene(at(&bytes, offset), "not a text file: it holds a zero byte"));
+        return Err(Error::scene(at(offset), "not a text file: it holds a zero byte"));
     }
-    let text = match String::from_utf8(bytes) {
-        Ok(text) => text,
-        Err(e) => {
-            let offset = e.utf8_error().valid_up_to();
-            return Err(Error::scene(at(e.as_bytes(), offset), "not UTF-8 text"));
-        }
-    };
-    Ok(match text.strip_prefix(BYTE_ORDER_MARK) {
-        Some(rest) => rest.to_owned(),
-        None => text,
-    })
+    let text = std::str::from_utf8(bytes)
+        .map_err(|e| Error::scene(at(e.valid_up_to()), "not UTF-8 text"))?;
+    Ok(text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text))
 }
 
 /// Returns the message of an error without its number, which tells a user nothing.

@@ -94,7 +94,7 @@ impl Sums {
     /// Returns those of particle `i` alone.
     fn of(p: &Particle, i: usize) -> Sums {
         let extents = p.shape.extents();
-        let aspect = p.shape.aspect_upright();
+        let aspect = p.shape.aspect_upright_of(extents);
         let (least, turned) = match p.shape.is_upright() {
             true => (aspect, 0.0),
             false => (p.shape.narrowest(), p.sigma * p.shape.widest()),

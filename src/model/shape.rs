@@ -23,6 +23,7 @@ impl Turn {
     pub const NONE: Turn = Turn([0; 2]);
 
     /// Returns the stored rotation next to a unit quaternion.
+    #[inline]
     pub fn new(rotation: DQuat) -> Turn {
         // w counts first, so that 0 is no rotation.
         let [x, y, z, w] = rotation.to_array();
@@ -49,6 +50,7 @@ impl Turn {
     }
 
     /// Returns the rotation as a unit quaternion.
+    #[inline]
     pub fn rotation(self) -> DQuat {
         let [low, high] = self.0;
         let component = |bits: u32| f64::from((bits << (32 - BITS)).cast_signed() >> (32 - BITS));
@@ -66,6 +68,7 @@ impl Turn {
 }
 
 /// Returns a quaternion of finite numbers as one of length 1; `None` of zeros.
+#[inline]
 pub fn unit_quaternion(of: DQuat) -> Option<DQuat> {
     let greatest = of.to_array().into_iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     // Squares of any numbers do not overflow then, nor vanish.
@@ -112,6 +115,7 @@ impl Shape {
     }
 
     /// Returns whether one axis lies along y, and the others are equal.
+    #[inline]
     pub fn is_upright(&self) -> bool {
         self.aspect_z == 1.0 && self.turn == Turn::NONE
     }
@@ -130,6 +134,7 @@ impl Shape {
     ///
     /// The returned σ is the greatest of the three. An upright ellipsoid has the σ along x and z
     /// instead. An axis shorter than [`MIN_ASPECT`] of the longest is raised to that.
+    #[inline]
     pub fn of(scales: DVec3, turned: DQuat) -> (f64, Shape) {
         let within =
             |v: f64| if v > 0.0 { v.clamp(MIN_ASPECT, 1.0 / MIN_ASPECT) } else { MIN_ASPECT };
@@ -160,11 +165,13 @@ impl Shape {
     }
 
     /// Returns the lengths of the axes over σ.
+    #[inline]
     pub fn lengths(&self) -> DVec3 {
         DVec3::new(1.0, self.aspect, self.aspect_z)
     }
 
     /// Returns the axes, unit vectors, as columns.
+    #[inline]
     pub fn axes(&self) -> DMat3 {
         if self.turn == Turn::NONE {
             return DMat3::IDENTITY;
@@ -210,6 +217,7 @@ impl Shape {
     }
 
     /// Returns the standard deviations along x, y and z over σ.
+    #[inline]
     pub fn extents(&self) -> DVec3 {
         if self.turn == Turn::NONE {
             return self.lengths();
@@ -220,26 +228,35 @@ impl Shape {
     }
 
     /// Returns the greatest length of an axis over σ.
+    #[inline]
     pub fn widest(&self) -> f64 {
         self.lengths().max_element()
     }
 
     /// Returns the least length of an axis over σ.
+    #[inline]
     pub fn narrowest(&self) -> f64 {
         self.lengths().min_element()
     }
 
     /// Returns the standard deviation along y over that across y, in the mean over x and z by its
     /// square.
+    #[inline]
     pub fn aspect_upright(&self) -> f64 {
+        self.aspect_upright_of(self.extents())
+    }
+
+    /// Returns [`Shape::aspect_upright`] from [`Shape::extents`].
+    #[inline]
+    pub fn aspect_upright_of(&self, extents: DVec3) -> f64 {
         if self.is_upright() {
             return self.aspect;
         }
-        let extents = self.extents();
         extents.y / (0.5 * (extents.x * extents.x + extents.z * extents.z)).sqrt()
     }
 
     /// Returns the volume over that of the ball of σ.
+    #[inline]
     pub fn volume(&self) -> f64 {
         self.aspect * self.aspect_z
     }

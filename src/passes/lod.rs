@@ -46,6 +46,9 @@ bindings! {
     }
 }
 
+/// Places of the order that a workgroup merges at a time; the shaders' RUN.
+pub const RUN: u32 = 256;
+
 /// The pipelines of the pass.
 pub struct Lod {
     key: Kernel,
@@ -64,14 +67,20 @@ impl Lod {
         has_regions: bool,
         is_textured: bool,
     ) -> Result<Lod> {
-        let kernel = |name, fields, macros| {
-            Kernel::with_macros(device, compiler, name, fields, &[], &[macros])
+        let kernel = |name, fields, macros: &[_]| {
+            Kernel::with_macros(device, compiler, name, fields, &[], macros)
         };
+        let invocations = device.limits().subgroup_size.clamp(8, 64);
+        let is_one_subgroup = device.limits().is_one_subgroup(invocations);
+        let of_merge = [
+            ("REGIONS", u32::from(has_regions)),
+            ("WORKGROUP", invocations),
+            ("ONE_SUBGROUP", u32::from(is_one_subgroup)),
+        ];
         let textured = ("TEXTURED", u32::from(is_textured));
-        let regions = ("REGIONS", u32::from(has_regions));
         Ok(Lod {
-            key: kernel("lod.key", KeyPush::FIELDS, textured)?,
-            merge: kernel("lod.merge", MergePush::FIELDS, regions)?,
+            key: kernel("lod.key", KeyPush::FIELDS, &[textured])?,
+            merge: kernel("lod.merge", MergePush::FIELDS, &of_merge)?,
         })
     }
 
@@ -108,6 +117,7 @@ impl Lod {
     ) -> Result<()> {
         let LodInput { placed, particles, i_group, groups, .. } = *input;
         let all = [sorted, placed, particles, i_group, groups, to_placed, to_particles];
-        rec.dispatch(&self.merge, &all, &MergePush { n_particles }, n_particles)
+        let n_blocks = n_particles.div_ceil(RUN);
+        rec.dispatch_groups(&self.merge, &all, &MergePush { n_particles }, n_blocks)
     }
 }

@@ -7,6 +7,7 @@
 
 mod brdf;
 mod case;
+mod colours;
 mod compositing;
 mod context;
 mod count;
@@ -14,6 +15,7 @@ mod determinism;
 mod functions;
 mod generation;
 mod live;
+mod merged;
 mod metamorphic;
 mod moisture;
 mod scattering;
@@ -43,6 +45,8 @@ pub fn cases() -> Vec<Case> {
         scattering::CASES,
         sorting::CASES,
         compositing::CASES,
+        merged::CASES,
+        colours::CASES,
         space::CASES,
         views::CASES,
         determinism::CASES,

@@ -48,6 +48,8 @@ fn families_pass_with_subgroups_of_four() {
         "transmittance/",
         "sorting/",
         "compositing/",
+        "lod/",
+        "harmonics/",
         "space/",
         "determinism/",
     ];
@@ -66,6 +68,15 @@ fn computed_families_pass_with_subgroups_of_sixteen() {
 /// The other families take a quarter of an hour there.
 #[test]
 fn families_pass_on_another_driver() {
-    let families = ["functions/", "count/", "moisture/", "brdf/", "sorting/", "compositing/"];
+    let families = [
+        "functions/",
+        "count/",
+        "moisture/",
+        "brdf/",
+        "sorting/",
+        "compositing/",
+        "lod/",
+        "harmonics/",
+    ];
     stress(&families, "SwiftShader", swiftshader::choose);
 }

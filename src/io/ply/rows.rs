@@ -194,7 +194,9 @@ fn offset_in(text: &str, part: &str) -> usize {
 }
 
 /// Returns the number at the start of `bytes`.
+#[inline]
 fn number(bytes: &[u8], scalar: Scalar, is_big: bool) -> f64 {
+    #[inline]
     fn first<const N: usize>(bytes: &[u8], is_big: bool) -> [u8; N] {
         let mut found = [0; N];
         found.copy_from_slice(&bytes[..N]);

@@ -5,7 +5,9 @@ use glam::{DQuat, DVec3};
 
 use super::header::{Element, Scalar};
 use super::rows::{Fault, Made, OfRow};
-use crate::io::bounds::{AMOUNT, DIVISOR, GREATEST, LEAST, wrong_coordinate, wrong_size};
+use crate::io::bounds::{
+    AMOUNT, COORDINATE, DIVISOR, GREATEST, LEAST, wrong_coordinate, wrong_size,
+};
 use crate::io::document::suggest::list;
 use crate::io::particle_file::wrong_height;
 use crate::model::cloud::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, Shape, unit_quaternion};
@@ -94,11 +96,12 @@ impl OfRow<Coefficients> for HarmonicColumns {
     fn made(&self, value: impl Fn(usize) -> f64) -> Made<Coefficients> {
         let number = |i: usize| {
             let v = value(i);
-            let finite = (!v.is_finite()).then(|| "a finite number".to_owned());
-            match finite.or_else(|| wrong_coordinate(v)) {
-                None => Ok(v),
-                Some(of) => Err(Fault { i, what: format!("expected {of}, found `{v}`") }),
+            if COORDINATE.contains(v) {
+                return Ok(v);
             }
+            let finite = (!v.is_finite()).then(|| "a finite number".to_owned());
+            let of = finite.unwrap_or_else(|| COORDINATE.to_string());
+            Err(Fault { i, what: format!("expected {of}, found `{v}`") })
         };
         let mut made = Coefficients::default();
         for (channel, i) in self.mean.into_iter().enumerate() {

@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 use super::air::{BASE, put_on_base, read_base};
 use super::device_range::{out_of_range, out_of_range_when_grown};
 use super::disc::{DISC_KEYS, read_disc};
-use super::files::Files;
+use super::files::{Files, ListText};
 use super::key::{Keys, keys, names};
 use super::materials::{GROUND, MATERIAL_NAME, ground_named, material_named};
 use super::motion::{
@@ -264,7 +264,7 @@ fn read_boxes(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
 
 fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
     enum Opened {
-        Text(String),
+        Text(ListText),
         Ply(MappedFile),
     }
     let files = reading.around.files;
@@ -275,8 +275,9 @@ fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource>
     let (opened, path) = open_file(s, reading.around.folder, open)?;
     let particles = match opened {
         Opened::Text(text) => {
-            reading.found.digests.push(Sha256::digest(&text).into());
-            let (particles, lines) = particle_file::parse(&text, &path)?;
+            let text = text.text(&path, particle_file::FIRST)?;
+            reading.found.digests.push(Sha256::digest(text).into());
+            let (particles, lines) = particle_file::parse(text, &path)?;
             reading.found.lines = lines;
             particles.into()
         }

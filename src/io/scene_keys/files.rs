@@ -5,13 +5,8 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::error::{Error, Result};
 use crate::io::mapped_file::MappedFile;
-use crate::io::memory;
-use crate::io::text_file::{DATA_LIMIT, plain, read_text};
+use crate::io::text_file::{DATA_LIMIT, check_text, plain, read_text};
 use crate::io::weather::wrf::{self, WeatherFile};
-
-/// Most memory that a list takes by its size: a row of ten bytes is a particle of 80 and a number
-/// of its line, beside the text.
-const MEMORY_BY_TEXT: u64 = 10;
 
 /// Source of the files that a scene names.
 pub trait Files {
@@ -21,12 +16,12 @@ pub trait Files {
     /// When the file cannot be read or is no text.
     fn text(&self, path: &Path, first: &str) -> Result<String>;
 
-    /// Reads a particle list, which may be as large as memory allows.
+    /// Opens a particle list as text, which may have any size.
     ///
     /// # Errors
-    /// As [`Files::text`], and when there is too little memory.
-    fn list(&self, path: &Path, first: &str) -> Result<String> {
-        self.text(path, first)
+    /// When the file cannot be read.
+    fn list(&self, path: &Path, first: &str) -> Result<ListText> {
+        self.text(path, first).map(ListText::Read)
     }
 
     /// Maps a file into memory.
@@ -46,6 +41,27 @@ pub trait Files {
     }
 }
 
+/// The text of a particle list.
+pub enum ListText {
+    /// Text that was read.
+    Read(String),
+    /// A file that is read where it lies.
+    Mapped(MappedFile),
+}
+
+impl ListText {
+    /// Returns the text without a byte-order mark; `path` and `first` are for messages.
+    ///
+    /// # Errors
+    /// With line and column when it is empty or no text.
+    pub fn text(&self, path: &Path, first: &str) -> Result<&str> {
+        match self {
+            ListText::Read(text) => Ok(text),
+            ListText::Mapped(file) => check_text(file.bytes(), path, first),
+        }
+    }
+}
+
 impl<F: Fn(&Path, &str) -> Result<String>> Files for F {
     fn text(&self, path: &Path, first: &str) -> Result<String> {
         self(path, first)
@@ -60,11 +76,8 @@ impl Files for OnDisk {
         read_text(path, DATA_LIMIT, first)
     }
 
-    fn list(&self, path: &Path, first: &str) -> Result<String> {
-        let n_bytes = path.metadata().map_or(0, |about| about.len());
-        let of = || format!("{}: particles of {} MiB of text", path.display(), n_bytes >> 20);
-        memory::check(n_bytes.saturating_mul(MEMORY_BY_TEXT), of)?;
-        read_text(path, u64::MAX, first)
+    fn list(&self, path: &Path, _: &str) -> Result<ListText> {
+        self.mapped(path).map(ListText::Mapped)
     }
 
     fn mapped(&self, path: &Path) -> Result<MappedFile> {
@@ -104,7 +117,7 @@ impl Files for Listed {
         OnDisk.text(path, first)
     }
 
-    fn list(&self, path: &Path, first: &str) -> Result<String> {
+    fn list(&self, path: &Path, first: &str) -> Result<ListText> {
         self.add(path);
         OnDisk.list(path, first)
     }

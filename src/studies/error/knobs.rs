@@ -25,7 +25,12 @@ const KNOBS: &[Knob] = &[
     Knob { key: "draw.overlap", values: &["thin", "slices"], applies: draws_tiles },
     Knob { key: "draw.slice", values: &["0.75", "1.25", "2.0"], applies: draws_slices },
     Knob { key: "draw.sort_bits", values: &["16", "32"], applies: has_particles },
-    Knob { key: "draw.count", values: &["all", "distance"], applies: has_particles },
+    // A scene with merged blobs draws all particles.
+    Knob {
+        key: "draw.count",
+        values: &["all", "distance"],
+        applies: |s| has_particles(s) && !has_many(s) && s.draw.lod == 0.0,
+    },
     Knob { key: "film.format", values: &["rgba8", "rgba16f", "rgba32f"], applies: |_| true },
     Knob { key: "lighting.grid", values: &["16", "32", "64", "128"], applies: marches },
     Knob { key: "lighting.step", values: &["0.5", "1.0", "2.0", "4.0"], applies: marches },
@@ -125,4 +130,34 @@ fn is_glossy(scene: &Scene) -> bool {
     let shines =
         |i: usize| scene.region_material(i).keys.iter().any(|key| key.brdf.ks != DVec3::ZERO);
     gathers(scene) && (0..scene.n_regions()).any(shines)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::io::scene_file::parse;
+
+    /// Returns the keys that a study of a disc of particles goes through.
+    fn keys(n_particles: u32, draw: &str) -> Vec<String> {
+        let text = format!("[draw]\n{draw}\n[[cloud]]\nfrom = 'disc'\nparticles = {n_particles}\n");
+        let scene = parse(text, Path::new("s.toml"), &[], None).unwrap().scene;
+        default_axes(&scene).into_iter().map(|axis| axis.key).collect()
+    }
+
+    #[test]
+    fn merged_blobs_and_fewer_particles_are_not_combined() {
+        let has = |keys: &[String], key: &str| keys.iter().any(|k| k == key);
+        for (n, draw, count, lod) in [
+            (100, "", true, false),
+            (100, "lod = 0.5", false, false),
+            (70_000, "", false, true),
+            (70_000, "count = 'distance'", true, false),
+        ] {
+            let keys = keys(n, draw);
+            let found = [has(&keys, "draw.count"), has(&keys, "draw.lod")];
+            assert_eq!(found, [count, lod], "{n} particles, {draw}");
+        }
+    }
 }

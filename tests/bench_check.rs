@@ -11,6 +11,7 @@ use std::process::Output;
 
 use faults::FAULTS;
 use nimbus::passes;
+use nimbus::stress::cases;
 use program::{nimbus, run, scenes};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -67,6 +68,7 @@ fn right_pictures_of_all_kinds_pass() {
         // From the light that is kept.
         ("cubes-554", &["lighting.mode='diffusion'", "draw.path='sprites'"]),
         ("cubes-554", &["lighting.mode='diffusion'", "draw.cutoff=3.5"]),
+        ("cubes-554", &["draw.lod=0.5", "draw.particles=5000", "cloud.*.texture='none'"]),
         ("threads", &["film.format='rgba32f'", "draw.sort_bits=32"]),
         ("static", &["film.format='rgba32f'", "lighting.summation='pairwise'"]),
     ] {
@@ -74,6 +76,7 @@ fn right_pictures_of_all_kinds_pass() {
         args.extend(settings.iter().flat_map(|s| ["--set".to_owned(), (*s).to_owned()]));
         all.push(args);
     }
+    all.push(["tests/data/splats.toml", SMALL[0], SMALL[1]].map(str::to_owned).to_vec());
     for args in all {
         let args: Vec<&str> = args.iter().map(String::as_str).collect();
         let (output, json) = bench(&args);
@@ -137,6 +140,12 @@ fn finder(what: &str) -> &'static [&'static str] {
             "--set",
             "lighting.bounces=0",
         ],
+        "the extinction of one member alone"
+        | "cells of one size for all sigma"
+        | "the masses of a run the wrong way round" => {
+            &["tests/data/splats.toml", "--set", "draw.lod=1.0"]
+        }
+        "a harmonic of the wrong sign" => &["tests/data/splats.toml"],
         "the sky's light from everywhere is too bright" => {
             &["scenes/cubes-554.toml", "--set", "lighting.mode='single'"]
         }
@@ -169,10 +178,28 @@ fn a_wrong_stage_is_told_where_the_picture_is_within_its_bounds() {
     assert!(!table.contains("the picture is right") && !table.contains("INTERRUPTED"), "{table}");
 }
 
+/// Beginnings of the names of cases of `nimbus stress` that a bench runs with new shaders.
+const STAGES: [&str; 4] = ["functions/", "brdf/", "generation/", "transport/sum"];
+
+fn stage_of(case: &str) -> Option<usize> {
+    STAGES.iter().position(|stage| case.starts_with(stage))
+}
+
+/// A bench runs every case of the stages, and each of their faults fails its case
+/// (tests/mutations.rs). So one fault of each stage stands for the others here.
 #[test]
 fn every_faulty_shader_is_found() {
+    let (_, right) = bench(&[&["scenes/hello.toml"][..], &SMALL].concat());
+    let n_cases = cases().iter().filter(|case| stage_of(case.name).is_some()).count();
+    assert_eq!(right.expect("JSON")["stages"]["n_cases"], n_cases);
     let mut missed = vec![];
-    for (what, file, from, to, _) in FAULTS {
+    let mut is_tried = [false; STAGES.len()];
+    for (what, file, from, to, case) in FAULTS {
+        if let Some(stage) = stage_of(case)
+            && std::mem::replace(&mut is_tried[stage], true)
+        {
+            continue;
+        }
         let dir = faulty(what, [file, from, to]);
         let shaders = ["--shaders", dir.path().to_str().expect("UTF-8")];
         let (output, json) = bench(&[finder(what), &SMALL, &SINGLE, &shaders].concat());
@@ -184,6 +211,7 @@ fn every_faulty_shader_is_found() {
         }
     }
     assert!(missed.is_empty(), "not found: {missed:?}");
+    assert_eq!(is_tried, [true; STAGES.len()]);
 }
 
 #[test]

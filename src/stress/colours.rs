@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::case::{Case, Comparison};
 use super::context::StressContext;
-use super::scenes::{MIDDLE, PATHS, UNLIT, blob, blob_scene, change_camera};
+use super::scenes::{MIDDLE, PATHS, SPRITES, TILES, UNLIT, blob, blob_scene, change_camera};
 use crate::error::Result;
 use crate::model::cloud::CloudSource;
 use crate::model::harmonics::{Coefficients, Harmonics, MAX_DEGREE, N_HARMONICS};
@@ -67,18 +67,16 @@ fn directions(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
         [1e-3, 1.0, 0.0],
         [0.0, -1.0, 1e-3],
     ];
-    for path in PATHS {
-        for size in [1e-15, 1.0, 1e15] {
-            let of = coefficients(size);
-            for axis in axes.map(DVec3::from) {
-                let eye = 10.0 * axis.normalize();
-                let frame = ctx.render(&scene(path, of, eye)?, 0)?;
-                let (truth, bound) = (color(&of, -eye.normalize()), rounding(&of));
-                for k in 0..3 {
-                    let bound = bound[k] + 2f64.powi(-22) * truth[k];
-                    let at = format_args!("{path}, size {size:e}, seen from {eye}, channel {k}");
-                    c.add(frame.channel(MIDDLE, k), truth[k], bound, at);
-                }
+    for (path, size) in [(SPRITES, 1.0), (TILES, 1e-15), (TILES, 1e15)] {
+        let of = coefficients(size);
+        for axis in axes.map(DVec3::from) {
+            let eye = 10.0 * axis.normalize();
+            let frame = ctx.render(&scene(path, of, eye)?, 0)?;
+            let (truth, bound) = (color(&of, -eye.normalize()), rounding(&of));
+            for k in 0..3 {
+                let bound = bound[k] + 2f64.powi(-22) * truth[k];
+                let at = format_args!("{path}, size {size:e}, seen from {eye}, channel {k}");
+                c.add(frame.channel(MIDDLE, k), truth[k], bound, at);
             }
         }
     }

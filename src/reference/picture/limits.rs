@@ -2,8 +2,12 @@
 
 use crate::error::{Error, Result};
 
-/// Most memory of a reference, bytes: 2 GiB less the memory of the scene and the program itself.
+/// Most memory of a reference's pixels, bytes: 2 GiB less the memory of a scene and the program
+/// itself.
 const MOST_BYTES: u64 = 1600 << 20;
+/// Most particles of a reference: more than a scene may have on most devices. They take up to three
+/// times the memory of a scene that holds as many.
+const MOST_PARTICLES: u64 = 1 << 24;
 /// Bytes of a pixel: colours, errors, depths and the picture's copies, as measured.
 const PIXEL_BYTES: u64 = 256;
 /// Bytes of a pixel in each of the partial sums of its samples ([`super::SampleSums`]).
@@ -30,18 +34,23 @@ pub(super) fn check_sums(
     // Sums are joined in pairs, so that there is one for each binary digit of the number.
     let n_sums = if n_samples > 1 { u64::from(n_samples.ilog2()) + 1 } else { 0 };
     let of_pixels = n_pixels.saturating_mul(PIXEL_BYTES + n_sums * sum_bytes);
-    let of_particles = n_particles.saturating_mul(PARTICLE_BYTES);
-    let bytes = of_pixels.saturating_add(of_particles);
-    if bytes <= MOST_BYTES {
-        return Ok(());
+    if n_particles > MOST_PARTICLES {
+        return Err(Error::limit(format!(
+            "a reference of {n_particles} particles takes {} MiB, the limit is {} MiB; expected \
+             fewer particles",
+            n_particles.saturating_mul(PARTICLE_BYTES) >> 20,
+            (MOST_PARTICLES * PARTICLE_BYTES) >> 20
+        )));
     }
-    Err(Error::limit(format!(
-        "a reference of {n_pixels} pixels, {n_samples} samples each, and {n_particles} particles \
-         takes {} MiB, the limit is {} MiB; expected fewer pixels (--size, --pixels, --tile), \
-         samples or particles",
-        bytes >> 20,
-        MOST_BYTES >> 20
-    )))
+    if of_pixels > MOST_BYTES {
+        return Err(Error::limit(format!(
+            "a reference of {n_pixels} pixels, {n_samples} samples each, takes {} MiB, the limit \
+             is {} MiB; expected fewer pixels (--size, --pixels, --tile) or samples",
+            of_pixels >> 20,
+            MOST_BYTES >> 20
+        )));
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -51,7 +60,7 @@ mod tests {
     #[test]
     fn numbers_that_no_memory_holds_are_refused() {
         assert!(check_memory(1920 * 1080, 1 << 6, 100_000).is_ok());
-        assert!(check_memory(0, 1, 5_000_000).is_ok());
+        assert!(check_memory(500, 1, 10_000_000).is_ok());
         for (pixels, samples, particles) in
             [(1 << 28, 1, 0), (1 << 22, 1 << 20, 0), (1, 1, u64::MAX), (u64::MAX, 1, u64::MAX)]
         {

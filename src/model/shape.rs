@@ -161,7 +161,11 @@ impl Shape {
             aspect_z: within(of[(first + 2) % 3] / sigma),
             turn: Turn::new(turned),
         };
-        (sigma, shape)
+        // The stored rotation may make it upright. What is written reads as the same then.
+        match upright_of(sigma * shape.lengths(), shape.turn.rotation()) {
+            Some((wide, high)) => (wide, Shape::upright(within(high / wide))),
+            None => (sigma, shape),
+        }
     }
 
     /// Returns the lengths of the axes over σ.

@@ -161,7 +161,8 @@ impl Shape {
             aspect_z: within(of[(first + 2) % 3] / sigma),
             turn: Turn::new(turned),
         };
-        // The stored rotation may make it upright. What is written reads as the same then.
+        // The stored rotation may make it upright. It must be the same after it was written and
+        // read.
         match upright_of(sigma * shape.lengths(), shape.turn.rotation()) {
             Some((wide, high)) => (wide, Shape::upright(within(high / wide))),
             None => (sigma, shape),

@@ -95,7 +95,7 @@ fn match_the_reference(of: fn(&Picture, u64) -> Picture) {
     let mut gpu = Gpu::new();
     for (i, (what, picture, _)) in cases().into_iter().enumerate() {
         let picture = of(&picture, i as u64);
-        // A format knows nothing of shapes, and takes turns.
+        // Rounding to a format does not depend on shapes: a third of the cases has all formats.
         let is_in_all = picture.placed.len() <= 100 && i.is_multiple_of(3);
         let formats = if is_in_all { &FORMATS[..] } else { &FORMATS[1..2] };
         for (target, format) in formats.iter().copied() {

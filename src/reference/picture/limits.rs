@@ -5,8 +5,7 @@ use crate::error::{Error, Result};
 /// Most memory of a reference's pixels, bytes: 2 GiB less the memory of a scene and the program
 /// itself.
 const MOST_BYTES: u64 = 1600 << 20;
-/// Most particles of a reference: more than a scene may have on most devices. They take up to three
-/// times the memory of a scene that holds as many.
+/// Most particles of a reference, which take 5 GiB.
 const MOST_PARTICLES: u64 = 1 << 24;
 /// Bytes of a pixel: colours, errors, depths and the picture's copies, as measured.
 const PIXEL_BYTES: u64 = 256;

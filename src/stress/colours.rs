@@ -15,8 +15,7 @@ use crate::reference::harmonics::{color, rounding};
 /// The cases of this file, in the order in which they run.
 pub const CASES: &[Case] = &[Case {
     name: "harmonics/directions",
-    what: "an opaque blob with coefficients of 1e-15 to 1e15, seen along the axes, the \
-            diagonals and within 1e-9 of them",
+    what: "an opaque blob seen along axes and diagonals; coefficients up to 1e15",
     bound: "that of the pass, 2^-22 of the colour",
     check: directions,
 }];

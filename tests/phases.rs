@@ -129,7 +129,7 @@ fn frames_are_of_the_phase_they_fall_in() {
 
 #[test]
 fn the_hash_depends_on_the_keys_that_phases_set() {
-    let hash = |scene: &str| loaded(scene, &[]).expect("the scene loads").hash;
+    let hash = |scene: &str| loaded(scene, &[]).expect("the scene loads").hash().to_owned();
     assert_eq!(hash(SCENE), hash(SCENE));
     assert_ne!(hash(SCENE), hash(&SCENE.replace("height = 24", "height = 25")));
     assert_ne!(hash(SCENE), hash(SCENE.split("[[phase]]").next().expect("a part")));

@@ -46,7 +46,7 @@ pub fn bench_cases(args: &BenchArgs, path: &Path, options: &SceneArgs) -> Result
     let mut memory = SceneMemory::of_machine();
     let loops = LoopChoice { modes, skip: !options.no_skip, saved: !args.no_saved };
     let loaded = load(path, options)?;
-    let (scene_hash, resolved) = (loaded.hash.clone(), loaded.resolved.clone());
+    let (scene_hash, resolved) = (loaded.hash().to_owned(), loaded.resolved.clone());
     let mut printed = BTreeSet::from_iter(warnings(&loaded));
     let mut all = Vec::new();
     if axes.is_empty() {

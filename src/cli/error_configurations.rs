@@ -106,7 +106,7 @@ pub fn load_configuration(
     settings: &[Setting],
 ) -> Result<LoadedConfiguration> {
     let loaded = load_at(&args.scene, options, "--knob", settings)?;
-    let hash = loaded.hash.clone();
+    let hash = loaded.hash().to_owned();
     let scene = loaded.at_frame(args.frame).exact().into_owned();
     Ok(LoadedConfiguration { scene: Arc::new(scene), hash })
 }

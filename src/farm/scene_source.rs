@@ -41,7 +41,7 @@ impl SceneSource {
             |path: &Path| std::path::absolute(path).map_err(|cause| Error::io(path, cause));
         let (file, shaders) = (absolute(file)?, shaders.map(absolute).transpose()?);
         let loaded = scene_file::load(&file, &set, seed)?;
-        let (hash, shaders_hash) = (loaded.hash.clone(), hash_of(shaders.as_deref())?);
+        let (hash, shaders_hash) = (loaded.hash().to_owned(), hash_of(shaders.as_deref())?);
         Ok((SceneSource { file, set, seed, hash, shaders, shaders_hash }, loaded))
     }
 
@@ -51,7 +51,7 @@ impl SceneSource {
     /// When the scene or a shader cannot be read.
     pub fn reload(&self) -> Result<std::result::Result<LoadedScene, String>> {
         let loaded = scene_file::load(&self.file, &self.set, self.seed)?;
-        if loaded.hash != self.hash {
+        if loaded.hash() != self.hash {
             let file = self.file.display();
             return Ok(Err(format!("{file} or a file that it names has changed since")));
         }

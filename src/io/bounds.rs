@@ -114,10 +114,14 @@ pub fn wrong_coordinate(v: f64) -> Option<String> {
 #[inline]
 pub fn wrong_size(v: f64, least: f64) -> Option<String> {
     let range = Bounds::Within(least, GREATEST);
-    if v == 0.0 || range.contains(v) {
-        return None;
-    }
-    Some(if least == 0.0 { range.to_string() } else { format!("0 or {range}") })
+    let expected = || if least == 0.0 { range.to_string() } else { format!("0 or {range}") };
+    (!is_size(v, least)).then(expected)
+}
+
+/// Returns whether `v` is a size, as in [`wrong_size`].
+#[inline]
+pub fn is_size(v: f64, least: f64) -> bool {
+    v == 0.0 || Bounds::Within(least, GREATEST).contains(v)
 }
 
 /// Returns whether the device can carry a place.

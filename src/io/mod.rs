@@ -32,6 +32,7 @@ pub mod ply;
 pub mod process_info;
 pub mod result_folder;
 pub mod scene_file;
+mod scene_hash;
 pub mod scene_keys;
 pub mod scene_view;
 pub mod text_file;

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value as Json;
-use sha2::{Digest, Sha256};
 
 use super::document::suggest::shown;
 use super::document::tree::Document;
+use super::scene_hash::SceneHash;
 pub use super::scene_keys::MAX_SIDE;
 use super::scene_keys::{
     Files, KEY_NAMES, Listed, OnDisk, PhaseSpec, Read, add_defaults, read_phases, read_scene,
@@ -26,9 +26,7 @@ pub struct LoadedScene {
     /// Resolved scene: the value of every key, defaults and `--set` included, under the scene
     /// file's keys.
     pub resolved: Json,
-    /// SHA-256 (hex) over the resolved scene, those of its phases, and the content of every file
-    /// that they name. The places of the files and the layout of the TOML do not enter.
-    pub hash: String,
+    hash: SceneHash,
     /// Settings that are allowed but hardly meant, with their places.
     pub warnings: Vec<String>,
     /// Path of the scene file.
@@ -49,6 +47,12 @@ pub struct Phase {
 }
 
 impl LoadedScene {
+    /// Returns the SHA-256 (hex) over the resolved scene, those of its phases, and the content of
+    /// every file that they name. The places of the files and the layout of the TOML do not enter.
+    pub fn hash(&self) -> &str {
+        self.hash.hex()
+    }
+
     /// Returns the scene of frame `i_frame`; beyond the last phase, the last phase's.
     pub fn at_frame(self, i_frame: u32) -> Scene {
         let mut end = 0u64;
@@ -149,7 +153,7 @@ fn load_document(
         let of_phase = read_scene(&document, folder, seed, files)
             .map_err(|e| e.within(&format!("phase \"{}\"", shown(&spec.name))))?;
         resolved.push(of_phase.resolved.to_string());
-        read.digests.extend(of_phase.digests);
+        read.contents.extend(of_phase.contents);
         read.warnings.extend(of_phase.warnings);
         let PhaseSpec { name, n_frames, .. } = spec;
         let (name, sets_mode) = (name.clone(), spec.sets_mode());
@@ -158,21 +162,12 @@ fn load_document(
     // Phases share most of their warnings.
     let mut seen = BTreeSet::new();
     read.warnings.retain(|warning| seen.insert(warning.clone()));
-    let hash = hash(&resolved, &read.digests);
-    let Read { scene, mut resolved, warnings, .. } = read;
-    if let (Json::Object(root), false) = (&mut resolved, specs.is_empty()) {
+    let Read { scene, resolved: mut root, contents, warnings } = read;
+    let hash = SceneHash::new(resolved, contents);
+    if let (Json::Object(root), false) = (&mut root, specs.is_empty()) {
         root.insert("phase".to_owned(), specs.into_iter().map(|s| s.resolved).collect());
     }
-    Ok(LoadedScene { scene, phases, resolved, hash, warnings, path: path.to_owned() })
-}
-
-/// Returns the hash of a scene. Digests have a fixed length and follow the closing brace of the
-/// JSON, so that no two scenes give the same bytes.
-fn hash(resolved: &[String], digests: &[[u8; 32]]) -> String {
-    let mut hasher = Sha256::new();
-    resolved.iter().for_each(|text| hasher.update(text));
-    digests.iter().for_each(|digest| hasher.update(digest));
-    format!("{:x}", hasher.finalize())
+    Ok(LoadedScene { scene, phases, resolved: root, hash, warnings, path: path.to_owned() })
 }
 
 #[cfg(test)]

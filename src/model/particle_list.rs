@@ -66,7 +66,7 @@ struct Sums {
     sigma_max: f64,
     sigma_y_max: f64,
     /// Sums of σ, σ² and σ³.
-    sigma_powers: [f64; 3],
+    sigma_powers: DVec3,
     /// Least aspect, sum, and greatest.
     aspects: [f64; 3],
     turned_max: f64,
@@ -83,7 +83,7 @@ impl Sums {
         position: DVec3::ZERO,
         sigma_max: 0.0,
         sigma_y_max: 0.0,
-        sigma_powers: [0.0; 3],
+        sigma_powers: DVec3::ZERO,
         aspects: [f64::INFINITY, 0.0, 0.0],
         turned_max: 0.0,
         kappa_max: 0.0,
@@ -105,7 +105,7 @@ impl Sums {
             position: p.position,
             sigma_max: p.sigma * extents.x.max(extents.z),
             sigma_y_max: p.sigma * extents.y,
-            sigma_powers: [1, 2, 3].map(|power| p.sigma.powi(power)),
+            sigma_powers: DVec3::new(p.sigma, p.sigma.powi(2), p.sigma.powi(3)),
             aspects: [least, aspect, aspect],
             turned_max: turned,
             kappa_max: p.kappa,
@@ -124,7 +124,7 @@ impl Sums {
             position: self.position + next.position,
             sigma_max: self.sigma_max.max(next.sigma_max),
             sigma_y_max: self.sigma_y_max.max(next.sigma_y_max),
-            sigma_powers: [0, 1, 2].map(|k| self.sigma_powers[k] + next.sigma_powers[k]),
+            sigma_powers: self.sigma_powers + next.sigma_powers,
             aspects: [least.min(next_least), sum + next_sum, greatest.max(next_greatest)],
             turned_max: self.turned_max.max(next.turned_max),
             kappa_max: self.kappa_max.max(next.kappa_max),
@@ -149,7 +149,7 @@ impl Summary {
         let sums = parts.into_iter().fold(Sums::NONE, Sums::and);
         let n = list.len() as f64;
         let is_empty = list.is_empty();
-        let [one, two, three] = sums.sigma_powers;
+        let [one, two, three] = sums.sigma_powers.to_array();
         let [least, aspects, greatest] = sums.aspects;
         let or_zero = |v: DVec3| if is_empty { DVec3::ZERO } else { v };
         Summary {

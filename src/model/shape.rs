@@ -1,6 +1,6 @@
 //! The shape of a Gaussian blob, model.md §14: a ball, or an ellipsoid whose axes are turned.
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3, DVec4};
 
 /// Least aspect of a blob; the greatest is its inverse.
 pub const MIN_ASPECT: f64 = 1e-3;
@@ -32,7 +32,8 @@ impl Turn {
             (1..4).fold(0, |most, i| if of[i].abs() > of[most].abs() { i } else { most });
         let sign = if of[greatest] < 0.0 { -1.0 } else { 1.0 };
         let others = [[x, y, z], [w, y, z], [w, x, z], [w, x, y]][greatest];
-        let bits = others.map(|v| (sign * v / STEP).round() as i32 as u32 & ((1 << BITS) - 1));
+        let bits = |v: f64| (sign * v / STEP).round() as i32 as u32 & ((1 << BITS) - 1);
+        let bits = [bits(others[0]), bits(others[1]), bits(others[2])];
         Turn([
             bits[0] | bits[2] << BITS,
             bits[1] | (bits[2] >> 12) << BITS | (greatest as u32) << 28,
@@ -53,9 +54,10 @@ impl Turn {
     #[inline]
     pub fn rotation(self) -> DQuat {
         let [low, high] = self.0;
-        let component = |bits: u32| f64::from((bits << (32 - BITS)).cast_signed() >> (32 - BITS));
+        let component =
+            |bits: u32| STEP * f64::from((bits << (32 - BITS)).cast_signed() >> (32 - BITS));
         let thirds = low >> BITS | (high >> BITS & 0xff) << 12;
-        let [a, b, c] = [low, high, thirds].map(|bits| STEP * component(bits));
+        let [a, b, c] = [component(low), component(high), component(thirds)];
         let rest = (1.0 - (a * a + b * b + c * c)).max(0.0).sqrt();
         let [w, x, y, z] = match high >> 28 & 3 {
             0 => [rest, a, b, c],
@@ -70,10 +72,9 @@ impl Turn {
 /// Returns a quaternion of finite numbers as one of length 1; `None` of zeros.
 #[inline]
 pub fn unit_quaternion(of: DQuat) -> Option<DQuat> {
-    let greatest = of.to_array().into_iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let greatest = DVec4::from(of).abs().max_element();
     // Squares of any numbers do not overflow then, nor vanish.
-    let scaled = of.to_array().map(|v| v / greatest);
-    (greatest > 0.0).then(|| DQuat::from_array(scaled).normalize())
+    (greatest > 0.0).then(|| DQuat::from_vec4(DVec4::from(of) / greatest).normalize())
 }
 
 /// The kinds of shapes among some blobs. Each includes those before it.
@@ -149,10 +150,10 @@ impl Shape {
         if wide > 0.0 {
             return (wide, Shape::upright(within(high / wide)));
         }
-        // The axes change places in a circle, which is a turn by a third about their diagonal.
+        // The axes change places in a circle, which is a turn by a third about their diagonal: of
+        // the quaternion, cos 60° and sin 60°/√3.
         let first = (1..3).fold(0, |most, i| if scales[i] > scales[most] { i } else { most });
-        let third =
-            DQuat::from_axis_angle(DVec3::splat(3f64.sqrt().recip()), std::f64::consts::TAU / 3.0);
+        let third = DQuat::from_xyzw(0.5, 0.5, 0.5, 0.5);
         let of = [scales.x, scales.y, scales.z];
         let sigma = of[first];
         let turned = (0..first).fold(turned, |turned, _| turned * third);
@@ -227,9 +228,9 @@ impl Shape {
         if self.turn == Turn::NONE {
             return self.lengths();
         }
-        let axes = self.axes();
-        let stretched = DMat3::from_diagonal(self.lengths()) * axes.transpose();
-        DVec3::from([0, 1, 2].map(|i| stretched.col(i).length()))
+        let (axes, lengths) = (self.axes(), self.lengths());
+        let along = |i: usize| (lengths * axes.row(i)).length();
+        DVec3::new(along(0), along(1), along(2))
     }
 
     /// Returns the greatest length of an axis over σ.
@@ -270,7 +271,16 @@ impl Shape {
 /// Returns σ along x and z, and along y, of an ellipsoid that is upright after it is turned; `None`
 /// of others. Rotations in f32 are rounded by 6e-8, so that a relative difference of 1e-6 counts as
 /// none.
+#[inline]
 fn upright_of(scales: DVec3, turned: DQuat) -> Option<(f64, f64)> {
+    // Squares of the axes are the eigenvalues of the covariance. If the bounds below hold, all its
+    // elements are within 1e-6 of the greatest from those of an upright one. Then two eigenvalues
+    // are within 6e-6 of it from each other (Weyl), and most ellipsoids need no matrix.
+    let squares = scales * scales;
+    let apart = (squares - DVec3::new(squares.y, squares.z, squares.x)).abs();
+    if apart.min_element() > 1e-4 * squares.max_element() {
+        return None;
+    }
     // Covariance: the sum of σ² r rᵀ over the turned axes r.
     let (mut own, mut across) = (DVec3::ZERO, DVec3::ZERO);
     let axes = DMat3::from_quat(turned);

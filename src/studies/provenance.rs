@@ -61,7 +61,7 @@ impl Provenance {
             date: machine::utc_now(),
             command: command_line(),
             scene_file: scene_file.display().to_string(),
-            scene_hash: scene.hash.clone(),
+            scene_hash: scene.hash().to_owned(),
             scene: scene.resolved.clone(),
             device: machine::device_record(info),
             cpu: machine::cpu(),

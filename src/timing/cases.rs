@@ -97,7 +97,8 @@ pub fn cases(
     loops: LoopChoice<'_>,
 ) -> Vec<Case> {
     let is_mode_swept = sweep.iter().any(|s| s.key == "threads.mode");
-    let LoadedScene { scene, phases, hash: scene_hash, .. } = loaded;
+    let scene_hash = loaded.hash().to_owned();
+    let LoadedScene { scene, phases, .. } = loaded;
     let case = |phase, scene: Scene, sets_mode: bool, i_first, own_frames| Case {
         phase,
         sweep: sweep.to_vec(),

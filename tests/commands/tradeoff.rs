@@ -85,7 +85,8 @@ fn loaded(settings: &[Setting]) -> Result<LoadedConfiguration> {
     let mut overrides = ["draw.sort_bits=32", "draw.cutoff=3.0"].map(str::to_owned).to_vec();
     overrides.extend(settings.iter().map(|s| format!("{}={}", s.key, s.value)));
     let loaded = load(Path::new("scenes/hello.toml"), &overrides, None)?;
-    Ok(LoadedConfiguration { scene: loaded.scene.into(), hash: loaded.hash })
+    let hash = loaded.hash().to_owned();
+    Ok(LoadedConfiguration { scene: loaded.scene.into(), hash })
 }
 
 fn plan(knobs: &[&str], design: Design, n_rounds: usize) -> StudyPlan {

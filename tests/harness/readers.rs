@@ -66,7 +66,7 @@ pub fn scene_file(bytes: &[u8]) -> std::result::Result<(), String> {
     let again = parse_beside(resolved.clone(), &path, &[], None, &files);
     let again =
         again.unwrap_or_else(|e| panic!("the resolved scene does not load: {e}\n{resolved}"));
-    assert_eq!(again.hash, loaded.hash, "the resolved scene is another one:\n{resolved}");
+    assert_eq!(again.hash(), loaded.hash(), "the resolved scene is another one:\n{resolved}");
     play(&loaded);
     Ok(())
 }

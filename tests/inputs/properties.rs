@@ -93,7 +93,7 @@ fn overrides_equal_keys_of_the_file() {
             format!("[{table}]\n{key} = {value}\n[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n")
         };
         let hash = |text: &str, overrides: &[String]| {
-            load(text, overrides).map(|loaded| loaded.hash).map_err(|e| match e {
+            load(text, overrides).map(|loaded| loaded.hash().to_owned()).map_err(|e| match e {
                 Error::Scene { what, .. } => what,
                 other => other.to_string(),
             })

@@ -208,7 +208,10 @@ fn the_hash_follows_every_step_of_a_file_that_moves() {
         let scene = format!(
             "[[cloud]]\nfrom = \"weather\"\nfile = \"{file}\"\nparticles = 500\nspeed = {speed}"
         );
-        loaded(&format!("{scene}\n[threads]\nsimulate = \"cpu\"\n")).expect("a scene").hash
+        loaded(&format!("{scene}\n[threads]\nsimulate = \"cpu\"\n"))
+            .expect("a scene")
+            .hash()
+            .to_owned()
     };
     let mut bytes = Made::wrf(1, 2).bytes();
     let first = [of(&bytes, "0"), of(&bytes, "60")];

@@ -96,8 +96,12 @@ impl<'a> Rows<'a> {
         if self.format == Format::Ascii {
             return self.map_lines(of);
         }
-        let n = self.element.n as usize;
-        let row_bytes = self.element.row_bytes().unwrap_or_default();
+        let is_big = self.format == Format::Big;
+        // Splats are files of `float` alone. Then no number's type and place are looked up.
+        if !is_big && self.element.properties.iter().all(|p| p.scalar == Some(Scalar::F32)) {
+            let of_row = |row: &[u8], i: usize| number(&row[4 * i..], Scalar::F32, false);
+            return self.map_by(of, of_row);
+        }
         let mut offset = 0;
         let columns: Vec<(usize, Scalar)> = self
             .element
@@ -109,15 +113,24 @@ impl<'a> Rows<'a> {
                 Some((offset - scalar.n_bytes(), scalar))
             })
             .collect();
-        let is_big = self.format == Format::Big;
+        self.map_by(of, |row, i| {
+            let (offset, scalar) = columns[i];
+            number(&row[offset..], scalar, is_big)
+        })
+    }
+
+    /// Returns the value of every binary row, in order. `of_row` returns the number of a property.
+    fn map_by<T: Default + Send>(
+        &self,
+        of: &(impl OfRow<T> + Sync),
+        of_row: impl Fn(&[u8], usize) -> f64 + Sync,
+    ) -> Result<Vec<T>> {
+        let n = self.element.n as usize;
+        let row_bytes = self.element.row_bytes().unwrap_or_default();
         let first_fault: Mutex<Option<(usize, Fault)>> = Mutex::new(None);
         let made = parallel_map(n, |k| {
-            let row = &self.bytes[k * row_bytes..];
-            let value = |i: usize| {
-                let (offset, scalar) = columns[i];
-                number(&row[offset..], scalar, is_big)
-            };
-            of.made(value).unwrap_or_else(|fault| {
+            let row = &self.bytes[k * row_bytes..(k + 1) * row_bytes];
+            of.made(|i| of_row(row, i)).unwrap_or_else(|fault| {
                 let mut first = first_fault.lock().unwrap_or_else(PoisonError::into_inner);
                 if first.as_ref().is_none_or(|(row, _)| k < *row) {
                     *first = Some((k, fault));
@@ -198,8 +211,7 @@ fn offset_in(text: &str, part: &str) -> usize {
 fn number(bytes: &[u8], scalar: Scalar, is_big: bool) -> f64 {
     #[inline]
     fn first<const N: usize>(bytes: &[u8], is_big: bool) -> [u8; N] {
-        let mut found = [0; N];
-        found.copy_from_slice(&bytes[..N]);
+        let mut found = bytes.first_chunk().copied().unwrap_or([0; N]);
         if is_big {
             found.reverse();
         }

@@ -5,9 +5,7 @@ use glam::{DQuat, DVec3};
 
 use super::header::{Element, Scalar};
 use super::rows::{Fault, Made, OfRow};
-use crate::io::bounds::{
-    AMOUNT, COORDINATE, DIVISOR, GREATEST, LEAST, wrong_coordinate, wrong_size,
-};
+use crate::io::bounds::{AMOUNT, COORDINATE, DIVISOR, LEAST, is_size, wrong_size};
 use crate::io::document::suggest::list;
 use crate::io::particle_file::wrong_height;
 use crate::model::cloud::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, Shape, unit_quaternion};
@@ -17,6 +15,7 @@ use crate::model::harmonics::{Coefficients, MAX_DEGREE, n_rest};
 const MOST_OPACITY: f64 = 0.99;
 /// Y₀₀ = ½/√π: the harmonic of degree 0, by which f_dc counts.
 const HARMONIC: f64 = 0.282_094_791_773_878_14;
+const FINITE: &str = "a finite number";
 /// p of Thomsen's formula for the mean area of an ellipsoid.
 const THOMSEN: f64 = 1.6075;
 
@@ -93,27 +92,46 @@ impl HarmonicColumns {
 }
 
 impl OfRow<Coefficients> for HarmonicColumns {
+    #[inline]
     fn made(&self, value: impl Fn(usize) -> f64) -> Made<Coefficients> {
-        let number = |i: usize| {
-            let v = value(i);
-            if COORDINATE.contains(v) {
-                return Ok(v);
-            }
-            let finite = (!v.is_finite()).then(|| "a finite number".to_owned());
-            let of = finite.unwrap_or_else(|| COORDINATE.to_string());
-            Err(Fault { i, what: format!("expected {of}, found `{v}`") })
-        };
         let mut made = Coefficients::default();
         for (channel, i) in self.mean.into_iter().enumerate() {
-            made[0][channel] = (0.5 + HARMONIC * number(i)?) as f32;
+            made[0][channel] = (0.5 + HARMONIC * coordinate(i, value(i))?) as f32;
         }
+        let mut are_right = true;
         for (to, of) in made[1..].iter_mut().zip(&self.rest) {
-            for (channel, i) in of.iter().enumerate() {
-                to[channel] = number(*i)? as f32;
+            for channel in 0..3 {
+                let v = value(of[channel]);
+                are_right &= COORDINATE.contains(v);
+                to[channel] = v as f32;
+            }
+        }
+        if !are_right {
+            for i in self.rest.as_flattened() {
+                coordinate(*i, value(*i))?;
             }
         }
         Ok(made)
     }
+}
+
+/// Returns `v`, the value of property `i`, if it is a coordinate.
+#[inline]
+fn coordinate(i: usize, v: f64) -> Made<f64> {
+    let wrong = || if v.is_finite() { COORDINATE.to_string() } else { FINITE.to_owned() };
+    if COORDINATE.contains(v) { Ok(v) } else { Err(fault(i, v, wrong)) }
+}
+
+/// Returns `v`, the value of property `i`, if it is a finite number.
+#[inline]
+fn finite(i: usize, v: f64) -> Made<f64> {
+    if v.is_finite() { Ok(v) } else { Err(fault(i, v, || FINITE.to_owned())) }
+}
+
+/// Returns the fault of property `i`, whose value is `found`.
+#[cold]
+fn fault(i: usize, found: f64, expected: impl FnOnce() -> String) -> Fault {
+    Fault { i, what: format!("expected {}, found `{found}`", expected()) }
 }
 
 impl Columns {
@@ -186,29 +204,24 @@ fn all_of<const N: usize>(
 }
 
 impl OfRow<Particle> for Columns {
+    #[inline]
     fn made(&self, value: impl Fn(usize) -> f64) -> Made<Particle> {
-        let checked = |i: usize, v: f64, expected: Option<String>| match expected {
-            None => Ok(v),
-            Some(of) => Err(Fault { i, what: format!("expected {of}, found `{}`", value(i)) }),
-        };
-        let finite = |i: usize| {
-            let v = value(i);
-            checked(i, v, (!v.is_finite()).then(|| "a finite number".to_owned()))
-        };
+        // Three million splats are read in a second: sentences are made of faults alone.
+        let finite = |i: usize| finite(i, value(i));
         let size = |i: usize, v: f64, least: f64| {
-            let wrong = if v.is_finite() { wrong_size(v, least) } else { Some(AMOUNT.to_string()) };
-            checked(i, v, wrong)
+            let wrong = || match wrong_size(v, least) {
+                Some(expected) if v.is_finite() => expected,
+                _ => AMOUNT.to_string(),
+            };
+            if is_size(v, least) { Ok(v) } else { Err(fault(i, value(i), wrong)) }
         };
-        let coordinate = |i: usize| finite(i).and_then(|v| checked(i, v, wrong_coordinate(v)));
-        let [x, y, z] = self.position.map(coordinate);
-        let position = DVec3::new(x?, y?, z?);
+        let place = |k: usize| coordinate(self.position[k], value(self.position[k]));
+        let position = DVec3::new(place(0)?, place(1)?, place(2)?);
         let turn = |rotation: Option<[usize; 4]>| {
-            let Some(of) = rotation else { return Ok(DQuat::IDENTITY) };
-            let [w, x, y, z] = of.map(finite);
-            let turn = unit_quaternion(DQuat::from_xyzw(x?, y?, z?, w?));
-            let expected = "a rotation other than zero".to_owned();
-            checked(of[0], 0.0, turn.is_none().then_some(expected))?;
-            Ok(turn.unwrap_or_default())
+            let Some([w, x, y, z]) = rotation else { return Ok(DQuat::IDENTITY) };
+            let turn = DQuat::from_xyzw(finite(x)?, finite(y)?, finite(z)?, finite(w)?);
+            let zero = || fault(w, value(w), || "a rotation other than zero".to_owned());
+            unit_quaternion(turn).ok_or_else(zero)
         };
         // Where an aspect is limited, κ is `share` of the given one, so that the mass stays.
         let (sigma, shape, logs, share) = match self.size {
@@ -217,8 +230,10 @@ impl OfRow<Particle> for Columns {
                 let other = |j: Option<usize>, than: [f64; 2]| match j {
                     Some(j) if sigma > 0.0 => {
                         let of = finite(j)?;
-                        let wrong = than.into_iter().find_map(|than| wrong_height(of, than));
-                        checked(j, of, wrong.or_else(|| wrong_size(of, LEAST)))
+                        match than.into_iter().find_map(|than| wrong_height(of, than)) {
+                            Some(expected) => Err(fault(j, of, || expected)),
+                            None => size(j, of, LEAST),
+                        }
                     }
                     _ => Ok(sigma),
                 };
@@ -233,17 +248,17 @@ impl OfRow<Particle> for Columns {
                 (first, shape, [sigma, high, deep].map(libm::log), 1.0)
             }
             Size::Scales(of, rotation) => {
-                let [a, b, c] = of.map(|i| {
+                let scale = |i: usize| {
                     let sigma = libm::exp(finite(i)?);
-                    let wrong = sigma < LEAST && sigma != 0.0 || sigma > GREATEST;
                     let expected = || format!("a logarithm of 0 or of {DIVISOR}");
-                    checked(i, sigma, wrong.then(expected))
-                });
-                let scales = DVec3::new(a?, b?, c?);
+                    let is_right = is_size(sigma, LEAST);
+                    if is_right { Ok(sigma) } else { Err(fault(i, value(i), expected)) }
+                };
+                let scales = DVec3::new(scale(of[0])?, scale(of[1])?, scale(of[2])?);
                 let (sigma, shape) = Shape::of(scales, turn(rotation)?);
                 let own = sigma * sigma * sigma * shape.volume();
                 let share = if own > 0.0 { scales.element_product() / own } else { 1.0 };
-                (sigma, shape, of.map(&value), share)
+                (sigma, shape, [value(of[0]), value(of[1]), value(of[2])], share)
             }
         };
         let own = sigma * sigma * sigma * shape.volume();
@@ -265,11 +280,8 @@ impl OfRow<Particle> for Columns {
                 DVec3::new(of(0)?, of(1)?, of(2)?)
             }
             Color::Harmonics(of) => {
-                let [r, g, b] = of.map(|i| {
-                    let v = (0.5 + HARMONIC * finite(i)?).max(0.0);
-                    size(i, v, 0.0)
-                });
-                DVec3::new(r?, g?, b?)
+                let mean = |i: usize| size(i, (0.5 + HARMONIC * finite(i)?).max(0.0), 0.0);
+                DVec3::new(mean(of[0])?, mean(of[1])?, mean(of[2])?)
             }
         };
         Ok(Particle { position, sigma, shape, kappa, color })
@@ -279,9 +291,9 @@ impl OfRow<Particle> for Columns {
 /// Returns the logarithm of the mean over all directions of an ellipsoid's projected area, over π,
 /// from the logarithms of its half axes.
 fn log_area([a, b, c]: [f64; 3]) -> f64 {
-    let pairs = [a + b, a + c, b + c];
-    let most = pairs.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let [ab, ac, bc] = [a + b, a + c, b + c];
+    let most = ab.max(ac).max(bc);
     // The greatest term is 1.
     let of = |pair: f64| if pair == most { 1.0 } else { libm::exp(THOMSEN * (pair - most)) };
-    most + libm::log(pairs.into_iter().map(of).sum::<f64>() / 3.0) / THOMSEN
+    most + libm::log((of(ab) + of(ac) + of(bc)) / 3.0) / THOMSEN
 }

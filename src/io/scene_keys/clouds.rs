@@ -21,7 +21,7 @@ use crate::io::bounds::{AMOUNT, COORDINATE, GREATEST, is_carried_place, shortest
 use crate::io::document::section::Section;
 use crate::io::mapped_file::MappedFile;
 use crate::io::near_file::MISSING;
-use crate::io::particle_digest::digest;
+use crate::io::scene_hash::Content;
 use crate::io::weather::{blobs, moving};
 use crate::io::{box_file, particle_file, ply};
 use crate::model::air::Air;
@@ -50,8 +50,8 @@ pub struct Surroundings<'a> {
 /// Results of reading clouds beside the clouds.
 #[derive(Default)]
 pub struct Found {
-    /// SHA-256 of every file, in order.
-    pub digests: Vec<[u8; 32]>,
+    /// What is drawn of every file, in order.
+    pub contents: Vec<Content>,
     /// Notes about the files for the user.
     pub notes: Vec<String>,
     /// Ground under the clouds.
@@ -249,7 +249,7 @@ fn open_file<T>(
 fn read_named(s: &mut Section, reading: &mut Reading, first: &str) -> Result<(String, PathBuf)> {
     let around = reading.around;
     let (text, path) = open_file(s, around.folder, |path| around.files.text(path, first))?;
-    reading.found.digests.push(Sha256::digest(&text).into());
+    reading.found.contents.push(Content::Digest(Sha256::digest(&text).into()));
     Ok((text, path))
 }
 
@@ -276,7 +276,7 @@ fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource>
     let particles = match opened {
         Opened::Text(text) => {
             let text = text.text(&path, particle_file::FIRST)?;
-            reading.found.digests.push(Sha256::digest(text).into());
+            reading.found.contents.push(Content::Digest(Sha256::digest(text).into()));
             let (particles, lines) = particle_file::parse(text, &path)?;
             reading.found.lines = lines;
             particles.into()
@@ -284,7 +284,7 @@ fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource>
         Opened::Ply(file) => {
             let ply::Read { particles, harmonics } = ply::parse(file.bytes(), &path)?;
             let list = ParticleList::with_harmonics(particles, harmonics);
-            reading.found.digests.push(digest(&list));
+            reading.found.contents.push(Content::List(list.clone()));
             list
         }
     };
@@ -306,15 +306,15 @@ fn read_weather(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
     if let Some(i_material) = ground_named(s, around.materials)? {
         let origin = read_position(s)?;
         let terrain = ground_of(s, &file, &settings, origin, i_material)?;
-        found.digests.push(blobs::digest_of_ground(&terrain));
+        found.contents.push(blobs::digest_of_ground(&terrain).into());
         found.terrains.push(terrain);
     }
     if settings.speed != 0.0 {
         // Any of its steps may be asked for later.
-        found.digests.push(file.digest()?);
+        found.contents.push(file.digest()?.into());
         return Ok(CloudSource::Animated(moving::moving(file, settings, seed)?));
     }
     let list = ParticleList::from(blobs::particles(&file, &settings, seed)?);
-    found.digests.push(digest(&list));
+    found.contents.push(Content::List(list.clone()));
     Ok(CloudSource::Particles(list))
 }

@@ -35,6 +35,7 @@ use spec::text;
 
 use super::document::section::Section;
 use super::document::tree::{Document, KeyNames, without_numbers};
+use super::scene_hash::Content;
 use crate::error::{Error, Result};
 use crate::model::scene::{FacetCount, Lighting, LightingMode, Scene};
 
@@ -171,8 +172,8 @@ pub(super) struct Read {
     pub scene: Scene,
     /// Every value the scene came to.
     pub resolved: serde_json::Value,
-    /// SHA-256 of every file that the scene names, in order.
-    pub digests: Vec<[u8; 32]>,
+    /// What is drawn of every file that the scene names, in order.
+    pub contents: Vec<Content>,
     pub warnings: Vec<String>,
 }
 
@@ -228,7 +229,7 @@ pub(super) fn read_scene(
             },
         )?;
     }
-    let Found { digests, notes, terrains, .. } = found;
+    let Found { contents, notes, terrains, .. } = found;
     warnings.extend(notes);
     let scene = Scene {
         title,
@@ -256,7 +257,7 @@ pub(super) fn read_scene(
         return Err(Error::scene(root.place("cloud"), what));
     }
     warnings.extend(grouped(&scene));
-    Ok(Read { scene, resolved: root.finish(), digests, warnings })
+    Ok(Read { scene, resolved: root.finish(), contents, warnings })
 }
 
 /// Says for which clouds the default makes fewer facets than particles.

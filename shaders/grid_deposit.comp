@@ -3,6 +3,7 @@
 #include "records.glsl"
 #include "particles.glsl"
 #include "functions.glsl"
+#include "grid_narrow.glsl"
 
 // Deposits each blob's mass into the grid's cells, a workgroup a blob (model.md §8, passes.md
 // "grid"). In: placed particles (lengths), kappa (1/length). Out: fixed-point sums of mass by cell,
@@ -38,6 +39,8 @@ layout(push_constant) uniform Push {
     // Number of grids, and whether those of wider cells are written.
     uint n_levels;
     uint is_wide;
+    // 1: grid_narrow.comp deposits some blobs.
+    uint has_narrow;
 } push;
 TEXELS(0, placed)
 TEXELS(1, particles)
@@ -68,6 +71,9 @@ void main() {
         bool is_turned = particle.aspect_z != 1.0 || particle.turn != uvec2(0);
         mass = is_turned ? 0.0 : mass;
 #endif
+        vec3 at = place_in_cells(push.grid, blob.position);
+        bool is_other = push.has_narrow == 1u && is_narrowed(push.grid, blob.sigma, at);
+        mass = is_other ? 0.0 : mass;
         vec3 sigma = blob.sigma * vec3(1.0, aspect, 1.0);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 inv_edges = push.grid.inv_cell * vec3(1.0, push.grid.inv_aspect, 1.0);

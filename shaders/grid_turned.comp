@@ -32,6 +32,8 @@ layout(push_constant) uniform Push {
     // Number of grids, and whether those of wider cells are written.
     uint n_levels;
     uint is_wide;
+    // Turned ones are not among those that grid_narrow.comp deposits.
+    uint has_narrow;
 } push;
 TEXELS(0, placed)
 TEXELS(1, particles)

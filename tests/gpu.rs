@@ -25,8 +25,8 @@ use sha2::{Digest, Sha256};
 fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
     let spec = GridSpec { aspect: 1.0, n_cells: UVec3::splat(8), cell: 1.0, low: DVec3::ZERO };
     let place = place::Place::new(&gpu.device, &gpu.compiler).unwrap();
-    let grid =
-        grid::Grid::new(&gpu.device, &gpu.compiler, spec.n_total(), false, Shapes::Balls).unwrap();
+    let room = grid::Room { n_cells: spec.n_total(), has_levels: false, has_narrow: false };
+    let grid = grid::Grid::new(&gpu.device, &gpu.compiler, room, Shapes::Balls).unwrap();
     let (particles, i_group) = (gpu.buffer::<ParticleRecord>(64), gpu.buffer::<u32>(64));
     let (groups, placed) = (gpu.buffer::<GroupRecord>(1), gpu.buffer::<PlacedRecord>(64));
     let (density, modes) = (gpu.buffer::<f32>(512), gpu.buffer::<ModeRecord>(1));
@@ -40,7 +40,8 @@ fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
             placed: &placed,
         };
         place.record(rec, &buffers, 64)?;
-        let of = grid::Deposit { grid: &record, n_particles: 64, heaviest: 1.0, n_levels: 1 };
+        let (n_levels, n_steps) = (1, 0);
+        let of = grid::Deposit { grid: &record, n_particles: 64, heaviest: 1.0, n_levels, n_steps };
         grid.record(rec, [&placed, &particles, &density], &of)
     });
     recorded.unwrap();

@@ -23,6 +23,7 @@ use crate::model::material::Material;
 use crate::model::scene::Scene;
 use crate::passes::blobs::BlobBuffers;
 use crate::passes::diffusion::Room;
+use crate::passes::grid::Room as GridRoom;
 use crate::passes::harmonics::Colored;
 use crate::passes::texture::POOL_TEXELS;
 
@@ -169,10 +170,15 @@ pub fn n_cells(scene: &Scene) -> u64 {
     if is_lit(scene) { n_cells_max(scene) } else { 0 }
 }
 
-/// Returns whether wide blobs are deposited on wider cells.
-pub fn has_levels(scene: &Scene) -> bool {
-    let side = scene.lighting.grid.min(MAX_CELLS);
-    is_lit(scene) && grid::has_levels(scene.n_particles(), side)
+/// Returns the room for the deposit of the particles in the density grid.
+pub fn grid_room(scene: &Scene) -> GridRoom {
+    let (n, side) = (scene.n_particles(), scene.lighting.grid.min(MAX_CELLS));
+    let has = |rule: fn(u64, u32) -> bool| is_lit(scene) && rule(n, side);
+    GridRoom {
+        n_cells: n_cells(scene),
+        has_levels: has(grid::has_levels),
+        has_narrow: has(grid::has_narrow),
+    }
 }
 
 /// Returns the room that the diffusion of light takes; `None` without.

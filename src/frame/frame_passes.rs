@@ -1,6 +1,6 @@
 //! The passes of a scene's frames and the buffers that they share.
 
-use super::buffers::{SceneBuffers, diffusion_room, has_levels, n_cells};
+use super::buffers::{SceneBuffers, diffusion_room, grid_room};
 use super::constants::FrameConstants;
 use super::culling::Culling;
 use super::features::{
@@ -104,7 +104,7 @@ impl FramePasses {
                 .transpose()?,
             colored,
             merging: Merging::new(device, compiler, scene)?,
-            grid: Grid::new(device, compiler, n_cells(scene), has_levels(scene), scene.shapes())?,
+            grid: Grid::new(device, compiler, grid_room(scene), scene.shapes())?,
             runs,
             facets: Facets::new(device, compiler, scene.shapes(), is_medium(scene))?,
             transmit: Transmit::new(device, compiler, arriving(scene), &sums)?,

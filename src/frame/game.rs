@@ -20,7 +20,7 @@ use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
-use crate::model::cloud::{Group, SQRT_TAU, mass, max_blob_mass};
+use crate::model::cloud::{Group, SQRT_TAU, aspects_of, mass, max_blob_mass};
 use crate::model::frame_state::FrameState;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::gust::Mode;
@@ -188,6 +188,7 @@ impl Game {
             heaviest,
             sigma_max,
             n_levels: setting.grid.n_used_levels(self.scene.n_particles(), sigma_max),
+            n_steps: setting.grid.n_steps(self.scene.n_particles(), sigma_max, aspects_of(&grown)),
             radius: setting.radius,
             sort_bits: self.sort_bits(&grown, setting.radius),
             slice: slice_length(self.scene.draw.slice, &grown, setting.radius),

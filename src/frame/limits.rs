@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::buffers::{SceneBuffers, diffusion_room, has_levels, n_cells};
+use super::buffers::{SceneBuffers, diffusion_room, grid_room};
 use super::culling::Culling;
 use super::features::{has_bounces, has_lod, has_second, is_grouped, is_lit};
 use super::gather::IndirectGather;
@@ -13,8 +13,8 @@ use super::morton_sort::FacetRuns;
 use super::picture::Picture;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferSpec, Limits};
-use crate::model::cloud::{Cloud, CloudSource, Group};
-use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
+use crate::model::cloud::{Cloud, CloudSource, Group, aspects_of};
+use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, NARROW_BELOW, NARROW_SIGMA, NARROW_UPDATES};
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Draw, Scene};
 use crate::model::sums::Precision;
@@ -87,7 +87,7 @@ fn specs(scene: &Scene) -> Vec<BufferSpec> {
     [
         SceneBuffers::specs(&exact),
         live::specs(&exact),
-        grid::specs(n_cells(&exact), has_levels(&exact)),
+        grid::specs(grid_room(&exact)),
         diffusion_room(&exact).map_or(vec![], diffusion::specs),
         when(is_grouped(&exact), FacetRuns::specs),
         when(has_second(&exact), IndirectGather::specs),
@@ -115,6 +115,11 @@ pub fn n_deposits(scene: &Scene) -> f64 {
     let groups = scene.groups();
     let blob = |g: &Group| {
         let sigma = g.sigma_mean * DVec3::new(1.0, g.aspects[1], 1.0);
+        // If the mean blob is such a one, so are most.
+        let is_narrowed = (NARROW_SIGMA..NARROW_BELOW).contains(&(g.sigma_mean / grid.cell));
+        if is_narrowed && grid.has_narrow(scene.n_particles(), aspects_of(&groups)) {
+            return f64::from(g.n_particles) * NARROW_UPDATES;
+        }
         let level = grid.level_of(sigma, grid.n_levels(scene.n_particles()));
         let (sigma, grid) = (grid.deposited(sigma, level), grid.level(level));
         let covered =

@@ -63,6 +63,10 @@ pub struct Packet {
     ///
     /// [`GridSpec::n_levels`]: crate::model::grid::GridSpec::n_levels
     pub n_levels: u32,
+    /// Most blurs that a blob needs ([`GridSpec::n_steps`]).
+    ///
+    /// [`GridSpec::n_steps`]: crate::model::grid::GridSpec::n_steps
+    pub n_steps: u32,
     /// Bound of |view depth| relative to the lighting origin.
     pub radius: f64,
     /// Bits of a sort key: 16 or 32.

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::animated::AnimatedParticles;
 use super::boxes::{BoxLaw, CloudBox, max_radius, mean_radius, mean_radius_by_area};
 use super::disc::Disc;
-pub use super::group::{Group, max_blob_mass, runs};
+pub use super::group::{Group, aspects_of, max_blob_mass, runs};
 use super::growth::Growth;
 use super::gust::Gust;
 use super::named::named;

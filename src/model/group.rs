@@ -46,6 +46,15 @@ pub struct Group {
     pub gust_reach: f64,
 }
 
+/// Returns the least and the greatest aspect of all particles; `None` if some ellipsoids are turned.
+pub fn aspects_of(groups: &[Group]) -> Option<[f64; 2]> {
+    let filled = || groups.iter().filter(|g| g.n_particles > 0);
+    let ends = filled().fold([f64::INFINITY, 0.0_f64], |[least, greatest], g| {
+        [least.min(g.aspects[0]), greatest.max(g.aspects[2])]
+    });
+    filled().all(|g| g.shapes() < Shapes::Turned).then_some(ends)
+}
+
 impl Group {
     /// Returns the group with particles from `low` to `high`.
     pub(super) fn between(self, low: DVec3, high: DVec3) -> Group {

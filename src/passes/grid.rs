@@ -6,13 +6,19 @@
 //! and at most 2.5e-6 of a weight. Of these 3e-7 are from the formula of erf, and the rest from
 //! rounding (1e-6 measured). Weights of turned ellipsoids also have the error of the places of
 //! their slabs and rows. Where there are many blobs, wide ones are deposited on grids of wider
-//! cells, each of which is spread to the one of half its edges.
+//! cells, each of which is spread to the one of half its edges. Where there are more, those of some
+//! cells are deposited narrower than they are, and blurred.
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
 use crate::layout::frame::GridRecord;
 use crate::layout::particle::Shapes;
 use crate::layout::record;
+
+mod narrow;
+
+use narrow::Narrow;
+pub use narrow::{BlurPush, NarrowPush};
 
 record! {
     /// Push constants of `grid_deposit.comp`.
@@ -27,6 +33,8 @@ record! {
         n_levels: u32,
         /// 1: blobs are deposited on wider cells, and else on the finest.
         is_wide: u32,
+        /// 1: `grid_narrow.comp` deposits some blobs.
+        has_narrow: u32,
     }
 }
 
@@ -72,15 +80,33 @@ buffers! {
     }
 }
 
-/// Returns the room for the cells of all wider grids: half of those of the finest. An axis has five
-/// cells or more, of which the next grid has at most three, and so on: less than a third together.
-fn room_of_wide(n_cells: u64, has_levels: bool) -> u64 {
-    if has_levels { n_cells / 2 } else { 0 }
+/// The deposits that there is room for.
+#[derive(Debug, Clone, Copy)]
+pub struct Room {
+    /// Most cells of the grid.
+    pub n_cells: u64,
+    /// Whether blobs may be deposited on wider cells.
+    pub has_levels: bool,
+    /// Whether blobs may be deposited narrower than they are.
+    pub has_narrow: bool,
+}
+
+impl Room {
+    /// Returns the room for the cells of all wider grids: half of those of the finest. An axis has
+    /// five cells or more, of which the next grid has at most three, and so on: less than a third
+    /// together.
+    fn n_wide(self) -> u64 {
+        if self.has_levels { self.n_cells / 2 } else { 0 }
+    }
 }
 
 /// Returns the sizes of the scratch buffers.
-pub fn specs(n_cells: u64, has_levels: bool) -> Vec<BufferSpec> {
-    Scratch::specs(n_cells, room_of_wide(n_cells, has_levels))
+pub fn specs(room: Room) -> Vec<BufferSpec> {
+    let mut specs = Scratch::specs(room.n_cells, room.n_wide());
+    if room.has_narrow {
+        specs.extend(narrow::specs(room.n_cells));
+    }
+    specs
 }
 
 /// The deposit of a frame.
@@ -94,6 +120,8 @@ pub struct Deposit<'a> {
     pub heaviest: f64,
     /// Number of grids that particles may be deposited on, each with cells twice as wide.
     pub n_levels: u32,
+    /// Greatest number of blurs; 0: no blob is deposited narrower than it is.
+    pub n_steps: u32,
 }
 
 /// The pipelines and scratch buffers of the pass.
@@ -104,23 +132,17 @@ pub struct Grid {
     resolve: Kernel,
     /// For wider grids, and for the finest where there are some.
     spread: Option<[Kernel; 2]>,
+    narrow: Option<Narrow>,
     scratch: Scratch,
-    capacity: u64,
+    room: Room,
 }
 
 impl Grid {
-    /// Creates the pipelines, and scratch buffers for `n_cells` cells; with `has_levels`, those of
-    /// wider cells, too.
+    /// Creates the pipelines and the scratch buffers.
     ///
     /// # Errors
     /// Fails if a shader does not compile or the device cannot hold the buffers.
-    pub fn new(
-        device: &Device,
-        compiler: &Compiler,
-        n_cells: u64,
-        has_levels: bool,
-        shapes: Shapes,
-    ) -> Result<Grid> {
+    pub fn new(device: &Device, compiler: &Compiler, room: Room, shapes: Shapes) -> Result<Grid> {
         // A workgroup of one subgroup does not wait at its barriers, and a blob's few cells fill
         // it.
         let width = device.limits().subgroup_size.clamp(8, 64);
@@ -137,15 +159,19 @@ impl Grid {
             deposit: kernel("grid.deposit")?,
             turned: is_turned.then(|| kernel("grid.turned")).transpose()?,
             resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS)?,
-            spread: if has_levels { Some([spread(0)?, spread(1)?]) } else { None },
-            scratch: Scratch::new(device, n_cells, room_of_wide(n_cells, has_levels))?,
-            capacity: n_cells,
+            spread: if room.has_levels { Some([spread(0)?, spread(1)?]) } else { None },
+            narrow: match room.has_narrow {
+                true => Some(Narrow::new(device, compiler, room.n_cells)?),
+                false => None,
+            },
+            scratch: Scratch::new(device, room.n_cells, room.n_wide())?,
+            room,
         })
     }
 
     /// Returns the number of cells that the scratch buffers hold.
     pub fn capacity(&self) -> u64 {
-        self.capacity
+        self.room.n_cells
     }
 
     /// Reallocates the scratch buffers for `n_cells` cells.
@@ -153,9 +179,12 @@ impl Grid {
     /// # Errors
     /// Fails if the device cannot hold them.
     pub fn set_capacity(&mut self, device: &Device, n_cells: u64) -> Result<()> {
-        let has_levels = self.spread.is_some();
-        self.scratch = Scratch::new(device, n_cells, room_of_wide(n_cells, has_levels))?;
-        self.capacity = n_cells;
+        let room = Room { n_cells, ..self.room };
+        self.scratch = Scratch::new(device, room.n_cells, room.n_wide())?;
+        if let Some(narrow) = &mut self.narrow {
+            narrow.set_capacity(device, n_cells)?;
+        }
+        self.room = room;
         Ok(())
     }
 
@@ -173,14 +202,14 @@ impl Grid {
     ) -> Result<()> {
         let Scratch { sums, wide_sums, .. } = &self.scratch;
         let levels = Levels::new(of);
-        if levels.n_finest() > self.capacity {
+        if levels.n_finest() > self.room.n_cells {
             return Err(Error::limit(format!(
                 "a density grid of {} cells, where there is room for {}",
                 levels.n_finest(),
-                self.capacity
+                self.room.n_cells
             )));
         }
-        let room = room_of_wide(self.capacity, self.spread.is_some());
+        let room = self.room.n_wide();
         if levels.n_wide() > room {
             return Err(Error::limit(format!(
                 "density grids of {} wide cells, where there is room for {room}",
@@ -189,28 +218,38 @@ impl Grid {
         }
         let quanta_per_mass =
             if of.heaviest > 0.0 { QUANTA_OF_HEAVIEST / of.heaviest } else { 0.0 };
+        let quanta_per_mass = quanta_per_mass as f32;
+        let narrow = self.narrow.as_ref().filter(|_| of.n_steps > 0);
         let push = DepositPush {
             grid: *of.grid,
             n_particles: of.n_particles,
-            quanta_per_mass: quanta_per_mass as f32,
+            quanta_per_mass,
             n_levels: levels.0.len() as u32,
             is_wide: 0,
+            has_narrow: narrow.is_some().into(),
         };
+        let finest = &levels.0[0];
         rec.fill(sums, 0);
         self.deposit(rec, &[placed, particles, sums], &push)?;
-        let spread = self.spread.as_ref().filter(|_| levels.n_wide() > 0);
-        let Some([spread, spread_finest]) = spread else {
-            return self.resolve(rec, density, &levels.0[0]);
-        };
-        rec.fill(wide_sums, 0);
-        self.deposit(rec, &[placed, particles, wide_sums], &DepositPush { is_wide: 1, ..push })?;
-        let wide = &self.scratch.wide;
-        for level in levels.0[1..].iter().rev() {
-            rec.dispatch(spread, &[wide_sums, wide], level, level.n_cells.iter().product())?;
+        match self.spread.as_ref().filter(|_| levels.n_wide() > 0) {
+            None => self.resolve(rec, density, finest)?,
+            Some([spread, spread_finest]) => {
+                rec.fill(wide_sums, 0);
+                let push = DepositPush { is_wide: 1, ..push };
+                self.deposit(rec, &[placed, particles, wide_sums], &push)?;
+                let wide = &self.scratch.wide;
+                for level in levels.0[1..].iter().rev() {
+                    let n_cells = level.n_cells.iter().product();
+                    rec.dispatch(spread, &[wide_sums, wide], level, n_cells)?;
+                }
+                let n_cells = finest.n_cells.iter().product();
+                rec.dispatch(spread_finest, &[sums, wide, density], finest, n_cells)?;
+            }
         }
-        let finest = &levels.0[0];
-        let n_cells = finest.n_cells.iter().product();
-        rec.dispatch(spread_finest, &[sums, wide, density], finest, n_cells)
+        let Some(narrow) = narrow else { return Ok(()) };
+        let Deposit { grid, n_particles, n_steps, .. } = *of;
+        let push = NarrowPush { grid: *grid, n_particles, quanta_per_mass, n_steps };
+        narrow.record(rec, [placed, particles, density], finest, &push)
     }
 
     /// Adds the particles' mass to the sums of the finest grid, or of all wider ones.

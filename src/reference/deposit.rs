@@ -1,19 +1,22 @@
 //! The deposit of the blobs' mass in the density grid, model.md §8 and passes.md "grid". It is
 //! conservative, and separable where blobs are upright. Wide blobs are deposited on wide cells,
-//! which are spread to the finest ones.
+//! which are spread to the finest ones. Many blobs of some cells are deposited narrower than they
+//! are, and blurred.
 //!
 //! Densities are extinction per unit length. Cell (x, y, z) is at index x + n_x (y + n_y z).
 
 use glam::{DVec3, UVec3};
 
 use super::Blob;
-use crate::model::grid::{GridSpec, given_by_coarser};
+use crate::model::grid::{GridSpec, NARROW_UPDATES, given_by_coarser};
 
+mod narrow;
 mod shares;
 #[cfg(test)]
 mod tests;
 mod turned;
 
+pub use narrow::{blurred, deposit_narrow, is_narrowed};
 pub use shares::axis_weights;
 pub(super) use shares::normal_share;
 use shares::reached;
@@ -26,11 +29,28 @@ pub(super) fn dense(blobs: &[Blob]) -> impl Iterator<Item = &Blob> {
 /// Returns the density of every cell. A blob outside the grid, or with σ = 0 or κ = 0, deposits
 /// nothing.
 pub fn deposit(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
-    deposit_by_levels(spec, blobs, spec.n_levels(blobs.len() as u64))
+    let has_narrow = has_narrow(spec, blobs);
+    let (narrowed, others): (Vec<Blob>, Vec<Blob>) =
+        dense(blobs).partition(|blob| has_narrow && is_narrowed(spec, blob));
+    let mut cells = deposit_by_levels(spec, &others, spec.n_levels(blobs.len() as u64));
+    if !narrowed.is_empty() {
+        let own = deposit_narrow(spec, &narrowed);
+        cells.iter_mut().zip(own).for_each(|(cell, own)| *cell += own);
+    }
+    cells
 }
 
-/// Returns the same with wide blobs on wide cells of so many levels, which are spread to the finest
-/// ones.
+/// Returns whether some blobs are deposited narrower than they are.
+fn has_narrow(spec: &GridSpec, blobs: &[Blob]) -> bool {
+    let are_upright = blobs.iter().all(|blob| blob.shape.is_upright());
+    let aspects = blobs.iter().fold([f64::INFINITY, 0.0_f64], |[least, greatest], blob| {
+        [least.min(blob.shape.aspect), greatest.max(blob.shape.aspect)]
+    });
+    spec.has_narrow(blobs.len() as u64, are_upright.then_some(aspects))
+}
+
+/// Returns the density with wide blobs on wide cells of so many levels, which are spread to the
+/// finest ones.
 ///
 /// Error: mass is kept. A blob's density differs by at most 9e-3 of its peak from that on the
 /// finest cells. Deposit and spread are even and keep the variance, so the difference begins with
@@ -111,7 +131,11 @@ pub fn spread(level: &GridSpec, coarser: &[f64], cells: &mut [f64]) {
 /// Returns the number of cell updates of [`deposit`], over all blobs.
 pub fn n_deposited(spec: &GridSpec, blobs: &[Blob]) -> f64 {
     let n_levels = spec.n_levels(blobs.len() as u64);
+    let has_narrow = has_narrow(spec, blobs);
     let of_blob = |blob: &Blob| {
+        if has_narrow && is_narrowed(spec, blob) {
+            return NARROW_UPDATES;
+        }
         let level = level_of(spec, blob, n_levels);
         if !blob.shape.is_upright() {
             let mut n = 0.0;

@@ -7,7 +7,7 @@ use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord, Shapes};
 use nimbus::model::grid::GridSpec;
 use nimbus::passes::facets::{Facets, ParticleBuffers};
-use nimbus::passes::grid::{Deposit, Grid};
+use nimbus::passes::grid::{Deposit, Grid, Room};
 use nimbus::reference::Blob;
 use nimbus::reference::facets::{
     CONDITIONING, Facet, FacetPlace, FacetSources, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions,
@@ -143,7 +143,8 @@ impl Scene {
         runs: &[(u64, u64)],
     ) -> (Vec<f64>, Vec<FacetRecord>, Vec<u32>) {
         let (n, n_cells) = (self.blobs.len(), self.spec.n_total() as usize);
-        let grid = Grid::new(&gpu.device, compiler, n_cells as u64, false, self.shapes()).unwrap();
+        let room = Room { n_cells: n_cells as u64, has_levels: false, has_narrow: false };
+        let grid = Grid::new(&gpu.device, compiler, room, self.shapes()).unwrap();
         let pass = Facets::new(&gpu.device, compiler, self.shapes(), false).unwrap();
         let placed = |b: &Blob| PlacedRecord {
             position: b.position.as_vec3().to_array(),
@@ -170,7 +171,8 @@ impl Scene {
             (gpu.upload(order), gpu.upload(&records), gpu.buffer::<u32>(n));
         gpu.run(|rec| {
             let grid_of = &self.record;
-            let deposit = Deposit { grid: grid_of, n_particles: n as u32, heaviest, n_levels: 1 };
+            let n_particles = n as u32;
+            let deposit = Deposit { grid: grid_of, n_particles, heaviest, n_levels: 1, n_steps: 0 };
             grid.record(rec, [&placed, &particles, &density], &deposit)?;
             let buffers = ParticleBuffers {
                 placed: &placed,

@@ -2,12 +2,16 @@
 //! deposits.
 
 mod blobs;
+#[path = "grid/narrowed.rs"]
+mod of_narrowed;
 #[path = "grid/turned.rs"]
 mod of_turned;
 
 use glam::{DVec3, UVec3, Vec3};
 
-use blobs::{at_the_cut, ellipsoids, paper, scattered, turned, wide, wide_ellipsoids, wide_turned};
+use blobs::{
+    at_the_cut, ellipsoids, medium, paper, scattered, turned, wide, wide_ellipsoids, wide_turned,
+};
 
 use crate::harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
@@ -15,9 +19,11 @@ use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{ParticleRecord, PlacedRecord};
 use nimbus::model::cloud::{Shape, Shapes};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
-use nimbus::passes::grid::{Deposit, Grid};
+use nimbus::passes::grid::{Deposit, Grid, Room};
 use nimbus::reference::Blob;
-use nimbus::reference::deposit::{axis_weights, deposit, deposit_on, level_of, spread};
+use nimbus::reference::deposit::{
+    axis_weights, deposit, deposit_on, is_narrowed, level_of, spread,
+};
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32, erf_bound};
 
 const U: f64 = U_F32;
@@ -60,12 +66,14 @@ impl Scene {
         Scene::new(&GridSpec::fit(low, high, n, aspect), blobs)
     }
 
-    /// Leaves out turned ellipsoids that extend over as many cells along two axes, but for
-    /// rounding: which axis comes first is open.
+    /// Leaves out blobs whose law rounding decides, and turned ellipsoids that extend over as many
+    /// cells along two axes, but for rounding: which axis comes first is open.
     fn decided(self) -> Scene {
         let n_levels = self.n_levels();
-        let of =
-            |b: &&Blob| of_turned::is_decided(&self.spec, b, level_of(&self.spec, b, n_levels));
+        let of = |b: &&Blob| {
+            of_narrowed::is_decided(&self.spec, b)
+                && of_turned::is_decided(&self.spec, b, level_of(&self.spec, b, n_levels))
+        };
         let blobs = self.blobs.iter().filter(of).copied().collect();
         Scene { blobs, ..self }
     }
@@ -76,9 +84,10 @@ impl Scene {
 
     fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> Vec<f64> {
         let n_cells = self.spec.n_total() as usize;
-        let n_levels = self.n_levels();
-        let n_total = n_cells as u64;
-        let pass = Grid::new(&gpu.device, compiler, n_total, n_levels > 1, self.shapes()).unwrap();
+        let (n_levels, n_steps) = (self.n_levels(), self.n_steps());
+        let (has_levels, has_narrow) = (n_levels > 1, n_steps > 0);
+        let room = Room { n_cells: n_cells as u64, has_levels, has_narrow };
+        let pass = Grid::new(&gpu.device, compiler, room, self.shapes()).unwrap();
         let placed = |b: &Blob| PlacedRecord {
             position: b.position.as_vec3().to_array(),
             sigma: b.sigma as f32,
@@ -95,13 +104,13 @@ impl Scene {
         let density = gpu.buffer::<f32>(n_cells);
         let n = self.blobs.len() as u32;
         gpu.run(|rec| {
-            pass.record(rec, [&placed, &particles, &density], &self.deposit(n, n_levels))
+            pass.record(rec, [&placed, &particles, &density], &self.deposit(n, n_levels, n_steps))
         });
         gpu.download::<f32>(&density, n_cells).into_iter().map(f64::from).collect()
     }
 
-    fn deposit(&self, n_particles: u32, n_levels: u32) -> Deposit<'_> {
-        Deposit { grid: &self.record, n_particles, heaviest: self.heaviest, n_levels }
+    fn deposit(&self, n_particles: u32, n_levels: u32, n_steps: u32) -> Deposit<'_> {
+        Deposit { grid: &self.record, n_particles, heaviest: self.heaviest, n_levels, n_steps }
     }
 
     /// The grids that a blob of the scene is deposited on.
@@ -110,14 +119,44 @@ impl Scene {
         self.spec.n_used_levels(self.blobs.len() as u64, widest)
     }
 
+    /// The most blurs that a blob needs.
+    fn n_steps(&self) -> u32 {
+        let widest = self.blobs.iter().map(|b| b.sigma).fold(0.0, f64::max);
+        let aspects = || self.blobs.iter().map(|b| b.shape.aspect);
+        let ends = [aspects().fold(f64::INFINITY, f64::min), aspects().fold(0.0, f64::max)];
+        let ends = (self.shapes() < Shapes::Turned).then_some(ends);
+        self.spec.n_steps(self.blobs.len() as u64, widest, ends)
+    }
+
+    /// The blobs that are deposited narrower than they are, and the others.
+    fn parts(&self) -> [Vec<Blob>; 2] {
+        let is_narrow = |b: &Blob| self.n_steps() > 0 && is_narrowed(&self.spec, b);
+        let (narrowed, others) = self.blobs.iter().partition(|b| is_narrow(b));
+        [narrowed, others]
+    }
+
     /// Bound of every cell's density.
     fn bounds(&self) -> Vec<f64> {
+        let [narrowed, others] = self.parts();
+        let mut bounds = self.bounds_of_levels(&others);
+        if !narrowed.is_empty() {
+            let own = of_narrowed::bounds(&self.spec, self.heaviest, self.n_steps(), &narrowed);
+            bounds.iter_mut().zip(own).for_each(|(bound, own)| *bound += own);
+            // The last blur adds to what is there.
+            let sums = deposit(&self.spec, &self.blobs);
+            bounds.iter_mut().zip(sums).for_each(|(bound, sum)| *bound += U * (sum + *bound));
+        }
+        bounds
+    }
+
+    /// Bound of the density of blobs that are deposited as wide as they are.
+    fn bounds_of_levels(&self, blobs: &[Blob]) -> Vec<f64> {
         let n_levels = self.n_levels();
         let level_of = |b: &Blob| level_of(&self.spec, b, n_levels);
         let mut wider: Option<[Vec<f64>; 2]> = None;
         for level in (0..n_levels).rev() {
             let of = |b: &&Blob| b.sigma > 0.0 && b.kappa > 0.0 && level_of(b) == level;
-            let blobs: Vec<Blob> = self.blobs.iter().filter(of).copied().collect();
+            let blobs: Vec<Blob> = blobs.iter().filter(of).copied().collect();
             let mut values = deposit_on(&self.spec, level, &blobs);
             let mut bounds = self.bounds_on(level, &blobs);
             if let Some([of_values, of_bounds]) = &wider {
@@ -255,6 +294,8 @@ fn scenes() -> Vec<(&'static str, Scene)> {
         ("ellipsoids", Scene::fitted(&ellipsoids(3000), 48)),
         ("turned", Scene::fitted(&turned(3000), 48).decided()),
         ("wide turned ones", Scene::fitted(&wide_turned(3000), 64).decided()),
+        ("of some cells", Scene::fitted(&medium(42_000, 1.0), 24).decided()),
+        ("of some flat cells", Scene::fitted(&medium(42_000, 0.3), 24).decided()),
         ("the paper's 554", Scene::fitted(&paper(), 64)),
         ("at the cut", Scene::new(&cells, &at_the_cut())),
         ("a speck", Scene::new(&cells, &[at(4.5, 1e-4, 3.0)])),
@@ -291,8 +332,14 @@ fn every_cell_is_within_its_bound() {
 #[test]
 fn mass_is_kept() {
     let mut gpu = Gpu::new();
-    for blobs in [scattered(3000), ellipsoids(3000), paper(), wide(3000)] {
-        let scene = Scene::fitted(&blobs, 64);
+    for (blobs, n) in [
+        (scattered(3000), 64),
+        (ellipsoids(3000), 64),
+        (paper(), 64),
+        (wide(3000), 64),
+        (medium(42_000, 1.0), 24),
+    ] {
+        let scene = Scene::fitted(&blobs, n).decided();
         let volume = scene.spec.cell_volume();
         let values = scene.run(&mut gpu, &compiler());
         let (found, expected) =
@@ -400,16 +447,40 @@ fn a_wrong_grid_of_wide_cells_is_noticed() {
 }
 
 #[test]
+fn a_wrong_blur_is_noticed() {
+    let scene = Scene::fitted(&medium(42_000, 1.0), 24).decided();
+    let [narrowed, others] = scene.parts();
+    assert!(narrowed.len() > 5_000 && others.len() > 1_000 && scene.n_steps() == 18);
+    let mutations = [
+        ("grid_narrow.comp", "0.75 - f * f", "0.76 - f * f"),
+        ("grid_narrow.comp", "- 1.0 / 3.0", "- 0.33"),
+        ("grid_narrow.comp", "(step + is_more - FIRST_STEP)", "(step - FIRST_STEP)"),
+        ("grid_narrow.comp", "first + x + row * y", "first + y + row * x"),
+        ("grid_narrow.comp", "at - vec3(own) - 0.5", "at - vec3(own) - 0.49"),
+        ("grid_narrow.comp", "15.7496099457224", "15.76"),
+        ("grid_narrow.comp", "? more : 1.0 - more", "? more : 1.0"),
+        ("grid_deposit.comp", "push.has_narrow == 1u &&", "false &&"),
+        ("grid_blur.comp", "54.0 * value_of(c)", "53.9 * value_of(c)"),
+        ("grid_blur.comp", "k == 1 ? 20.0 : 1.0", "k == 1 ? 21.0 : 0.0"),
+        ("grid_blur.comp", "? -1 - i", "? 0"),
+        ("grid_blur.comp", "? 2 * n - 1 - i", "? n - 1"),
+        ("grid_blur.comp", "push.adds == 1u ? blurred[c] + sum : sum", "sum"),
+    ];
+    assert_noticed(&scene, &mutations);
+}
+
+#[test]
 fn a_grid_without_room_is_refused() {
     let mut gpu = Gpu::new();
     let scene = Scene::fitted(&scattered(10), 24);
     let n_cells = scene.spec.n_total();
-    let pass = Grid::new(&gpu.device, &compiler(), n_cells - 1, false, Shapes::Balls).unwrap();
+    let room = Room { n_cells: n_cells - 1, has_levels: false, has_narrow: false };
+    let pass = Grid::new(&gpu.device, &compiler(), room, Shapes::Balls).unwrap();
     let (placed, particles) = (gpu.buffer::<PlacedRecord>(10), gpu.buffer::<ParticleRecord>(10));
     let density = gpu.buffer::<f32>(n_cells as usize);
     let mut what = String::new();
     gpu.run(|rec| {
-        let refused = pass.record(rec, [&placed, &particles, &density], &scene.deposit(10, 1));
+        let refused = pass.record(rec, [&placed, &particles, &density], &scene.deposit(10, 1, 0));
         what = refused.expect_err("no room").to_string();
         Ok(())
     });

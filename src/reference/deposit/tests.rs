@@ -101,6 +101,91 @@ fn wide_cells_keep_mass_and_differ_by_their_bound() {
     assert!(greatest > 0.5 * LEVEL_ERROR, "the bound says nothing: {greatest}");
 }
 
+/// Bounds of what blurs change, over a blob's peak, and the σ in cells from which they hold.
+const NARROW_ERRORS: [(f64, f64); 3] = [(1.125, 9e-2), (1.5, 2.2e-2), (1.75, 1.2e-2)];
+
+#[test]
+fn blurred_blobs_keep_mass_and_differ_by_their_bounds() {
+    let mut greatest = [0.0_f64; 3];
+    for i in 0..150 {
+        let (a, b) = (f64::from(i) * 0.618_034 % 1.0, f64::from(i) * 0.754_877_7 % 1.0);
+        let sigma = 1.125 + 1.874 * f64::from(i) / 150.0;
+        let spec = spec((6.0 * sigma).ceil() as u32 + 4 + i % 3, 1.0, 0.0);
+        let middle = 0.5 * spec.n_cells.x as f64;
+        let position = middle + 0.5 * DVec3::new(a - 0.5, b - 0.5, 0.5 - a);
+        let blob = Blob { shape: Shape::BALL, position, sigma, kappa: 0.7 };
+        assert!(is_narrowed(&spec, &blob));
+        let (narrow, exact) =
+            (deposit_narrow(&spec, &[blob]), deposit_by_levels(&spec, &[blob], 1));
+        let sum = |cells: &[f64]| cells.iter().sum::<f64>();
+        assert!((sum(&narrow) / sum(&exact) - 1.0).abs() < 1e-12);
+        // Place and variance along x are those of the blob in its cells, but for the mirrored tail:
+        // 0.3 % of the mass lies beyond 3σ, where the ends are.
+        let along = |f: &dyn Fn(f64) -> f64| {
+            let of = |c: usize| f(spec.center(c).x) * narrow[c];
+            (0..narrow.len()).map(of).sum::<f64>() / sum(&narrow)
+        };
+        let mean = along(&|x| x);
+        assert!((mean - position.x).abs() < 2e-3, "{mean} {position}");
+        let variance = along(&|x| (x - mean).powi(2));
+        let expected = sigma * sigma + 1.0 / 12.0;
+        assert!((variance / expected - 1.0).abs() < 1e-3, "{variance} {expected}");
+        let off = narrow.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let of = NARROW_ERRORS.iter().rposition(|(from, _)| sigma >= *from).unwrap();
+        greatest[of] = greatest[of].max(off / blob.kappa);
+    }
+    println!("greatest differences over the blob's peak: {greatest:?}");
+    for (greatest, (_, bound)) in greatest.into_iter().zip(NARROW_ERRORS) {
+        assert!(greatest < bound && greatest > 0.5 * bound, "{greatest} {bound}");
+    }
+}
+
+#[test]
+fn a_spline_and_a_blur_by_hand() {
+    // In the middle of a cell: 1/8, 3/4, 1/8. On a face: 1/2, 1/2.
+    let spec = spec(7, 1.0, 0.0);
+    let one = |x: f64| {
+        let position = DVec3::new(x, 3.5, 3.5);
+        let blob = Blob { shape: Shape::BALL, position, sigma: 2.0, kappa: 1.0 };
+        let mut along = [0.0; 7];
+        super::narrow::each_share(&spec, &blob, |c, share| along[c % 7] += share);
+        along
+    };
+    assert_eq!(one(3.5), [0.0, 0.0, 0.125, 0.75, 0.125, 0.0, 0.0]);
+    assert_eq!(one(3.0), [0.0, 0.0, 0.5, 0.5, 0.0, 0.0, 0.0]);
+    let row = |cells: [f64; 4]| blurred(&cells, UVec3::new(4, 1, 1), 0);
+    assert_eq!(row([0.0, 96.0, 0.0, 0.0]), [21.0, 54.0, 20.0, 1.0]);
+    assert_eq!(row([96.0, 0.0, 0.0, 0.0]), [74.0, 21.0, 1.0, 0.0]);
+    // Along y and z the neighbours lie a row and a layer further.
+    let mut cells = vec![0.0; 8];
+    cells[0] = 96.0;
+    assert_eq!(blurred(&cells, UVec3::splat(2), 1)[..4], [74.0, 0.0, 22.0, 0.0]);
+    assert_eq!(blurred(&cells, UVec3::splat(2), 2)[4], 22.0);
+}
+
+#[test]
+fn many_blobs_of_some_cells_are_blurred() {
+    let spec = spec(20, 1.0, 0.0);
+    // Every other one has a σ of one cell, and stays as wide as it is.
+    let of = |i: usize| Blob {
+        position: DVec3::new(10.0, 9.5, 9.5) + 0.001 * (i % 7) as f64,
+        ..blob(0.0, [1.0, 2.0][i % 2], 1.0)
+    };
+    let blobs: Vec<Blob> = (0..24_000).map(of).collect();
+    let narrowed: Vec<Blob> = blobs.iter().skip(1).step_by(2).copied().collect();
+    let others: Vec<Blob> = blobs.iter().step_by(2).copied().collect();
+    let found = deposit(&spec, &blobs);
+    let parts = [deposit_narrow(&spec, &narrowed), deposit_by_levels(&spec, &others, 6)];
+    for (c, found) in found.iter().enumerate() {
+        assert!((found - parts[0][c] - parts[1][c]).abs() <= 1e-12 * found);
+    }
+    assert_eq!(n_deposited(&spec, &blobs), 12_000.0 * 54.0 + n_deposited(&spec, &others));
+    // One less, and none is blurred.
+    let few = deposit_by_levels(&spec, &blobs[..23_999], 6);
+    assert_eq!(deposit(&spec, &blobs[..23_999]), few);
+    assert!(n_deposited(&spec, &blobs[..23_999]) > 2.0 * n_deposited(&spec, &blobs));
+}
+
 #[test]
 fn wide_cells_at_the_border_keep_mass() {
     // The grids of scenes reach two cells beyond 3σ.

@@ -40,7 +40,18 @@ pub fn wide(n: u32) -> Vec<Blob> {
     scattered(n).into_iter().zip(0..).map(of).collect()
 }
 
-/// The same, from half to twice as high as wide.
+/// Blobs of half a cell to three of 24, which are `aspect` times as high as wide.
+pub fn medium(n: u32, aspect: f64) -> Vec<Blob> {
+    let blob = |i: u32| {
+        let ([a, b, c, d], [e, ..]) = (uniforms(0x64128, 0, i, 0), uniforms(0x64128, 1, i, 0));
+        let position = DVec3::new(1.5 * a, 7.0 + 1.5 * aspect * b, 1.4 * c - 3.0);
+        let kappa = 10f64.powf(3.0 * e - 2.0);
+        Blob { shape: Shape::upright(aspect), position, sigma: 0.5 + 2.55 * d, kappa }
+    };
+    (0..n).map(blob).collect()
+}
+
+/// [`wide`] ones, from half to twice as high as wide.
 pub fn wide_ellipsoids(n: u32) -> Vec<Blob> {
     let shaped = |(b, i): (Blob, u32)| Blob {
         shape: Shape::upright(0.5 * 4f64.powf(uniforms(0x64126, 0, i, 0)[0])),

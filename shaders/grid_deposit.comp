@@ -10,7 +10,7 @@
 // 64 bits. Law: the Gaussian, cut at 3 sigma and normalised, integrated over each cell. The
 // fixed-point sums do not depend on the order of the atomics. Bound: half a quantum a deposit, and
 // erf_approx's error in the weights. Wide blobs are deposited on grids of wider cells, by another
-// dispatch.
+// dispatch. Where there are more, grid_narrow.comp deposits some.
 
 // The host asks for one subgroup, where barriers are cheap.
 #ifndef WORKGROUP

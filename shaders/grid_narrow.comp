@@ -5,11 +5,12 @@
 #include "grid_narrow.glsl"
 #include "each.glsl"
 
-// Deposits balls, in cells, of some cells narrower than they are; grid_blur.comp makes them as wide
-// (passes.md "grid"). It is run where there are many. In: placed particles (lengths), kappa (1/length). Out: fixed-point sums of
-// mass by number of blurs and cell, 64 bits. Law: along each axis the quadratic B-spline, whose
-// variance is 1/4 cell², in three cells. The mass is dealt to two numbers of blurs, so that the
-// variance is that of the blob in its cells. Error: half a quantum a deposit, and some roundings.
+// Deposits balls, in cells, of some cells narrower than they are; grid_blur.comp makes them as
+// wide (passes.md "grid"). It is run where there are many. In: placed particles (lengths), kappa
+// (1/length). Out: fixed-point sums of mass by number of blurs and cell, 64 bits. Law: along each
+// axis the quadratic B-spline, whose variance is 1/4 cell², in three cells. The mass is dealt to
+// two numbers of blurs, so that the variance is that of the blob in its cells. Error: half a
+// quantum a deposit, and some roundings.
 
 layout(push_constant) uniform Push {
     Grid grid;

@@ -14,7 +14,8 @@ use crate::layout::frame::LightRecord;
 use crate::layout::harmonics::n_texels;
 use crate::layout::medium::MediumRecord;
 use crate::layout::particle::{
-    BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, TexturedRecord,
+    BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, Shapes,
+    TexturedRecord,
 };
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{Cloud, CloudSource};
@@ -173,11 +174,12 @@ pub fn n_cells(scene: &Scene) -> u64 {
 /// Returns the room for the deposit of the particles in the density grid.
 pub fn grid_room(scene: &Scene) -> GridRoom {
     let (n, side) = (scene.n_particles(), scene.lighting.grid.min(MAX_CELLS));
-    let has = |rule: fn(u64, u32) -> bool| is_lit(scene) && rule(n, side);
+    // Such blobs are balls in cells at every time.
+    let may_be_balls = scene.shapes() < Shapes::Turned && !scene.is_animated();
     GridRoom {
         n_cells: n_cells(scene),
-        has_levels: has(grid::has_levels),
-        has_narrow: has(grid::has_narrow),
+        has_levels: is_lit(scene) && grid::has_levels(n, side),
+        has_narrow: is_lit(scene) && may_be_balls && grid::has_narrow(n, side),
     }
 }
 

@@ -152,8 +152,9 @@ impl Game {
         };
         let heaviest = self.heaviest(&grown, live.as_ref());
         let extents = self.extents(&grown, &origins, live.as_deref());
-        let filled = grown.iter().filter(|g| g.n_particles > 0);
-        let sigma_max = filled.map(Group::sigma_widest).fold(0.0, f64::max);
+        let filled = || grown.iter().filter(|g| g.n_particles > 0);
+        let sigma_max = filled().map(Group::sigma_widest).fold(0.0, f64::max);
+        let across_max = filled().map(|g| g.sigma_max).fold(0.0, f64::max);
         Ok(Packet {
             i_frame,
             time_s,
@@ -188,7 +189,7 @@ impl Game {
             heaviest,
             sigma_max,
             n_levels: setting.grid.n_used_levels(self.scene.n_particles(), sigma_max),
-            n_steps: setting.grid.n_steps(self.scene.n_particles(), sigma_max, aspects_of(&grown)),
+            n_steps: setting.grid.n_steps(self.scene.n_particles(), across_max, aspects_of(&grown)),
             radius: setting.radius,
             sort_bits: self.sort_bits(&grown, setting.radius),
             slice: slice_length(self.scene.draw.slice, &grown, setting.radius),

@@ -113,11 +113,12 @@ fn start_grid(scene: &Scene) -> Option<GridSpec> {
 pub fn n_deposits(scene: &Scene) -> f64 {
     let Some(grid) = start_grid(scene) else { return 0.0 };
     let groups = scene.groups();
+    let has_narrow = grid.has_narrow(scene.n_particles(), aspects_of(&groups));
     let blob = |g: &Group| {
         let sigma = g.sigma_mean * DVec3::new(1.0, g.aspects[1], 1.0);
-        // If the mean blob is such a one, so are most.
+        // All blobs of a group count as if they had its mean σ.
         let is_narrowed = (NARROW_SIGMA..NARROW_BELOW).contains(&(g.sigma_mean / grid.cell));
-        if is_narrowed && grid.has_narrow(scene.n_particles(), aspects_of(&groups)) {
+        if has_narrow && is_narrowed {
             return f64::from(g.n_particles) * NARROW_UPDATES;
         }
         let level = grid.level_of(sigma, grid.n_levels(scene.n_particles()));

@@ -110,7 +110,7 @@ fn watch(
         if waited == Waited::Over {
             return;
         }
-        let (seen, mut newest) = (Instant::now(), picture);
+        let (mut seen, mut newest) = (Instant::now(), picture);
         let mut told = vec![];
         for newer in presented.try_iter() {
             if wait(newer.id, Duration::ZERO) != Waited::Visible {
@@ -118,7 +118,8 @@ fn watch(
                 break;
             }
             told.push(Shown { begun: newest.begun, seen: None });
-            newest = newer;
+            // It may have become visible since: no picture is told to be seen too early.
+            (seen, newest) = (Instant::now(), newer);
         }
         told.push(Shown { begun: newest.begun, seen: Some(seen) });
         for shown in told {

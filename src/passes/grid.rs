@@ -11,7 +11,7 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
-use crate::layout::frame::GridRecord;
+use crate::layout::frame::{FIRST_STEP, GridRecord, LAST_STEP};
 use crate::layout::particle::Shapes;
 use crate::layout::record;
 
@@ -220,6 +220,13 @@ impl Grid {
             if of.heaviest > 0.0 { QUANTA_OF_HEAVIEST / of.heaviest } else { 0.0 };
         let quanta_per_mass = quanta_per_mass as f32;
         let narrow = self.narrow.as_ref().filter(|_| of.n_steps > 0);
+        let has_room = narrow.is_some() && (FIRST_STEP + 1..=LAST_STEP).contains(&of.n_steps);
+        if of.n_steps > 0 && !has_room {
+            return Err(Error::limit(format!(
+                "a density grid with {} blurs, where there is no room for them",
+                of.n_steps
+            )));
+        }
         let push = DepositPush {
             grid: *of.grid,
             n_particles: of.n_particles,

@@ -83,11 +83,14 @@ impl Scene {
     }
 
     fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> Vec<f64> {
+        let (has_levels, has_narrow) = (self.n_levels() > 1, self.n_steps() > 0);
+        let room = Room { n_cells: self.spec.n_total(), has_levels, has_narrow };
+        self.run_on(gpu, &Grid::new(&gpu.device, compiler, room, self.shapes()).unwrap())
+    }
+
+    fn run_on(&self, gpu: &mut Gpu, pass: &Grid) -> Vec<f64> {
         let n_cells = self.spec.n_total() as usize;
         let (n_levels, n_steps) = (self.n_levels(), self.n_steps());
-        let (has_levels, has_narrow) = (n_levels > 1, n_steps > 0);
-        let room = Room { n_cells: n_cells as u64, has_levels, has_narrow };
-        let pass = Grid::new(&gpu.device, compiler, room, self.shapes()).unwrap();
         let placed = |b: &Blob| PlacedRecord {
             position: b.position.as_vec3().to_array(),
             sigma: b.sigma as f32,
@@ -450,7 +453,8 @@ fn a_wrong_grid_of_wide_cells_is_noticed() {
 fn a_wrong_blur_is_noticed() {
     let scene = Scene::fitted(&medium(42_000, 1.0), 24).decided();
     let [narrowed, others] = scene.parts();
-    assert!(narrowed.len() > 5_000 && others.len() > 1_000 && scene.n_steps() == 18);
+    assert!(narrowed.len() > 5_000 && others.len() > 1_000 && scene.n_steps() == 17);
+    assert_eq!(scene.spec.n_cells, UVec3::new(24, 22, 24));
     let mutations = [
         ("grid_narrow.comp", "0.75 - f * f", "0.76 - f * f"),
         ("grid_narrow.comp", "- 1.0 / 3.0", "- 0.33"),
@@ -460,13 +464,37 @@ fn a_wrong_blur_is_noticed() {
         ("grid_narrow.comp", "15.7496099457224", "15.76"),
         ("grid_narrow.comp", "? more : 1.0 - more", "? more : 1.0"),
         ("grid_deposit.comp", "push.has_narrow == 1u &&", "false &&"),
+        ("grid_narrow.comp", "layer = row * push.grid.n_cells.y", "layer = row * row"),
         ("grid_blur.comp", "54.0 * value_of(c)", "53.9 * value_of(c)"),
+        ("grid_blur.comp", "uvec3(1u, n.x, n.x * n.y)", "uvec3(1u, n.x, n.x * n.x)"),
         ("grid_blur.comp", "k == 1 ? 20.0 : 1.0", "k == 1 ? 21.0 : 0.0"),
         ("grid_blur.comp", "? -1 - i", "? 0"),
         ("grid_blur.comp", "? 2 * n - 1 - i", "? n - 1"),
         ("grid_blur.comp", "push.adds == 1u ? blurred[c] + sum : sum", "sum"),
     ];
     assert_noticed(&scene, &mutations);
+}
+
+/// One pass with room to spare: frames with many blurs, with none, with fewer, and after its room
+/// has changed.
+#[test]
+fn frames_with_and_without_blurs_follow_each_other() {
+    let mut gpu = Gpu::new();
+    let many = Scene::fitted(&medium(42_000, 1.0), 24).decided();
+    let few = Scene::fitted(&medium(3_000, 1.0), 24);
+    let thin: Vec<Blob> = many.blobs.iter().filter(|b| b.sigma < 1.7).copied().collect();
+    let thin = Scene::new(&GridSpec { n_cells: UVec3::splat(18), ..many.spec }, &thin);
+    assert_eq!([&many, &few, &thin].map(Scene::n_steps), [17, 0, 5]);
+    let alone = [&many, &few, &thin].map(|scene| scene.run(&mut gpu, &compiler()));
+    let room = Room { n_cells: 20_000, has_levels: true, has_narrow: true };
+    let mut pass = Grid::new(&gpu.device, &compiler(), room, Shapes::Balls).unwrap();
+    for n_cells in [20_000, 24 * 24 * 24] {
+        pass.set_capacity(&gpu.device, n_cells).unwrap();
+        for i in [0, 1, 2, 0] {
+            let scene = [&many, &few, &thin][i];
+            assert!(scene.run_on(&mut gpu, &pass) == alone[i], "{n_cells} {i}");
+        }
+    }
 }
 
 #[test]

@@ -17,7 +17,7 @@ use crate::gpu::Device;
 use crate::layout::facet::{FacetRecord, RegionRecord};
 use crate::layout::particle::GroupRecord;
 use crate::model::cloud::{CloudSource, Group};
-use crate::model::grid::{DEPOSIT_CUT_SIGMA, NARROW_UPDATES};
+use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::harmonics::n_rest;
 use crate::model::scene::{Scene, Simulate};
 use crate::passes::blobs::Extent;
@@ -240,7 +240,8 @@ const LEAST_SIGMA: f64 = 1.322;
 /// which is at least 6σ/h cells of edge h, and one. The product is convex in σ, so that the blobs
 /// of a group reach at least as many as if all had their mean σ. A blob on wider cells has at least
 /// [`LEAST_SIGMA`] of them a σ. Any blob has fewer of cells of which the widest blob has so many.
-/// Where some are deposited narrower than they are, all count as such ones if that is less.
+/// Where some are deposited narrower than they are, each counts as one cell: those shares of a blob
+/// that round to nothing are left out.
 fn deposits(scene: &Scene, packet: &Packet) -> f64 {
     let widest = packet.extents.iter().map(|e| e.sigma_max).fold(0.0, f64::max);
     let least = if packet.n_levels > 1 { widest / LEAST_SIGMA } else { 0.0 };
@@ -254,8 +255,8 @@ fn deposits(scene: &Scene, packet: &Packet) -> f64 {
         let least = if group.turned_max > 0.0 { group.aspects[0].min(1.0) } else { 1.0 };
         let across = reached(least * f64::from(record.sigma_mean), cell);
         let along = reached(least * extent.sigma_mean, cell * f64::from(packet.grid.aspect));
-        let most = if packet.n_steps > 0 { NARROW_UPDATES } else { f64::INFINITY };
-        f64::from(group.n_particles) * (across * across * along).min(most)
+        let cells = if packet.n_steps > 0 { 1.0 } else { across * across * along };
+        f64::from(group.n_particles) * cells
     };
     groups.iter().zip(&packet.groups).zip(&packet.extents).map(of).sum()
 }

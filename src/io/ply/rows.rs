@@ -211,6 +211,7 @@ fn offset_in(text: &str, part: &str) -> usize {
 fn number(bytes: &[u8], scalar: Scalar, is_big: bool) -> f64 {
     #[inline]
     fn first<const N: usize>(bytes: &[u8], is_big: bool) -> [u8; N] {
+        debug_assert!(bytes.len() >= N, "a row is cut to its length");
         let mut found = bytes.first_chunk().copied().unwrap_or([0; N]);
         if is_big {
             found.reverse();

@@ -3,9 +3,8 @@
 use super::SpreadPush;
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
-use crate::layout::frame::GridRecord;
+use crate::layout::frame::{FIRST_STEP, GridRecord, LAST_STEP};
 use crate::layout::record;
-use crate::model::grid::{FIRST_STEP, LAST_STEP};
 
 record! {
     /// Push constants of `grid_narrow.comp`.

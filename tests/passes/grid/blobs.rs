@@ -44,7 +44,7 @@ pub fn wide(n: u32) -> Vec<Blob> {
 pub fn medium(n: u32, aspect: f64) -> Vec<Blob> {
     let blob = |i: u32| {
         let ([a, b, c, d], [e, ..]) = (uniforms(0x64128, 0, i, 0), uniforms(0x64128, 1, i, 0));
-        let position = DVec3::new(1.5 * a, 7.0 + 1.5 * aspect * b, 1.4 * c - 3.0);
+        let position = DVec3::new(3.0 * a, 7.0 + 0.2 * aspect * b, 1.6 * c - 3.0);
         let kappa = 10f64.powf(3.0 * e - 2.0);
         Blob { shape: Shape::upright(aspect), position, sigma: 0.5 + 2.55 * d, kappa }
     };

@@ -166,6 +166,27 @@ mod tests {
         assert_eq!((seen, asked), (vec![false, false, true, true], vec![1, 2, 3, 4, 4]));
     }
 
+    /// The second becomes visible while the first is told.
+    #[test]
+    fn no_picture_is_told_to_be_seen_before_it_is_visible() {
+        let (send, presented) = sync_channel(MOST);
+        let (report, shown) = sync_channel(MOST);
+        let begun = Instant::now();
+        (1..=2).for_each(|id| send.send(Presented { id, begun }).expect("room"));
+        drop(send);
+        let visible = RefCell::new(vec![]);
+        watch(&presented, &report, |_, _| {
+            let before = Instant::now();
+            while Instant::now() == before {}
+            visible.borrow_mut().push(Instant::now());
+            Visible
+        });
+        drop(report);
+        let told: Vec<Option<Instant>> = shown.iter().map(|s| s.seen).collect();
+        assert_eq!(told.len(), 2);
+        assert!(told[0].is_none() && told[1] >= Some(visible.borrow()[1]));
+    }
+
     #[test]
     fn nothing_is_told_of_a_picture_that_the_window_system_gave_up() {
         let (seen, asked) = watched(3, &[Visible, NotYet, NotYet, Over]);

@@ -8,7 +8,7 @@ use glam::DVec3;
 use nimbus::io::weather::wrf::{self, Step};
 use nimbus::model::weather::grid::{Grid, Ground, Shape};
 use nimbus::model::weather::interval::{Interval, StepClouds};
-use nimbus::model::weather::particles::{Layout, THIN, WeatherBlob};
+use nimbus::model::weather::particles::{Layout, THIN, WeatherBlob, courses};
 use nimbus::model::weather::statistics::column_depths;
 
 fn step(name: &str, i_step: usize) -> Step {
@@ -43,9 +43,26 @@ fn plain_grid(nx: usize, ny: usize, nz: usize) -> Grid {
     Grid::new(ground, heights).expect("a grid")
 }
 
-/// Katrina with 100 000 blobs. Mass is right to 0.1 %. The transmittance of the columns' mean
-/// optical depth is within 0.055 RMS (measured: 0.037 to 0.048). At 16 points of each column, which
-/// also show gaps between blobs, it is within 0.02 (measured: 0.013 to 0.017).
+/// Returns the vertical optical depth at `side`² points of each column, as it runs in the
+/// cells. *Shape*: [column][point].
+fn running(step: &Step, side: usize) -> Vec<f64> {
+    let shape = step.grid.shape();
+    let n_columns = shape.n_columns();
+    let depths: Vec<f64> =
+        (0..shape.n_cells()).map(|i| step.extinction[i] * step.grid.thickness_m(i)).collect();
+    let courses = courses(&step.grid, &depths, |_| true);
+    let part = |i: usize| (i as f64 + 0.5) / side as f64 - 0.5;
+    let at = |k: usize| {
+        let (i_column, x, z) = (k / (side * side), part(k % side), part(k / side % side));
+        let cells = (i_column..shape.n_cells()).step_by(n_columns);
+        cells.map(|i| depths[i] * courses[i].across.at(x, z)).sum()
+    };
+    (0..n_columns * side * side).map(at).collect()
+}
+
+/// Katrina with 100 000 blobs. Mass is right to 1e-9. The transmittance of the columns' mean optical
+/// depth is within 0.02 RMS (measured: MMM). At 16 points of each column, which also show gaps
+/// between blobs, it is within PPP of that in the cells (measured: QQQ).
 #[test]
 fn columns_of_katrina_have_the_transmittance_of_the_file() {
     for i_step in 0..4 {
@@ -56,9 +73,25 @@ fn columns_of_katrina_have_the_transmittance_of_the_file() {
         let whole: f64 = blobs.iter().map(WeatherBlob::mass).sum();
         assert!((whole / mass(&step.grid, &step.extinction) - 1.0).abs() < 1e-9, "{whole}");
         let of_columns = transmittance_rms(&of_file, &of_blobs(&step.grid, &blobs));
-        let of_points = transmittance_rms(&of_file, &at_points(&step.grid, &blobs, 4));
+        let of_points = transmittance_rms(&running(&step, 4), &at_points(&step.grid, &blobs, 4));
         println!("step {i_step}: columns {of_columns:.4}, points {of_points:.4}");
-        assert!(of_columns < 0.055 && of_points < 0.02, "step {i_step}: {of_columns} {of_points}");
+        assert!(of_columns < 0.02 && of_points < 0.05, "step {i_step}: {of_columns} {of_points}");
+    }
+}
+
+/// Prints the table of model.md §15.
+#[test]
+#[ignore = "it measures, and asserts nothing"]
+fn errors_by_number_of_blobs() {
+    for (name, i_step) in [("katrina.nc", 0), ("supercell.nc", 1)] {
+        let step = step(name, i_step);
+        let (of_file, of_points) = (column_depths(&step.grid, &step.extinction), running(&step, 4));
+        for n in [1_000, 10_000, 100_000, 1_000_000] {
+            let (_, blobs) = blobs_of(&step, n, 1);
+            let columns = transmittance_rms(&of_file, &of_blobs(&step.grid, &blobs));
+            let points = transmittance_rms(&of_points, &at_points(&step.grid, &blobs, 4));
+            println!("{name} {n}: columns {columns:.4}, points {points:.4}");
+        }
     }
 }
 

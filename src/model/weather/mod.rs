@@ -12,6 +12,7 @@ pub mod grid;
 pub mod interval;
 pub mod particles;
 pub mod places;
+pub mod profile;
 pub mod statistics;
 pub mod steps;
 pub mod sun;

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::grid::{Grid, Shape};
 use super::places::CellSeed;
+use super::profile::{Plane, Profile};
 
 /// Optical depth below which a column may be without blobs, 0.1 % of the light. It applies if more
 /// than one blob in [`AFFORDED`] would be needed to give every column one. The column's mass goes
@@ -17,9 +18,6 @@ pub const AFFORDED: usize = 10;
 /// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other,
 /// narrower ones leave gaps (errors: model.md §15).
 pub const SPREAD: f64 = 0.45;
-/// Additional distance of the centres from a cell's edge, σ_xy. Thick clouds then leak less into
-/// clear columns, and the loss between two cloudy cells is small.
-const INSET: f64 = 0.5;
 /// σ of a uniform distribution over a length of 1: 1/√12.
 const EVEN: f64 = 0.288_675_134_594_812_9;
 /// σ_z over the thickness of a cell with several blobs. Their heights, over half of the cell, add
@@ -63,6 +61,8 @@ pub struct Place {
 pub struct Layout {
     seed: u32,
     n_blobs: Vec<u32>,
+    /// For every cell with blobs, how its extinction runs.
+    courses: Vec<Course>,
     /// For every cell the cell whose blobs hold its mass; itself if it has blobs.
     hosts: Vec<u32>,
     /// All blobs, in an order of which any first part represents all cells evenly.
@@ -88,7 +88,8 @@ impl Layout {
         }
         ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
         let places = ordered.into_iter().map(|(_, place)| place).collect();
-        Layout { seed, n_blobs, hosts, places }
+        let courses = courses(grid, &depths, |i| n_blobs[i] > 0);
+        Layout { seed, n_blobs, courses, hosts, places }
     }
 
     /// Returns all blobs in drawing order.
@@ -129,11 +130,14 @@ impl Layout {
         // are wider.
         let room =
             |size: f64, sigma: f64| size * (1.0 - (sigma / (EVEN * size)).powi(2)).max(0.0).sqrt();
-        let inside = |size: f64| (room(size, sigma_xy) - 2.0 * INSET * sigma_xy).max(0.0);
-        let room = DVec3::new(inside(dx), room(thickness, sigma_z), inside(dy));
+        let room = DVec3::new(room(dx, sigma_xy), room(thickness, sigma_z), room(dy, sigma_xy));
         let middle =
             DVec3::new(ground.east_m[i_column], grid.middle_m(i), ground.south_m[i_column]);
-        let position = middle + room * CellSeed::new(self.seed, place.i_cell).place(place.number);
+        let even = CellSeed::new(self.seed, place.i_cell).place(place.number);
+        let Course { across, upward } = self.courses[i];
+        let [x, z] = across.place([even.x, even.z]);
+        let at = DVec3::new(x, upward.place(even.y), z);
+        let position = middle + room * at;
         let mut blob = WeatherBlob { position, sigma_xy, sigma_z, kappa: 1.0 };
         blob.kappa = mass_of_cell / n / blob.mass();
         blob
@@ -144,6 +148,44 @@ impl Layout {
 fn greatest_depths(grid: &Grid, moments: &[&[f64]]) -> Vec<f64> {
     let greatest = |i: usize| moments.iter().map(|m| m[i]).fold(0.0, f64::max);
     (0..grid.shape().n_cells()).map(|i| greatest(i) * grid.thickness_m(i)).collect()
+}
+
+/// How the extinction runs in a cell: across, and in height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Course {
+    /// Along x and z.
+    pub across: Plane,
+    /// Upward.
+    pub upward: Profile,
+}
+
+impl Course {
+    /// The same throughout.
+    const EVEN: Course = Course { across: Plane::EVEN, upward: Profile::EVEN };
+}
+
+/// Returns how the extinction runs in cells of vertical optical depths `depths`, where `has` says
+/// that a cell's is needed.
+pub fn courses(grid: &Grid, depths: &[f64], has: impl Fn(usize) -> bool) -> Vec<Course> {
+    let Shape { nx, ny, nz } = grid.shape();
+    let extinction = |i: usize| depths[i] / grid.thickness_m(i);
+    let of = |i: usize| {
+        if !has(i) {
+            return Course::EVEN;
+        }
+        let (i_column, k) = (i % (nx * ny), i / (nx * ny));
+        let (x, y) = (i_column % nx, i_column / nx);
+        // Rows run north, and z points south.
+        let at = |east: usize, south: usize| {
+            let (x, y) = ((x + east).checked_sub(1)?, (y + 1).checked_sub(south)?);
+            (x < nx && y < ny).then(|| extinction(x + nx * (y + ny * k)))
+        };
+        let across = Plane::among([0, 1, 2].map(|east| [0, 1, 2].map(|south| at(east, south))));
+        let below = (k > 0).then(|| extinction(i - nx * ny));
+        let above = (k + 1 < nz).then(|| extinction(i + nx * ny));
+        Course { across, upward: Profile::between(below, extinction(i), above) }
+    };
+    (0..depths.len()).map(of).collect()
 }
 
 /// Returns the number of blobs of each cell. Columns get blobs by Σ 1 − e^{−τ}, and the cells of a

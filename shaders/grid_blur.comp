@@ -4,9 +4,10 @@
 #include "each.glsl"
 
 // Blurs a density along one axis (passes.md "grid"). In: the density, and the 64-bit sums of what
-// needs as many blurs. Out: the blurred density; the last blur adds it to the grid's. Law: shares of
-// 1, 20, 54, 20 and 1 of 96, whose variance is 1/2 cell² and whose fourth cumulant is 0. The grid's
-// ends are mirrors, so that the mass is kept. Error: the roundings of terms that are not negative.
+// needs as many blurs. Out: the blurred density; the last blur adds it to the grid's. Law: shares
+// of 1, 20, 54, 20 and 1 of 96, whose variance is 1/2 cell² and whose fourth cumulant is 0. The
+// grid's ends are mirrors, so that the mass is kept. Error: the roundings of terms that are not
+// negative.
 
 layout(push_constant) uniform Push {
     uvec3 n_cells;

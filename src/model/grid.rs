@@ -20,8 +20,8 @@ pub const MAX_LEVELS: u32 = 6;
 /// blob pays for 900 cells, and levels pay if more than two blobs in nine are wide.
 pub const CELLS_PER_BLOB: u64 = 200;
 
-/// Least σ along every axis, in cells, of a blob that is deposited narrower than it is, and blurred.
-/// From there on, that changes its peak by less than the means over cells do.
+/// Least σ along every axis, in cells, of a blob that is deposited narrower than it is, and
+/// blurred. From there on, that changes its peak by less than the means over cells do.
 pub const NARROW_SIGMA: f64 = 1.125;
 
 /// Their σ are less than this, in cells.
@@ -39,8 +39,9 @@ pub const LAST_STEP: u32 = 18;
 /// Cell updates of such a blob: of 27 cells for each of two numbers of blurs.
 pub const NARROW_UPDATES: f64 = 54.0;
 
-/// Such a blob saves 400 updates and more, of 7 ns on llvmpipe. Blurs take 1 µs a cell at most. With
-/// three blobs a cell they pay if one in nine is such a one, and cost 0.3 µs a blob where none is.
+/// Such a blob saves 400 updates and more, of 7 ns on llvmpipe. Blurs take 1 µs a cell at most.
+/// With three blobs a cell they pay if one in nine is such a one, and cost 0.3 µs a blob where none
+/// is.
 const BLOBS_PER_CELL: u64 = 3;
 
 /// Most cells of a cube whose sums by number of blurs fit the storage buffer that any device can
@@ -133,8 +134,8 @@ impl GridSpec {
             && aspects.is_some_and(|aspects| aspects.into_iter().all(is_ball))
     }
 
-    /// Returns the greatest number of blurs that some of `n_blobs` need, of at most `widest` σ along
-    /// x, in f32, too; 0 if none is deposited narrower than it is ([`GridSpec::has_narrow`]).
+    /// Returns the greatest number of blurs that some of `n_blobs` need, of at most `widest` σ
+    /// along x, in f32, too; 0 if none is deposited narrower than it is ([`GridSpec::has_narrow`]).
     pub fn n_steps(&self, n_blobs: u64, widest: f64, aspects: Option<[f64; 2]>) -> u32 {
         let across = widest * (1.0 + 1e-5) / self.cell;
         if !self.has_narrow(n_blobs, aspects) || across < NARROW_SIGMA {
@@ -216,8 +217,8 @@ pub fn has_narrow(n_blobs: u64, side: u32) -> bool {
     n_blobs >= BLOBS_PER_CELL * n_cells && n_cells <= MAX_NARROW_CELLS
 }
 
-/// Returns how many blurs, each of a variance of ½, make the quadratic B-spline as wide as a blob of
-/// `sigma` in its cells: of variances σ² + 1/12 and ¼. Lengths are in cells.
+/// Returns how many blurs, each of a variance of ½, make the quadratic B-spline as wide as a blob
+/// of `sigma` in its cells: of variances σ² + 1/12 and ¼. Lengths are in cells.
 pub fn blurs(sigma: f64) -> f64 {
     2.0 * (sigma * sigma + 1.0 / 12.0 - 0.25)
 }

@@ -46,7 +46,8 @@ pub struct Group {
     pub gust_reach: f64,
 }
 
-/// Returns the least and the greatest aspect of all particles; `None` if some ellipsoids are turned.
+/// Returns the least and the greatest aspect of all particles; `None` if some ellipsoids are
+/// turned.
 pub fn aspects_of(groups: &[Group]) -> Option<[f64; 2]> {
     let filled = || groups.iter().filter(|g| g.n_particles > 0);
     let ends = filled().fold([f64::INFINITY, 0.0_f64], |[least, greatest], g| {

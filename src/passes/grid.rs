@@ -256,7 +256,7 @@ impl Grid {
         let Some(narrow) = narrow else { return Ok(()) };
         let Deposit { grid, n_particles, n_steps, .. } = *of;
         let push = NarrowPush { grid: *grid, n_particles, quanta_per_mass, n_steps };
-        narrow.record(rec, [placed, particles, density], finest, &push)
+        narrow.record(rec, [placed, particles, density], finest.density_per_quantum, &push)
     }
 
     /// Adds the particles' mass to the sums of the finest grid, or of all wider ones.

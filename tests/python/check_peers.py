@@ -38,17 +38,17 @@ def projected(place, focal):
     return np.array([place[0], place[1]]) * focal / (12.0 - place[2])
 
 
-def check_splat(peers, focal):
+def check_splat(peers, focal, law, blur):
     """Compares one ball off the axis with the derivative of the projection, by differences."""
     place, sigma, opacity = np.array([1.2, 0.5, -0.7]), 0.03, 0.2
     rows = np.array([[*place, sigma, opacity, 1, 0, 0]])
-    seen = peers.drawn_in_f64(np, rows, "splat")[:, :, 0]
+    seen = peers.drawn_in_f64(np, rows, law)[:, :, 0]
     step = 1e-5
     columns = [(projected(place + step * e, focal) - projected(place - step * e, focal))
                / (2 * step) for e in np.eye(3)]
     jacobian = np.stack(columns, axis=1)
     image = sigma**2 * jacobian @ jacobian.T
-    wide = image + 0.3 * np.eye(2)
+    wide = image + blur * np.eye(2)
     fade = math.sqrt(np.linalg.det(image) / np.linalg.det(wide))
     center = projected(place, focal)
     for i, j in [(468, 272), (470, 270)]:
@@ -56,7 +56,7 @@ def check_splat(peers, focal):
         by_hand = opacity * fade * math.exp(-0.5 * off @ np.linalg.inv(wide) @ off)
         if by_hand < 1e-3:
             sys.exit(f"the pixel ({i}, {j}) shows nothing of the ball")
-        expect(f"splat at ({i}, {j})", seen[j, i], by_hand, 1e-9)
+        expect(f"{law} at ({i}, {j})", seen[j, i], by_hand, 1e-9)
 
 
 def nimbus(*arguments):
@@ -116,7 +116,8 @@ def main():
         green = 1 - 0.8 ** math.exp(-0.5 * sine2 * (13 / 0.5) ** 2)
         expect(f"depth, red at {column}", seen[0], red, 1e-12)
         expect(f"depth, green at {column}", seen[1], green * (1 - red), 1e-12)
-    check_splat(peers, focal)
+    check_splat(peers, focal, "splat", 0.3)
+    check_splat(peers, focal, "projected", 0.0)
     few, many = peers.particles(np, 3, 0.1), peers.particles(np, 9, 0.1)
     if not (few == many[:3]).all() or many.dtype != np.dtype("<f4"):
         sys.exit("fewer particles are not the first of more")

@@ -1,6 +1,5 @@
 //! Blobs that are deposited narrower than they are, and blurred (passes.md "grid").
 
-use super::SpreadPush;
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
 use crate::layout::frame::{FIRST_STEP, GridRecord, LAST_STEP};
@@ -82,15 +81,17 @@ impl Narrow {
         Ok(())
     }
 
-    /// Adds the blobs to the density of the `finest` grid, by at most `push.n_steps` blurs.
+    /// Adds the blobs to the density of the finest grid, by at most `push.n_steps` blurs.
+    /// `density_per_quantum`: extinction per length of a quantum.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
         [placed, particles, density]: [&Buffer; 3],
-        finest: &SpreadPush,
+        density_per_quantum: f32,
         push: &NarrowPush,
     ) -> Result<()> {
-        let n_cells: u32 = finest.n_cells.iter().product();
+        let sides = push.grid.n_cells;
+        let n_cells: u32 = sides.iter().product();
         let Scratch { sums, blurred, other } = &self.scratch;
         rec.fill(sums, 0);
         rec.dispatch(&self.deposit, &[placed, particles, sums], push, push.n_particles)?;
@@ -100,13 +101,13 @@ impl Narrow {
                 let own = step.checked_sub(FIRST_STEP).filter(|_| axis == 0);
                 let is_last = step == 1 && axis == 2;
                 let push = BlurPush {
-                    n_cells: finest.n_cells,
+                    n_cells: sides,
                     axis,
                     i_first: own.unwrap_or(0) * n_cells,
                     has_sums: own.is_some().into(),
                     has_density: (step < push.n_steps || axis > 0).into(),
                     adds: is_last.into(),
-                    density_per_quantum: finest.density_per_quantum,
+                    density_per_quantum,
                 };
                 let target = if is_last { density } else { to };
                 rec.dispatch(&self.blur, &[sums, from, target], &push, n_cells)?;

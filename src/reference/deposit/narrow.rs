@@ -20,15 +20,16 @@ fn place(spec: &GridSpec, blob: &Blob) -> DVec3 {
 
 /// Returns the density that blobs give after all blurs.
 ///
-/// Error: mass is kept. A blob's density differs by at most 9e-2 of its peak from the direct deposit;
-/// from σ = 1.5 cells on by 2.2e-2, and from 1.75 on by 1.2e-2. Both have the same variance v, in
-/// cells². Two numbers of blurs with variances v₁ and v₂ share the mass. A peak is as v^(−3/2), so
-/// that the mean of both peaks is greater by (15/8)(v − v₁)(v₂ − v)/v²: at most 5.2e-2, where v is
-/// 1.5 and the product 1/16. In three cells the spline has a third cumulant of at most f/4 − f³ =
-/// 0.048. It changes the density by 1.38/6 of that over v^(3/2) of the peak, 6e-3 on each axis. Its
-/// fourth, 1/16 − 3f²/2 + 3f⁴, changes the peak by an eighth of it over v²: by at most 7e-3 on each
-/// axis where f is ½ and the third is 0, and 4e-3 where f is 0. A direct deposit ends at 3σ, where a
-/// hundredth of the peak is left. The means over cells lower the peak of the least σ by 9e-2.
+/// Error: mass is kept. A blob's density differs by at most 9e-2 of its peak from the direct
+/// deposit; from σ = 1.5 cells on by 2.2e-2, and from 1.75 on by 1.2e-2. Both have the same
+/// variance v, in cells². Two numbers of blurs with variances v₁ and v₂ share the mass. A peak is
+/// as v^(−3/2), so that the mean of both peaks is greater by (15/8)(v − v₁)(v₂ − v)/v²: at most
+/// 5.2e-2, where v is 1.5 and the product 1/16. In three cells the spline has a third cumulant of
+/// at most f/4 − f³ = 0.048. It changes the density by 1.38/6 of that over v^(3/2) of the peak,
+/// 6e-3 on each axis. Its fourth, 1/16 − 3f²/2 + 3f⁴, changes the peak by an eighth of it over v²:
+/// by at most 7e-3 on each axis where f is ½ and the third is 0, and 4e-3 where f is 0. A direct
+/// deposit ends at 3σ, where a hundredth of the peak is left. The means over cells lower the peak
+/// of the least σ by 9e-2.
 pub fn deposit_narrow(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
     let n = spec.n_cells;
     let n_cells = n.as_usizevec3().element_product();
@@ -72,8 +73,8 @@ pub(super) fn each_share(spec: &GridSpec, blob: &Blob, mut f: impl FnMut(usize, 
 }
 
 /// Returns cells after a blur along an axis: every cell keeps 54 of 96 shares and gives 20 and 1 to
-/// the first and second on each side, mirrored at the ends. The variance is (2·20 + 2·4)/96 = ½, and
-/// the fourth moment, (2·20 + 2·16)/96 = ¾, is that of a Gaussian.
+/// the first and second on each side, mirrored at the ends. The variance is (2·20 + 2·4)/96 = ½,
+/// and the fourth moment, (2·20 + 2·16)/96 = ¾, is that of a Gaussian.
 pub fn blurred(cells: &[f64], n: UVec3, axis: usize) -> Vec<f64> {
     let (n_along, n) = (i64::from(n[axis]), n.as_usizevec3());
     let stride = [1, n.x, n.x * n.y][axis];

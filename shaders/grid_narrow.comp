@@ -17,17 +17,17 @@ layout(push_constant) uniform Push {
     uint n_particles;
     float quanta_per_mass;
     // Greatest number of blurs.
-    uint n_steps;
+    uint n_blurs;
 } push;
 TEXELS(0, placed)
 TEXELS(1, particles)
-// Cell c after so many blurs from FIRST_STEP on: low word at 2c, high word at 2c + 1.
+// Cell c after so many blurs from FIRST_BLUR on: low word at 2c, high word at 2c + 1.
 UPDATES(2, uint, sums)
 
 // (2 pi)^(3/2)
 const float MASS_FACTOR = 15.7496099457224;
 // The least number of blurs that a blob needs.
-const uint FIRST_STEP = 2;
+const uint FIRST_BLUR = 2;
 
 void main() {
     FOR_EACH(p, push.n_particles) {
@@ -41,7 +41,7 @@ void main() {
             // blur adds 1/2.
             float across = blob.sigma * push.grid.inv_cell;
             float steps = 2.0 * across * across - 1.0 / 3.0;
-            uint step = min(uint(steps), push.n_steps - 1u);
+            uint step = min(uint(steps), push.n_blurs - 1u);
             float more = clamp(steps - float(step), 0.0, 1.0);
             uvec3 own = uvec3(at);
             vec3 f = at - vec3(own) - 0.5;
@@ -55,7 +55,7 @@ void main() {
                 uint x = k % 3u, y = k / 3u % 3u, z = k / 9u % 3u, is_more = k / 27u;
                 float share = weights[x].x * weights[y].y * weights[z].z;
                 share *= is_more == 1u ? more : 1.0 - more;
-                uint cell = (step + is_more - FIRST_STEP) * n_cells;
+                uint cell = (step + is_more - FIRST_BLUR) * n_cells;
                 cell += first + x + row * y + layer * z;
                 uint quanta = uint(quanta_of_blob * share + 0.5);
                 if (quanta > 0u) {

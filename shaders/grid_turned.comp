@@ -32,7 +32,7 @@ layout(push_constant) uniform Push {
     // Number of grids, and whether those of wider cells are written.
     uint n_levels;
     uint is_wide;
-    // Turned ones are not among those that grid_narrow.comp deposits.
+    // Not read: grid_narrow.comp runs only where no ellipsoid is turned.
     uint has_narrow;
 } push;
 TEXELS(0, placed)

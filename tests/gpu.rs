@@ -40,8 +40,8 @@ fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
             placed: &placed,
         };
         place.record(rec, &buffers, 64)?;
-        let (n_levels, n_steps) = (1, 0);
-        let of = grid::Deposit { grid: &record, n_particles: 64, heaviest: 1.0, n_levels, n_steps };
+        let (n_levels, n_blurs) = (1, 0);
+        let of = grid::Deposit { grid: &record, n_particles: 64, heaviest: 1.0, n_levels, n_blurs };
         grid.record(rec, [&placed, &particles, &density], &of)
     });
     recorded.unwrap();

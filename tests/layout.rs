@@ -23,7 +23,7 @@ use nimbus::layout::particle::{
 use nimbus::layout::second::{PackedRecord, SourceRecord};
 use nimbus::layout::tiles::{SplatRecord, SplatTextureRecord};
 use nimbus::model::grid::{
-    DEPOSIT_CUT_SIGMA, FIRST_STEP, LEVEL_SIGMA, MAX_CELLS, NARROW_BELOW, NARROW_SIGMA,
+    DEPOSIT_CUT_SIGMA, FIRST_BLUR, LEVEL_SIGMA, MAX_CELLS, NARROW_BELOW, NARROW_SIGMA,
 };
 use nimbus::model::lod;
 use nimbus::passes::{self, SHADERS, cull, generate, sort, texture, tiles, transmit};
@@ -332,7 +332,7 @@ fn shared_constants_have_one_value() {
         ("grid_deposit.comp", "LEVEL_SIGMA", LEVEL_SIGMA),
         ("include/grid_narrow.glsl", "NARROW_SIGMA", NARROW_SIGMA),
         ("include/grid_narrow.glsl", "NARROW_BELOW", NARROW_BELOW),
-        ("grid_narrow.comp", "FIRST_STEP", f64::from(FIRST_STEP)),
+        ("grid_narrow.comp", "FIRST_BLUR", f64::from(FIRST_BLUR)),
         ("grid_turned.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
         ("grid_turned.comp", "LEVEL_SIGMA", LEVEL_SIGMA),
         ("include/shell.glsl", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),

@@ -189,7 +189,7 @@ impl Game {
             heaviest,
             sigma_max,
             n_levels: setting.grid.n_used_levels(self.scene.n_particles(), sigma_max),
-            n_steps: setting.grid.n_steps(self.scene.n_particles(), across_max, aspects_of(&grown)),
+            n_blurs: setting.grid.n_blurs(self.scene.n_particles(), across_max, aspects_of(&grown)),
             radius: setting.radius,
             sort_bits: self.sort_bits(&grown, setting.radius),
             slice: slice_length(self.scene.draw.slice, &grown, setting.radius),

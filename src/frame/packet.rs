@@ -63,10 +63,10 @@ pub struct Packet {
     ///
     /// [`GridSpec::n_levels`]: crate::model::grid::GridSpec::n_levels
     pub n_levels: u32,
-    /// Most blurs that a blob needs ([`GridSpec::n_steps`]).
+    /// Most blurs that a blob needs ([`GridSpec::n_blurs`]).
     ///
-    /// [`GridSpec::n_steps`]: crate::model::grid::GridSpec::n_steps
-    pub n_steps: u32,
+    /// [`GridSpec::n_blurs`]: crate::model::grid::GridSpec::n_blurs
+    pub n_blurs: u32,
     /// Bound of |view depth| relative to the lighting origin.
     pub radius: f64,
     /// Bits of a sort key: 16 or 32.

@@ -116,9 +116,9 @@ impl FramePasses {
             merging.try_for_each(|m| m.record(rec, &self.buffers, n, packet.sigma_max))
         })?;
         pass(rec, plan, Pass::Grid, |rec| {
-            let Packet { grid: of, heaviest, n_levels, n_steps, .. } = packet;
-            let (heaviest, n_levels, n_steps) = (*heaviest, *n_levels, *n_steps);
-            let deposit = Deposit { grid: of, n_particles: n, heaviest, n_levels, n_steps };
+            let Packet { grid: of, heaviest, n_levels, n_blurs, .. } = packet;
+            let (heaviest, n_levels, n_blurs) = (*heaviest, *n_levels, *n_blurs);
+            let deposit = Deposit { grid: of, n_particles: n, heaviest, n_levels, n_blurs };
             grid.record(rec, [placed, particles, density], &deposit)
         })
     }

@@ -118,7 +118,7 @@ fn watch(
                 break;
             }
             told.push(Shown { begun: newest.begun, seen: None });
-            // It may have become visible since: no picture is told to be seen too early.
+            // The newer picture may have become visible after the older one was reported.
             (seen, newest) = (Instant::now(), newer);
         }
         told.push(Shown { begun: newest.begun, seen: Some(seen) });
@@ -166,9 +166,9 @@ mod tests {
         assert_eq!((seen, asked), (vec![false, false, true, true], vec![1, 2, 3, 4, 4]));
     }
 
-    /// The second becomes visible while the first is told.
+    /// The second picture becomes visible while the first one is reported.
     #[test]
-    fn no_picture_is_told_to_be_seen_before_it_is_visible() {
+    fn no_picture_is_reported_before_it_is_visible() {
         let (send, presented) = sync_channel(MOST);
         let (report, shown) = sync_channel(MOST);
         let begun = Instant::now();

@@ -8,7 +8,7 @@ use sha2::{Digest, Sha256};
 use super::particle_digest;
 use crate::model::particle_list::ParticleList;
 
-/// What a scene draws of a file that it names.
+/// The content of a file, as far as a scene draws it.
 #[derive(Debug, Clone)]
 pub enum Content {
     /// SHA-256 of it.
@@ -23,7 +23,7 @@ impl From<[u8; 32]> for Content {
     }
 }
 
-/// The hash of a scene, and all that it is made of.
+/// The hash of a scene, and the data that it is made of.
 #[derive(Debug, Clone)]
 pub struct SceneHash {
     /// The resolved scene, and those of its phases.

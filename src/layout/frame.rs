@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::layout::record;
 use crate::model::camera::{Camera, Pose};
 use crate::model::film::Film;
-pub use crate::model::grid::{FIRST_STEP, LAST_STEP};
+pub use crate::model::grid::{FIRST_BLUR, LAST_BLUR};
 use crate::model::grid::{GridSpec, cells_before};
 use crate::model::light::{Light, MIN_PENUMBRA, UP};
 

@@ -24,29 +24,28 @@ pub const CELLS_PER_BLOB: u64 = 200;
 /// blurred. From there on, that changes its peak by less than the means over cells do.
 pub const NARROW_SIGMA: f64 = 1.125;
 
-/// Their σ are less than this, in cells.
+/// Such blobs have σ below this, in cells.
 pub const NARROW_BELOW: f64 = 3.0;
 
 /// Blobs are balls in cells up to this share of σ.
 pub const NARROW_ASPECT: f64 = 1e-3;
 
-/// The least number of blurs that such a blob needs; see [`blurs`].
-pub const FIRST_STEP: u32 = 2;
+/// Least number of blurs that such a blob needs; see [`blurs`].
+pub const FIRST_BLUR: u32 = 2;
 
-/// The greatest number.
-pub const LAST_STEP: u32 = 18;
+/// Greatest number of blurs that such a blob needs.
+pub const LAST_BLUR: u32 = 18;
 
 /// Cell updates of such a blob: of 27 cells for each of two numbers of blurs.
 pub const NARROW_UPDATES: f64 = 54.0;
 
-/// Such a blob saves 400 updates and more, of 7 ns on llvmpipe. Blurs take 1 µs a cell at most.
-/// With three blobs a cell they pay if one in nine is such a one, and cost 0.3 µs a blob where none
-/// is.
+/// Such a blob saves 400 updates and more, of 7 ns on llvmpipe. Blurs take 0.3 µs a cell at most.
+/// With three blobs a cell they pay if one in 28 is such a one.
 const BLOBS_PER_CELL: u64 = 3;
 
 /// Most cells of a cube whose sums by number of blurs fit the storage buffer that any device can
 /// bind, 2²⁷ bytes.
-const MAX_NARROW_CELLS: u64 = (1 << 27) / (8 * (LAST_STEP - FIRST_STEP + 1) as u64);
+const MAX_NARROW_CELLS: u64 = (1 << 27) / (8 * (LAST_BLUR - FIRST_BLUR + 1) as u64);
 
 /// Margin around the bounds, cells: trilinear sampling at the bounds never leaves the grid.
 pub const MARGIN_CELLS: u32 = 2;
@@ -136,7 +135,7 @@ impl GridSpec {
 
     /// Returns the greatest number of blurs that some of `n_blobs` need, of at most `widest` σ
     /// along x, in f32, too; 0 if none is deposited narrower than it is ([`GridSpec::has_narrow`]).
-    pub fn n_steps(&self, n_blobs: u64, widest: f64, aspects: Option<[f64; 2]>) -> u32 {
+    pub fn n_blurs(&self, n_blobs: u64, widest: f64, aspects: Option<[f64; 2]>) -> u32 {
         let across = widest * (1.0 + 1e-5) / self.cell;
         if !self.has_narrow(n_blobs, aspects) || across < NARROW_SIGMA {
             return 0;
@@ -350,17 +349,17 @@ mod tests {
     fn blurs_by_hand() {
         // 2 · (1.265625 - 1/6), and 2 · (9 - 1/6).
         assert!((blurs(NARROW_SIGMA) - (2.53125 - 1.0 / 3.0)).abs() < 1e-14);
-        assert_eq!(blurs(NARROW_SIGMA) as u32, FIRST_STEP);
-        assert_eq!(blurs(NARROW_BELOW) as u32 + 1, LAST_STEP);
+        assert_eq!(blurs(NARROW_SIGMA) as u32, FIRST_BLUR);
+        assert_eq!(blurs(NARROW_BELOW) as u32 + 1, LAST_BLUR);
         // 99³ · 136 bytes are 131,960,664, and 2²⁷ are 134,217,728.
         assert!(has_narrow(3 * 99 * 99 * 99, 99) && !has_narrow(u64::MAX, 100));
         assert!(!has_narrow(2999, 10) && has_narrow(3000, 10));
         let grid =
             GridSpec { n_cells: UVec3::new(10, 5, 5), cell: 0.5, aspect: 1.0, low: DVec3::ZERO };
-        let of = |sigma: f64| grid.n_steps(3000, sigma, Some([1.0; 2]));
+        let of = |sigma: f64| grid.n_blurs(3000, sigma, Some([1.0; 2]));
         assert_eq!([of(0.56), of(0.5625), of(1.0), of(1.5), of(9.0)], [0, 3, 8, 18, 18]);
-        assert_eq!(grid.n_steps(2999, 1.0, Some([1.0; 2])), 0);
-        let with = |aspects| grid.n_steps(3000, 1.0, aspects);
+        assert_eq!(grid.n_blurs(2999, 1.0, Some([1.0; 2])), 0);
+        let with = |aspects| grid.n_blurs(3000, 1.0, aspects);
         assert_eq!([Some([0.9995, 1.0005]), Some([0.99, 1.0]), None].map(with), [8, 0, 0]);
     }
 

@@ -11,7 +11,7 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
-use crate::layout::frame::{FIRST_STEP, GridRecord, LAST_STEP};
+use crate::layout::frame::{FIRST_BLUR, GridRecord, LAST_BLUR};
 use crate::layout::particle::Shapes;
 use crate::layout::record;
 
@@ -121,7 +121,7 @@ pub struct Deposit<'a> {
     /// Number of grids that particles may be deposited on, each with cells twice as wide.
     pub n_levels: u32,
     /// Greatest number of blurs; 0: no blob is deposited narrower than it is.
-    pub n_steps: u32,
+    pub n_blurs: u32,
 }
 
 /// The pipelines and scratch buffers of the pass.
@@ -219,12 +219,12 @@ impl Grid {
         let quanta_per_mass =
             if of.heaviest > 0.0 { QUANTA_OF_HEAVIEST / of.heaviest } else { 0.0 };
         let quanta_per_mass = quanta_per_mass as f32;
-        let narrow = self.narrow.as_ref().filter(|_| of.n_steps > 0);
-        let has_room = narrow.is_some() && (FIRST_STEP + 1..=LAST_STEP).contains(&of.n_steps);
-        if of.n_steps > 0 && !has_room {
+        let narrow = self.narrow.as_ref().filter(|_| of.n_blurs > 0);
+        let has_room = narrow.is_some() && (FIRST_BLUR + 1..=LAST_BLUR).contains(&of.n_blurs);
+        if of.n_blurs > 0 && !has_room {
             return Err(Error::limit(format!(
                 "a density grid with {} blurs, where there is no room for them",
-                of.n_steps
+                of.n_blurs
             )));
         }
         let push = DepositPush {
@@ -254,8 +254,8 @@ impl Grid {
             }
         }
         let Some(narrow) = narrow else { return Ok(()) };
-        let Deposit { grid, n_particles, n_steps, .. } = *of;
-        let push = NarrowPush { grid: *grid, n_particles, quanta_per_mass, n_steps };
+        let Deposit { grid, n_particles, n_blurs, .. } = *of;
+        let push = NarrowPush { grid: *grid, n_particles, quanta_per_mass, n_blurs };
         narrow.record(rec, [placed, particles, density], finest.density_per_quantum, &push)
     }
 

@@ -172,7 +172,7 @@ impl Scene {
         gpu.run(|rec| {
             let grid_of = &self.record;
             let n_particles = n as u32;
-            let deposit = Deposit { grid: grid_of, n_particles, heaviest, n_levels: 1, n_steps: 0 };
+            let deposit = Deposit { grid: grid_of, n_particles, heaviest, n_levels: 1, n_blurs: 0 };
             grid.record(rec, [&placed, &particles, &density], &deposit)?;
             let buffers = ParticleBuffers {
                 placed: &placed,

@@ -83,14 +83,14 @@ impl Scene {
     }
 
     fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> Vec<f64> {
-        let (has_levels, has_narrow) = (self.n_levels() > 1, self.n_steps() > 0);
+        let (has_levels, has_narrow) = (self.n_levels() > 1, self.n_blurs() > 0);
         let room = Room { n_cells: self.spec.n_total(), has_levels, has_narrow };
         self.run_on(gpu, &Grid::new(&gpu.device, compiler, room, self.shapes()).unwrap())
     }
 
     fn run_on(&self, gpu: &mut Gpu, pass: &Grid) -> Vec<f64> {
         let n_cells = self.spec.n_total() as usize;
-        let (n_levels, n_steps) = (self.n_levels(), self.n_steps());
+        let (n_levels, n_blurs) = (self.n_levels(), self.n_blurs());
         let placed = |b: &Blob| PlacedRecord {
             position: b.position.as_vec3().to_array(),
             sigma: b.sigma as f32,
@@ -107,13 +107,13 @@ impl Scene {
         let density = gpu.buffer::<f32>(n_cells);
         let n = self.blobs.len() as u32;
         gpu.run(|rec| {
-            pass.record(rec, [&placed, &particles, &density], &self.deposit(n, n_levels, n_steps))
+            pass.record(rec, [&placed, &particles, &density], &self.deposit(n, n_levels, n_blurs))
         });
         gpu.download::<f32>(&density, n_cells).into_iter().map(f64::from).collect()
     }
 
-    fn deposit(&self, n_particles: u32, n_levels: u32, n_steps: u32) -> Deposit<'_> {
-        Deposit { grid: &self.record, n_particles, heaviest: self.heaviest, n_levels, n_steps }
+    fn deposit(&self, n_particles: u32, n_levels: u32, n_blurs: u32) -> Deposit<'_> {
+        Deposit { grid: &self.record, n_particles, heaviest: self.heaviest, n_levels, n_blurs }
     }
 
     /// The grids that a blob of the scene is deposited on.
@@ -123,17 +123,17 @@ impl Scene {
     }
 
     /// The most blurs that a blob needs.
-    fn n_steps(&self) -> u32 {
+    fn n_blurs(&self) -> u32 {
         let widest = self.blobs.iter().map(|b| b.sigma).fold(0.0, f64::max);
         let aspects = || self.blobs.iter().map(|b| b.shape.aspect);
         let ends = [aspects().fold(f64::INFINITY, f64::min), aspects().fold(0.0, f64::max)];
         let ends = (self.shapes() < Shapes::Turned).then_some(ends);
-        self.spec.n_steps(self.blobs.len() as u64, widest, ends)
+        self.spec.n_blurs(self.blobs.len() as u64, widest, ends)
     }
 
     /// The blobs that are deposited narrower than they are, and the others.
     fn parts(&self) -> [Vec<Blob>; 2] {
-        let is_narrow = |b: &Blob| self.n_steps() > 0 && is_narrowed(&self.spec, b);
+        let is_narrow = |b: &Blob| self.n_blurs() > 0 && is_narrowed(&self.spec, b);
         let (narrowed, others) = self.blobs.iter().partition(|b| is_narrow(b));
         [narrowed, others]
     }
@@ -143,7 +143,7 @@ impl Scene {
         let [narrowed, others] = self.parts();
         let mut bounds = self.bounds_of_levels(&others);
         if !narrowed.is_empty() {
-            let own = of_narrowed::bounds(&self.spec, self.heaviest, self.n_steps(), &narrowed);
+            let own = of_narrowed::bounds(&self.spec, self.heaviest, self.n_blurs(), &narrowed);
             bounds.iter_mut().zip(own).for_each(|(bound, own)| *bound += own);
             // The last blur adds to what is there.
             let sums = deposit(&self.spec, &self.blobs);
@@ -453,12 +453,12 @@ fn a_wrong_grid_of_wide_cells_is_noticed() {
 fn a_wrong_blur_is_noticed() {
     let scene = Scene::fitted(&medium(42_000, 1.0), 24).decided();
     let [narrowed, others] = scene.parts();
-    assert!(narrowed.len() > 5_000 && others.len() > 1_000 && scene.n_steps() == 17);
+    assert!(narrowed.len() > 5_000 && others.len() > 1_000 && scene.n_blurs() == 17);
     assert_eq!(scene.spec.n_cells, UVec3::new(24, 22, 24));
     let mutations = [
         ("grid_narrow.comp", "0.75 - f * f", "0.76 - f * f"),
         ("grid_narrow.comp", "- 1.0 / 3.0", "- 0.33"),
-        ("grid_narrow.comp", "(step + is_more - FIRST_STEP)", "(step - FIRST_STEP)"),
+        ("grid_narrow.comp", "(step + is_more - FIRST_BLUR)", "(step - FIRST_BLUR)"),
         ("grid_narrow.comp", "first + x + row * y", "first + y + row * x"),
         ("grid_narrow.comp", "at - vec3(own) - 0.5", "at - vec3(own) - 0.49"),
         ("grid_narrow.comp", "15.7496099457224", "15.76"),
@@ -484,7 +484,7 @@ fn frames_with_and_without_blurs_follow_each_other() {
     let few = Scene::fitted(&medium(3_000, 1.0), 24);
     let thin: Vec<Blob> = many.blobs.iter().filter(|b| b.sigma < 1.7).copied().collect();
     let thin = Scene::new(&GridSpec { n_cells: UVec3::splat(18), ..many.spec }, &thin);
-    assert_eq!([&many, &few, &thin].map(Scene::n_steps), [17, 0, 5]);
+    assert_eq!([&many, &few, &thin].map(Scene::n_blurs), [17, 0, 5]);
     let alone = [&many, &few, &thin].map(|scene| scene.run(&mut gpu, &compiler()));
     let room = Room { n_cells: 20_000, has_levels: true, has_narrow: true };
     let mut pass = Grid::new(&gpu.device, &compiler(), room, Shapes::Balls).unwrap();

@@ -47,7 +47,7 @@ fn packet(x: f64, z: f64) -> Packet {
         heaviest: 1.0,
         sigma_max: 1.0,
         n_levels: 1,
-        n_steps: 0,
+        n_blurs: 0,
         radius: 12.0,
         sort_bits: 32,
         slice: 1.0,

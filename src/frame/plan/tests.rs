@@ -76,7 +76,7 @@ fn packet() -> Packet {
         heaviest: 1.0,
         sigma_max: 1.0,
         n_levels: 1,
-        n_steps: 0,
+        n_blurs: 0,
         radius: 1.0,
         sort_bits: 32,
         slice: 1.0,

@@ -255,7 +255,7 @@ fn deposits(scene: &Scene, packet: &Packet) -> f64 {
         let least = if group.turned_max > 0.0 { group.aspects[0].min(1.0) } else { 1.0 };
         let across = reached(least * f64::from(record.sigma_mean), cell);
         let along = reached(least * extent.sigma_mean, cell * f64::from(packet.grid.aspect));
-        let cells = if packet.n_steps > 0 { 1.0 } else { across * across * along };
+        let cells = if packet.n_blurs > 0 { 1.0 } else { across * across * along };
         f64::from(group.n_particles) * cells
     };
     groups.iter().zip(&packet.groups).zip(&packet.extents).map(of).sum()

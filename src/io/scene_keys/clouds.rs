@@ -50,7 +50,7 @@ pub struct Surroundings<'a> {
 /// Results of reading clouds beside the clouds.
 #[derive(Default)]
 pub struct Found {
-    /// What is drawn of every file, in order.
+    /// The drawn content of every file, in order.
     pub contents: Vec<Content>,
     /// Notes about the files for the user.
     pub notes: Vec<String>,

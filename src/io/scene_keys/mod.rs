@@ -172,7 +172,7 @@ pub(super) struct Read {
     pub scene: Scene,
     /// Every value the scene came to.
     pub resolved: serde_json::Value,
-    /// What is drawn of every file that the scene names, in order.
+    /// The drawn content of every file that the scene names, in order.
     pub contents: Vec<Content>,
     pub warnings: Vec<String>,
 }

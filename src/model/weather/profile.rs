@@ -13,8 +13,8 @@ impl Profile {
     pub const EVEN: Profile = Profile { ends: [1.0; 2] };
 
     /// Returns the profile of a cell of extinction `own` between two others; `None`: there is no
-    /// cell. Both cells of a face have the same extinction there: the mean, but at most twice the
-    /// smaller one, so that it is 0 beside a clear cell, and never less than 0 within.
+    /// cell. Both cells of a face have the same extinction there: their mean, but at most twice the
+    /// smaller one. So the extinction is 0 beside a clear cell, and nowhere below 0.
     pub fn between(before: Option<f64>, own: f64, after: Option<f64>) -> Profile {
         let end = |other: Option<f64>| other.map_or(1.0, |other| shared(own, &[own, other], 2.0));
         Profile { ends: [end(before), end(after)] }

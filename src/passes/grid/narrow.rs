@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferSpec, Compiler, Device, Kernel, Recorder, buffers};
-use crate::layout::frame::{FIRST_STEP, GridRecord, LAST_STEP};
+use crate::layout::frame::{FIRST_BLUR, GridRecord, LAST_BLUR};
 use crate::layout::record;
 
 record! {
@@ -15,7 +15,7 @@ record! {
         /// Quanta of a unit of mass.
         quanta_per_mass: f32,
         /// Greatest number of blurs.
-        n_steps: u32,
+        n_blurs: u32,
     }
 }
 
@@ -40,7 +40,7 @@ record! {
 }
 
 /// Numbers of blurs that have sums of their own.
-const N_SUMS: u64 = (LAST_STEP - FIRST_STEP + 1) as u64;
+const N_SUMS: u64 = (LAST_BLUR - FIRST_BLUR + 1) as u64;
 
 buffers! {
     /// Scratch for a number of cells.
@@ -81,7 +81,7 @@ impl Narrow {
         Ok(())
     }
 
-    /// Adds the blobs to the density of the finest grid, by at most `push.n_steps` blurs.
+    /// Adds the blobs to the density of the finest grid, by at most `push.n_blurs` blurs.
     /// `density_per_quantum`: extinction per length of a quantum.
     pub fn record(
         &self,
@@ -96,16 +96,16 @@ impl Narrow {
         rec.fill(sums, 0);
         rec.dispatch(&self.deposit, &[placed, particles, sums], push, push.n_particles)?;
         let (mut from, mut to) = (blurred, other);
-        for step in (1..=push.n_steps).rev() {
+        for step in (1..=push.n_blurs).rev() {
             for axis in 0..3 {
-                let own = step.checked_sub(FIRST_STEP).filter(|_| axis == 0);
+                let own = step.checked_sub(FIRST_BLUR).filter(|_| axis == 0);
                 let is_last = step == 1 && axis == 2;
                 let push = BlurPush {
                     n_cells: sides,
                     axis,
                     i_first: own.unwrap_or(0) * n_cells,
                     has_sums: own.is_some().into(),
-                    has_density: (step < push.n_steps || axis > 0).into(),
+                    has_density: (step < push.n_blurs || axis > 0).into(),
                     adds: is_last.into(),
                     density_per_quantum,
                 };

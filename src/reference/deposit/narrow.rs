@@ -2,10 +2,10 @@
 
 use glam::{DVec3, UVec3};
 
-use crate::model::grid::{FIRST_STEP, GridSpec, LAST_STEP, NARROW_BELOW, NARROW_SIGMA, blurs};
+use crate::model::grid::{GridSpec, LAST_BLUR, NARROW_BELOW, NARROW_SIGMA, blurs};
 use crate::reference::Blob;
 
-/// Returns whether a blob is such a one, if the grid has any. It needs a cell on each side.
+/// Returns whether a blob is narrow enough and wide enough for that, with a cell on each side.
 pub fn is_narrowed(spec: &GridSpec, blob: &Blob) -> bool {
     let at = place(spec, blob);
     (NARROW_SIGMA..NARROW_BELOW).contains(&(blob.sigma / spec.cell))
@@ -33,7 +33,7 @@ fn place(spec: &GridSpec, blob: &Blob) -> DVec3 {
 pub fn deposit_narrow(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
     let n = spec.n_cells;
     let n_cells = n.as_usizevec3().element_product();
-    let mut by_step = vec![Vec::new(); LAST_STEP as usize + 1];
+    let mut by_step = vec![Vec::new(); LAST_BLUR as usize + 1];
     for blob in blobs {
         let density = blob.mass() / spec.cell_volume();
         let steps = blurs(blob.sigma / spec.cell);
@@ -46,7 +46,6 @@ pub fn deposit_narrow(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
     }
     let mut cells = vec![0.0; n_cells];
     for step in (1..by_step.len()).rev() {
-        assert!(step >= FIRST_STEP as usize || by_step[step].is_empty(), "a narrower blob");
         cells.iter_mut().zip(&by_step[step]).for_each(|(cell, own)| *cell += own);
         cells = (0..3).fold(cells, |cells, axis| blurred(&cells, n, axis));
     }
@@ -72,7 +71,7 @@ pub(super) fn each_share(spec: &GridSpec, blob: &Blob, mut f: impl FnMut(usize, 
     }
 }
 
-/// Returns cells after a blur along an axis: every cell keeps 54 of 96 shares and gives 20 and 1 to
+/// Returns cells after a blur along an axis. Every cell keeps 54 of 96 shares and gives 20 and 1 to
 /// the first and second on each side, mirrored at the ends. The variance is (2·20 + 2·4)/96 = ½,
 /// and the fourth moment, (2·20 + 2·16)/96 = ¾, is that of a Gaussian.
 pub fn blurred(cells: &[f64], n: UVec3, axis: usize) -> Vec<f64> {

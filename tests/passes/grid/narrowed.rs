@@ -2,17 +2,17 @@
 
 use glam::DVec3;
 
-use nimbus::model::grid::{FIRST_STEP, GridSpec, NARROW_BELOW, NARROW_SIGMA, blurs};
+use nimbus::model::grid::{FIRST_BLUR, GridSpec, NARROW_BELOW, NARROW_SIGMA, blurs};
 use nimbus::reference::Blob;
 use nimbus::reference::deposit::blurred;
 use nimbus::reference::rounding::U_F32;
 
 const U: f64 = U_F32;
 
-/// Roundings of a deposit that are relative: the mass 7 (6 products, a constant), quanta a mass 2,
-/// the product with the share 1, the share's three 3, 1 less `more` 1, adding ½ before the cut to
-/// whole quanta 1; and of the sum: two words to f32, their sum, the density of a quantum (one more
-/// for the cells' shape) and its product 6.
+/// Relative roundings. The mass has 7 (6 products, a constant), the quanta of a mass 2, their
+/// product with the share 1, the share 4 (three products, and 1 less `more`), and ½ added before
+/// the cut to whole quanta 1. The sum has 6: two words to f32, their sum, the density of a quantum
+/// (one more for the cells' shape), and the product.
 const ROUNDINGS: f64 = 21.0;
 
 /// Roundings of a blur: of a neighbour's product, the two neighbours' sum and three sums 5, of 1/96
@@ -26,12 +26,12 @@ pub fn is_decided(spec: &GridSpec, blob: &Blob) -> bool {
 }
 
 /// Returns the bound of every cell's density.
-pub fn bounds(spec: &GridSpec, heaviest: f64, n_steps: u32, blobs: &[Blob]) -> Vec<f64> {
+pub fn bounds(spec: &GridSpec, heaviest: f64, n_blurs: u32, blobs: &[Blob]) -> Vec<f64> {
     let (n, volume) = (spec.n_cells, spec.cell_volume());
     let n_cells = spec.n_total() as usize;
     let quantum = heaviest / 2f64.powi(31) / volume;
     // By number of blurs: the density that is deposited, and its bound.
-    let mut by_step = vec![[vec![0.0; n_cells], vec![0.0; n_cells]]; n_steps as usize + 2];
+    let mut by_step = vec![[vec![0.0; n_cells], vec![0.0; n_cells]]; n_blurs as usize + 2];
     for blob in blobs {
         let density = blob.mass() / volume;
         let at = (blob.position - spec.low) / spec.edges();
@@ -76,7 +76,7 @@ pub fn bounds(spec: &GridSpec, heaviest: f64, n_steps: u32, blobs: &[Blob]) -> V
     }
     let (mut values, mut bounds) = (vec![0.0; n_cells], vec![0.0; n_cells]);
     for (step, [own, own_bounds]) in by_step.iter().enumerate().skip(1).rev() {
-        assert!(step + 1 >= FIRST_STEP as usize || own.iter().all(|v| *v == 0.0));
+        assert!(step + 1 >= FIRST_BLUR as usize || own.iter().all(|v| *v == 0.0));
         for i in 0..n_cells {
             values[i] += own[i];
             bounds[i] += own_bounds[i];

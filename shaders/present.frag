@@ -6,10 +6,14 @@
 // In: one or two pictures, premultiplied linear RGBA. Out: code values of 8 bits. Error: half a
 // code value, by dithering.
 
-#include "buffers.glsl"
+#include "records.glsl"
+#include "camera.glsl"
+#include "clear_sky.glsl"
 
 // 0: bytes, 1: half floats, 2: floats.
 layout(constant_id = 0) const uint FORMAT = 1;
+// 1: the sky is behind the picture, in place of the background.
+layout(constant_id = 1) const uint HAS_SKY = 0;
 
 layout(push_constant) uniform Push {
     vec3 background;
@@ -24,10 +28,13 @@ layout(push_constant) uniform Push {
 // Four words a texel, which devices read best.
 TEXELS(0, picture_a)
 TEXELS(1, picture_b)
+READS(2, Sky, skies)
 
 layout(location = 0) out vec4 out_color;
 
+// Tone maps.
 const uint NEUTRAL = 0;
+const uint FILMIC = 2;
 
 // Ways of comparing.
 const uint SPLIT = 1;
@@ -71,10 +78,36 @@ vec3 neutral(vec3 color) {
 // Returns how far two pixels over the background are apart, times the gain. Differences are formed
 // first, so that small ones keep their digits. NaN gives 1, so that it is not taken for no
 // difference.
-vec3 apart(vec4 a, vec4 b) {
+vec3 apart(vec4 a, vec4 b, vec3 behind) {
     vec4 d = a - b;
-    vec3 far = push.gain * (push.exposure * abs(d.rgb - d.a * push.background));
+    vec3 far = push.gain * (push.exposure * abs(d.rgb - d.a * behind));
     return mix(vec3(1.0), far, greaterThanEqual(far, vec3(0.0)));
+}
+
+// Narkowicz's fit of the filmic curve; NaN is black.
+float filmic(float x) {
+    x = x > 0.0 ? min(x, 1e6) : 0.0;
+    return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
+}
+
+vec3 toned(vec3 linear) {
+    if (push.tone_map == FILMIC) {
+        return vec3(filmic(linear.r), filmic(linear.g), filmic(linear.b));
+    }
+    return push.tone_map == NEUTRAL ? neutral(linear) : linear;
+}
+
+// Returns the radiance behind a place in the picture.
+vec3 behind_pixel(uvec2 p) {
+    if (HAS_SKY == 0) {
+        return push.background;
+    }
+    Camera camera = skies[0].camera;
+    vec2 pixel = 2.0 * vec2(camera.tan_x, camera.tan_y) / vec2(push.size);
+    vec3 ray = ray_through(camera, vec2(p) + 0.5, pixel);
+    return sky_behind(
+        skies[0], normalize(ray.x * camera.right + ray.y * camera.up + camera.forward)
+    );
 }
 
 // IEC 61966-2-1; NaN is black.
@@ -104,12 +137,11 @@ void main() {
     }
     bool shows_b = push.compare == SECOND || (push.compare == SPLIT && at.x > push.split);
     vec4 pixel = pixel_at(shows_b, uvec2(at));
-    vec3 shown;
+    vec3 behind = behind_pixel(uvec2(at)), shown;
     if (push.compare == DIFFERENCE) {
-        shown = apart(pixel, pixel_at(true, uvec2(at)));
+        shown = apart(pixel, pixel_at(true, uvec2(at)), behind);
     } else {
-        vec3 linear = push.exposure * (pixel.rgb + (1.0 - pixel.a) * push.background);
-        shown = push.tone_map == NEUTRAL ? neutral(linear) : linear;
+        shown = toned(push.exposure * (pixel.rgb + (1.0 - pixel.a) * behind));
     }
     vec3 code = floor(
         255.0 * vec3(encoded(shown.r), encoded(shown.g), encoded(shown.b)) + dither(uvec2(at))

@@ -232,6 +232,39 @@ struct Camera {
     vec3 forward;
     float unused;
 };
+struct Sky {
+    Camera camera;
+    vec3 a;
+    float height;
+    vec3 b;
+    float unit;
+    vec3 c;
+    float flatness;
+    vec3 d;
+    float haze;
+    vec3 e;
+    uint has_ground;
+    vec3 f;
+    float inv_molecules;
+    vec3 g;
+    float inv_aerosol;
+    vec3 h;
+    float inv_sun;
+    vec3 i;
+    float unused;
+    vec3 scale;
+    float unused_a;
+    vec3 toward_sun;
+    float unused_b;
+    vec3 disc;
+    float unused_c;
+    vec3 molecules;
+    float unused_d;
+    vec3 aerosol;
+    float unused_e;
+    vec3 ground;
+    float unused_f;
+};
 
 // In place of a particle's number: an entry that draws nothing.
 const uint NO_PARTICLE = 0xFFFFFFFFu;

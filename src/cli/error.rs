@@ -19,6 +19,7 @@ use crate::io::console::say;
 use crate::io::image;
 use crate::io::result_folder::Existing;
 use crate::measure::picture::map::error_map;
+use crate::model::backdrop::Backdrop;
 use crate::model::film::Film;
 use crate::model::scene::Scene;
 use crate::reference::picture::{PathLimits, Pixels, ReferenceRequest};
@@ -50,7 +51,7 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     }
     let StudyScene { options, loaded, scene, time_s } =
         load_study(&args.scene, &args.options, args.plain, args.frame)?;
-    let film = scene.film;
+    let backdrop = Backdrop::of(&scene, time_s);
     if (args.reference_error.is_some() || args.paths.is_some()) && !args.against.is_random() {
         return Err(Error::usage(format!(
             "--reference-error and --paths: only \"transport\" is random; expected neither with \
@@ -114,7 +115,7 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
     update(args, &mut study, &results);
     if let Some(folder) = &mut *lock_folder(&folder) {
         folder.add(REFERENCE_FILE, |path| {
-            write_reference(path, &film, &pixels, &cached.reference.rgba)
+            write_reference(path, &backdrop, &pixels, &cached.reference.rgba)
         })?;
         files::write(folder, &study, &results)?;
     }
@@ -134,7 +135,7 @@ pub fn run(args: &ErrorArgs, color: ColorChoice) -> Result<()> {
             folder: &folder,
             last_round: &last_round,
             study: &mut study,
-            film: &film,
+            backdrop: &backdrop,
             pixels: &pixels,
             reference: &cached.reference.rgba,
             bar: &bar,
@@ -305,7 +306,7 @@ struct Recorder<'a> {
     folder: &'a SharedFolder,
     last_round: &'a LastRound,
     study: &'a mut Study,
-    film: &'a Film,
+    backdrop: &'a Backdrop,
     pixels: &'a Pixels,
     reference: &'a [[f64; 4]],
     bar: &'a Progress,
@@ -342,9 +343,9 @@ impl Recorder<'_> {
     ) -> Result<()> {
         let mut folder = lock_folder(self.folder);
         let Some(folder) = &mut *folder else { return Ok(()) };
-        let (Film { width, height, .. }, pixels) = (*self.film, self.pixels);
+        let (Film { width, height, .. }, pixels) = (self.backdrop.film, self.pixels);
         let [picture, map] = files::picture_files(i);
-        folder.add(&picture, |path| image::write(path, self.film, width, height, rgba))?;
+        folder.add(&picture, |path| image::write(path, self.backdrop, width, height, rgba))?;
         let at = |k: usize| &rgba[4 * pixels.index(pixels.at[k])..][..4];
         let error = |(k, r): (usize, &[f64; 4])| {
             let sum: f64 = at(k).iter().zip(r).map(|(a, b)| (f64::from(*a) - b).powi(2)).sum();
@@ -359,7 +360,12 @@ impl Recorder<'_> {
 }
 
 /// Writes the reference as a picture in which every cell has the value of its pixel.
-fn write_reference(path: &Path, film: &Film, pixels: &Pixels, rgba: &[[f64; 4]]) -> Result<()> {
+fn write_reference(
+    path: &Path,
+    shown: &Backdrop,
+    pixels: &Pixels,
+    rgba: &[[f64; 4]],
+) -> Result<()> {
     let whole: Vec<f32> = pixels.spread(rgba).into_iter().flatten().map(|v| v as f32).collect();
-    image::write(path, film, film.width, film.height, &whole)
+    image::write(path, shown, shown.film.width, shown.film.height, &whole)
 }

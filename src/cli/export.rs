@@ -74,7 +74,7 @@ fn write(
     let of_spots = spots.iter().enumerate().map(|(i, picture)| (spot_picture(i), picture));
     let pictures = sky.iter().map(|picture| (SKY_PICTURE.to_owned(), picture)).chain(of_spots);
     for (name, ([width, height], rgba)) in pictures {
-        let picture = image::encoded(ImageKind::Exr, film, *width, *height, rgba)?;
+        let picture = image::encoded(ImageKind::Exr, &(*film).into(), *width, *height, rgba)?;
         folder.add(&name, |path| bytes(path, &picture))?;
     }
     if let Some(ground) = ground {

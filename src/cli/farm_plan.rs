@@ -2,7 +2,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::args::{CalibrateArgs, FormatArg, PlanArgs, Span};
+use super::args::{CalibrateArgs, PlanArgs, Span};
 use super::farm_told;
 use super::output::{self, claim_file};
 use super::progress::progress;
@@ -74,11 +74,7 @@ fn cut(args: &PlanArgs, set: &[String], loaded: &LoadedScene) -> Result<Cut> {
         shard_seconds: args.shard_seconds.unwrap_or((60.0, 600.0)),
         n_nodes: args.n_nodes(),
     };
-    let format = |usual| match args.format {
-        Some(FormatArg::Png) => ImageKind::Png,
-        Some(FormatArg::Exr) => ImageKind::Exr,
-        None => usual,
-    };
+    let format = |usual| args.format.map_or(usual, Into::into);
     if let Some(of) = args.reference {
         let request = ReferenceDivision {
             of,

@@ -39,6 +39,7 @@ mod ledger;
 mod output;
 mod progress;
 mod render;
+mod render_frames;
 mod render_layers;
 mod render_reference;
 mod report;

@@ -5,13 +5,14 @@ use serde_json::{Value, json};
 use super::args::RenderArgs;
 use super::progress::spinner;
 use super::scene::{check_time, device_choice, load, print_notes, print_sizes, print_unseen};
-use super::{capture_note, output, render_layers, render_reference};
+use super::{capture_note, output, render_frames, render_layers, render_reference};
 use crate::error::Result;
 use crate::frame::plan::Pass;
 use crate::frame::{Counts, DrawnFrame, Rendered, Stage, scene_of_layers};
 use crate::io::console::say;
 use crate::io::image::{self, ImageKind, image_hash};
 use crate::io::layers::{self, CHANNELS};
+use crate::model::backdrop::Backdrop;
 use crate::model::film::FilmFormat;
 use crate::model::scene::Scene;
 use crate::timing::machine::device_record;
@@ -21,6 +22,9 @@ use crate::timing::machine::device_record;
 /// # Errors
 /// Fails if the arguments or the scene are faulty, the device fails, or the file cannot be written.
 pub fn run(args: &RenderArgs) -> Result<()> {
+    if let Some(span) = args.frames {
+        return render_frames::run(args, span);
+    }
     // Faults of the arguments are reported before any work.
     ImageKind::of(&args.output)?;
     render_layers::check(args)?;
@@ -39,7 +43,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 }
 
 fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
-    let film = scene.film;
+    let (film, backdrop) = (scene.film, Backdrop::of(&scene, time_s));
     let quiet = args.options.quiet;
     let drawing = spinner("drawing", quiet);
     let mut choice = device_choice(&args.options);
@@ -79,7 +83,7 @@ fn render(args: &RenderArgs, scene: Scene, time_s: f64) -> Result<()> {
     let writing = spinner("writing", quiet);
     match &layers {
         Some(layers) => layers::write(&args.output, layers)?,
-        None => image::write(&args.output, &film, film.width, film.height, &rgba)?,
+        None => image::write(&args.output, &backdrop, film.width, film.height, &rgba)?,
     }
     let hash = args.json.then(|| image_hash(&rgba));
     drop(writing);

@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::io::console::say;
 use crate::io::image::{self, image_hash};
 use crate::io::layers::{self, CHANNELS};
+use crate::model::backdrop::Backdrop;
 use crate::model::scene::{Draw, Scene};
 use crate::reference::picture::{
     self, BlobModel, DrawnPicture, Enough, Grown, MAX_SAMPLES, MeanPicture, Pixels, ReferenceKind,
@@ -64,7 +65,8 @@ pub fn run(args: &RenderArgs, kind: ReferenceKind, scene: &Scene, time_s: f64) -
     let rgba = picture::to_f32(&rgba);
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
     warn_of_bad(args, n_bad, rgba.len());
-    image::write(&args.output, &film, film.width, film.height, &rgba)?;
+    let backdrop = Backdrop::of(scene, time_s);
+    image::write(&args.output, &backdrop, film.width, film.height, &rgba)?;
     let hash = image_hash(&rgba);
     tell(args, (kind, scene, time_s), (hash, n_bad), keys)
 }

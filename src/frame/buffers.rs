@@ -1,7 +1,8 @@
 //! The buffers that passes share.
 
 use super::features::{
-    colored_runs, has_bounces, has_diffusion, has_second, has_slopes, is_grouped, is_lit, is_medium,
+    colored_runs, has_bounces, has_diffusion, has_haze, has_second, has_slopes, is_grouped, is_lit,
+    is_medium,
 };
 use super::packet::Packet;
 use super::staging::StagedBuffer;
@@ -17,6 +18,7 @@ use crate::layout::particle::{
     BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, Shapes,
     TexturedRecord,
 };
+use crate::layout::sky::SkyRecord;
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{Cloud, CloudSource};
 use crate::model::grid::{self, DEPOSIT_CUT_SIGMA, MAX_CELLS};
@@ -74,6 +76,12 @@ buffers! {
         /// Lobes by material, then the vectors of the basis, N_NODES numbers each.
         table: StagedBuffer => f32, n_table_rows(scene) * N_NODES as u64, "first.table", Floats;
         lit: Buffer => LitRecord, scene.n_facets(), "first.lit";
+        /// The sky as the eye sees it.
+        sky: StagedBuffer => SkyRecord, n_if(scene.sky.is_some(), 1), "haze.sky";
+        /// Light of facets behind the air.
+        hazed: Buffer => LitRecord, n_if(has_haze(scene), scene.n_facets()), "haze.lit";
+        hazed_slopes: Buffer => SlopeRecord,
+            n_if(has_haze(scene) && has_slopes(scene), scene.n_facets()), "haze.slopes";
         /// Change of the light inside of blobs, by facet.
         slopes: Buffer => SlopeRecord, n_if(has_slopes(scene), scene.n_facets()),
             "scatter.slopes";
@@ -104,21 +112,34 @@ impl SceneBuffers {
         self.table.write(slot, &packet.table)?;
         self.regions.write(slot, &packet.regions)?;
         self.media.write(slot, &packet.media)?;
+        if let Some(sky) = packet.sky {
+            self.sky.write(slot, &[sky])?;
+        }
         self.lights.write(slot, &packet.lights)
     }
 
     /// Copies the staged data to where shaders read it.
     pub fn record_copies(&self, rec: &mut Recorder<'_>, slot: usize) {
-        let SceneBuffers { groups, drawn, modes, table, media, regions, lights, .. } = self;
-        for staged in [groups, drawn, modes, table, media, regions, lights] {
+        let SceneBuffers { groups, drawn, modes, table, media, regions, lights, sky, .. } = self;
+        for staged in [groups, drawn, modes, table, media, regions, lights, sky] {
             staged.record_copy(rec, slot);
         }
     }
 
+    /// Returns the light of facets that is drawn, and its changes inside of blobs: behind the air
+    /// where a scene has some.
+    pub fn shown_light(&self, has_haze: bool) -> [&Buffer; 2] {
+        match has_haze {
+            true => [&self.hazed, &self.hazed_slopes],
+            false => [&self.lit, &self.slopes],
+        }
+    }
+
     /// Returns the buffers that blobs are drawn from.
-    pub fn of_blobs(&self) -> BlobBuffers<'_> {
-        let SceneBuffers { entries, placed, particles, lit, i_facet, i_group, drawn, .. } = self;
-        let SceneBuffers { textured, pool, slopes, seen, .. } = self;
+    pub fn of_blobs(&self, has_haze: bool) -> BlobBuffers<'_> {
+        let [lit, slopes] = self.shown_light(has_haze);
+        let SceneBuffers { entries, placed, particles, i_facet, i_group, drawn, .. } = self;
+        let SceneBuffers { textured, pool, seen, .. } = self;
         BlobBuffers {
             entries,
             placed,

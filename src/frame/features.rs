@@ -41,6 +41,8 @@ pub struct SceneFeatures {
     pub has_lod: bool,
     /// Some colours change with the direction of view.
     pub has_harmonics: bool,
+    /// Air lies before the facets.
+    pub has_haze: bool,
     /// Number of surfaces.
     pub n_surfaces: u32,
     /// Number of terrains.
@@ -95,6 +97,7 @@ impl SceneFeatures {
             is_textured: scene.is_textured(),
             has_lod: has_lod(scene),
             has_harmonics: !colored_runs(scene).is_empty(),
+            has_haze: has_haze(scene),
             n_surfaces: scene.surfaces.len() as u32,
             n_terrains: scene.terrains.len() as u32,
             is_glossy: has_glossy(scene) || is_medium(scene),
@@ -143,6 +146,11 @@ pub fn has_bounces(scene: &Scene) -> bool {
 /// Returns whether the light changes inside of each blob.
 pub fn has_slopes(scene: &Scene) -> bool {
     scene.lighting.has_slopes()
+}
+
+/// Returns whether air lies before lit facets.
+pub fn has_haze(scene: &Scene) -> bool {
+    is_lit(scene) && scene.has_haze()
 }
 
 /// Returns whether lit facets stand for several particles.

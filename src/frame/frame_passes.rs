@@ -4,8 +4,8 @@ use super::buffers::{SceneBuffers, diffusion_room, grid_room};
 use super::constants::FrameConstants;
 use super::culling::Culling;
 use super::features::{
-    SceneFeatures, colored_runs, has_bounces, has_diffusion, has_second, has_slopes, is_grouped,
-    is_medium,
+    SceneFeatures, colored_runs, has_bounces, has_diffusion, has_haze, has_second, has_slopes,
+    is_grouped, is_medium,
 };
 use super::gather::IndirectGather;
 use super::live::{LiveParticles, PlacedUploads, unmoved};
@@ -24,6 +24,7 @@ use crate::passes::first::First;
 use crate::passes::generate::Generate;
 use crate::passes::grid::Grid;
 use crate::passes::harmonics::{Colored, Harmonics};
+use crate::passes::haze::HazePass;
 use crate::passes::place::Place;
 use crate::passes::scatter::{Scatter, ScatterVariant};
 use crate::passes::sort::Sort;
@@ -50,6 +51,7 @@ pub(super) struct FramePasses {
     pub scatter: Option<Scatter>,
     pub gather: Option<IndirectGather>,
     pub tensors: Option<LightTensors>,
+    pub haze: Option<HazePass>,
     pub culling: Option<Culling>,
     pub sort: Sort,
     pub texture: Option<Texture>,
@@ -124,6 +126,9 @@ impl FramePasses {
                 .transpose()?,
             gather,
             tensors,
+            haze: has_haze(scene)
+                .then(|| HazePass::new(device, compiler, has_slopes(scene)))
+                .transpose()?,
             culling: Culling::new(device, compiler, scene)?,
             sort: Sort::new(device, compiler, n_particles)?,
             texture: scene.is_textured().then(|| Texture::new(device, compiler)).transpose()?,

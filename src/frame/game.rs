@@ -18,6 +18,7 @@ use crate::error::Result;
 use crate::layout::facet::{KeyBits, NO_LOBE, RegionBoundsRecord, RegionRecord, lobe_width};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::layout::sky::SkyRecord;
 use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
 use crate::model::cloud::{Group, SQRT_TAU, aspects_of, mass, max_blob_mass};
@@ -155,16 +156,15 @@ impl Game {
         let filled = || grown.iter().filter(|g| g.n_particles > 0);
         let sigma_max = filled().map(Group::sigma_widest).fold(0.0, f64::max);
         let across_max = filled().map(|g| g.sigma_max).fold(0.0, f64::max);
+        let Scene { camera, film, .. } = &*self.scene;
+        let camera = CameraRecord::new(camera, &setting.pose, film, setting.light_origin);
+        let sky = self.scene.sky_view(setting.pose.position, time_s);
         Ok(Packet {
             i_frame,
             time_s,
             begin,
-            camera: CameraRecord::new(
-                &self.scene.camera,
-                &setting.pose,
-                &self.scene.film,
-                setting.light_origin,
-            ),
+            camera,
+            sky: sky.map(|view| SkyRecord::new(&view, camera)),
             groups: info_span!("groups")
                 .in_scope(|| grown.iter().map(|g| self.group(g, origins[g.i_cloud])).collect()),
             drawn,

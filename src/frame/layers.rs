@@ -111,7 +111,7 @@ impl Renderer {
         let Renderer { host, passes, .. } = self;
         let (c, b, picture) = (&passes.constants, &passes.buffers, &mut passes.picture);
         let [placed, particles] = drawn(&passes.merging, b);
-        let blobs = BlobBuffers { placed, particles, ..b.of_blobs() };
+        let blobs = BlobBuffers { placed, particles, ..b.of_blobs(false) };
         let [width, height] = c.size;
         let n_pixels = u64::from(width) * u64::from(height);
         let has_depth = scene.has_solids();

@@ -138,7 +138,7 @@ impl LowResTarget {
     ) -> Result<()> {
         let camera = self.camera(camera);
         if let (Some(solids), Some(target)) = (&self.solids, self.target.target(0)) {
-            solids.record(rec, pass, b, target, &camera)?;
+            solids.record(rec, pass, (b, &b.lit), target, &camera)?;
         }
         // Copied before blobs are drawn, which may overwrite it.
         self.target.record_copy_solids(rec, 0, None, &self.buffers.small_depths);

@@ -10,6 +10,7 @@ use crate::layout::facet::{RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::medium::MediumRecord;
 use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::layout::sky::SkyRecord;
 use crate::passes::blobs::Extent;
 
 /// The state of a scene at a frame's time.
@@ -53,6 +54,8 @@ pub struct Packet {
     pub coefficients: Vec<[f32; 4]>,
     /// The lights.
     pub lights: Vec<LightRecord>,
+    /// The sky as the eye sees it; `None` without.
+    pub sky: Option<SkyRecord>,
     /// The density grid.
     pub grid: GridRecord,
     /// Bound of every blob's mass κ (2π)^{3/2} σ³.

@@ -19,6 +19,7 @@ use crate::passes::blobs::{BlobBuffers, BlobCount};
 use crate::passes::cull::{CullBuffers, Order};
 use crate::passes::facets;
 use crate::passes::grid::Deposit;
+use crate::passes::haze::HazeBuffers;
 use crate::passes::morton;
 use crate::passes::place::PlaceBuffers;
 use crate::passes::sort::{Count, TILE};
@@ -47,6 +48,7 @@ impl FramePasses {
         self.record_particles(rec, slot, packet, plan)?;
         self.record_facets(rec, packet, plan)?;
         self.record_light(rec, packet, plan)?;
+        self.record_haze(rec, plan)?;
         self.record_picture(rec, packet, plan)?;
         if let Some(culling) = &self.culling {
             rec.copy(&self.buffers.kept, &culling.counts.counts.0[slot]);
@@ -168,6 +170,16 @@ impl FramePasses {
         })
     }
 
+    /// Puts the air before the facets.
+    fn record_haze(&self, rec: &mut Recorder<'_>, plan: &Plan) -> Result<()> {
+        let FramePasses { haze, buffers, constants, .. } = self;
+        let SceneBuffers { facets, lit, slopes, sky, hazed, hazed_slopes, .. } = buffers;
+        let all = HazeBuffers { facets, lit, slopes, sky, hazed, hazed_slopes };
+        pass(rec, plan, Pass::Haze, |rec| {
+            haze.iter().try_for_each(|haze| haze.record(rec, &all, constants.march.n_facets))
+        })
+    }
+
     /// Selects and sorts the particles, and draws the picture.
     pub fn record_picture(
         &mut self,
@@ -176,8 +188,17 @@ impl FramePasses {
         plan: &Plan,
     ) -> Result<()> {
         let FramePasses {
-            merging, culling, sort, texture, picture, buffers: b, constants: c, ..
+            merging,
+            culling,
+            sort,
+            texture,
+            picture,
+            buffers: b,
+            constants: c,
+            features,
+            ..
         } = self;
+        let [lit, _] = b.shown_light(features.has_haze);
         let [placed, particles] = drawn(merging, b);
         let SceneBuffers { i_group, drawn, entries, kept, .. } = &*b;
         let (blob_camera, blob_size) = picture.blob_camera(&packet.camera, c);
@@ -207,7 +228,7 @@ impl FramePasses {
         for draws in [Pass::Surfaces, Pass::Terrain] {
             pass(rec, plan, draws, |rec| {
                 if let (Some(solids), Some(target)) = (&picture.solids, picture.full.target(i)) {
-                    solids.record(rec, draws, b, target, camera)?;
+                    solids.record(rec, draws, (b, lit), target, camera)?;
                 }
                 let mut low_res = picture.low_res.iter_mut();
                 low_res.try_for_each(|low_res| low_res.record_solids(rec, draws, b, camera))
@@ -221,7 +242,7 @@ impl FramePasses {
         };
         let count = BlobCount { n, i_first_facet: c.n_solid_facets };
         let view = c.view(camera, packet);
-        let all = BlobBuffers { placed, particles, ..b.of_blobs() };
+        let all = BlobBuffers { placed, particles, ..b.of_blobs(features.has_haze) };
         pass(rec, plan, Pass::Impostors, |rec| {
             match (&mut picture.impostors, picture.full.target(i)) {
                 (Some(impostors), Some(target)) => {

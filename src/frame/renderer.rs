@@ -106,6 +106,12 @@ impl Renderer {
         self.last.as_ref().map(|packet| packet.time_s)
     }
 
+    /// Returns the sky of the last frame, a `SkyRecord`; `None` without one.
+    pub fn sky(&self) -> Option<&Buffer> {
+        let has_sky = self.last.as_ref().is_some_and(|packet| packet.sky.is_some());
+        has_sky.then_some(&self.passes.buffers.sky)
+    }
+
     /// Draws one frame and waits for it.
     ///
     /// # Errors

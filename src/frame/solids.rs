@@ -3,7 +3,7 @@
 use super::buffers::SceneBuffers;
 use super::plan::Pass;
 use crate::error::Result;
-use crate::gpu::{Compiler, Device, LoadOp, Recorder, Target, TargetFormat};
+use crate::gpu::{Buffer, Compiler, Device, LoadOp, Recorder, Target, TargetFormat};
 use crate::layout::frame::CameraRecord;
 use crate::model::scene::Scene;
 use crate::passes::surfaces::Surfaces;
@@ -40,7 +40,7 @@ impl Solids {
         &self,
         rec: &mut Recorder<'_>,
         pass: Pass,
-        SceneBuffers { regions, ground, lit, .. }: &SceneBuffers,
+        (SceneBuffers { regions, ground, .. }, lit): (&SceneBuffers, &Buffer),
         target: Target<'_>,
         camera: &CameraRecord,
     ) -> Result<()> {

@@ -14,7 +14,9 @@ use sha2::{Digest, Sha256};
 use super::atomic::write_atomic;
 use super::input_file::{self, PICTURE_LIMIT};
 use crate::error::{Error, Result};
-use crate::model::film::{Film, dither};
+use crate::model::backdrop::Backdrop;
+use crate::model::film::dither;
+use crate::model::parallel::parallel_map;
 
 /// Most pixels of a picture that is read: 4096 x 2304. Comparing two of them takes 1.9 GB, as
 /// measured, and no command may take more than 2 GiB.
@@ -45,6 +47,11 @@ impl ImageKind {
                 path.display()
             ))),
         }
+    }
+
+    /// Returns the file name of a frame's picture. Names sort as the frames do.
+    pub fn frame_name(self, i_frame: u32) -> String {
+        format!("frame-{i_frame:08}.{}", self.extension())
     }
 
     /// Returns the extension of file names.
@@ -152,13 +159,13 @@ fn not_encoded(cause: image::ImageError) -> Error {
 /// When `rgba` is not width × height pixels.
 pub fn encoded(
     kind: ImageKind,
-    film: &Film,
+    shown: &Backdrop,
     width: u32,
     height: u32,
     rgba: &[f32],
 ) -> Result<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::new());
-    encode(&mut bytes, kind, film, [width, height], rgba).map_err(not_encoded)?;
+    encode(&mut bytes, kind, shown, [width, height], rgba).map_err(not_encoded)?;
     Ok(bytes.into_inner())
 }
 
@@ -166,13 +173,13 @@ pub fn encoded(
 fn encode(
     writer: impl Write + Seek,
     kind: ImageKind,
-    film: &Film,
+    shown: &Backdrop,
     [width, height]: [u32; 2],
     rgba: &[f32],
 ) -> image::ImageResult<()> {
     match kind {
         ImageKind::Png => {
-            let rgb = display_bytes(film, width, height, rgba);
+            let rgb = display_bytes(shown, width, height, rgba);
             PngEncoder::new(writer).write_image(&rgb, width, height, ExtendedColorType::Rgb8)
         }
         ImageKind::Exr => {
@@ -195,26 +202,29 @@ fn encode(
 ///
 /// # Panics
 /// When `rgba` is not width × height pixels.
-pub fn write(path: &Path, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
+pub fn write(path: &Path, shown: &Backdrop, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
     let kind = ImageKind::of(path)?;
     // The file grows in small pieces. A single write of the whole picture could not be interrupted.
-    write_atomic(path, |writer| encode(writer, kind, film, [width, height], rgba))
+    write_atomic(path, |writer| encode(writer, kind, shown, [width, height], rgba))
 }
 
 /// Returns dithered 8-bit sRGB pixels, three bytes each.
 ///
 /// # Panics
 /// When `rgba` is not width × height pixels.
-pub fn display_bytes(film: &Film, width: u32, height: u32, rgba: &[f32]) -> Vec<u8> {
+pub fn display_bytes(backdrop: &Backdrop, width: u32, height: u32, rgba: &[f32]) -> Vec<u8> {
     check_size(width, height, rgba);
-    let mut bytes = Vec::with_capacity(rgba.len() / 4 * 3);
-    for (i, pixel) in rgba.chunks_exact(4).enumerate() {
-        let [r, g, b, a] = [pixel[0], pixel[1], pixel[2], pixel[3]].map(f64::from);
-        let threshold = dither(i % width as usize, i / width as usize);
-        let shown = film.display(DVec3::new(r, g, b), a);
-        bytes.extend(shown.to_array().map(|v| (255.0 * v + threshold).floor() as u8));
-    }
-    bytes
+    let n = width as usize;
+    let rows = parallel_map(height as usize, |y| {
+        let row = rgba[4 * n * y..4 * n * (y + 1)].chunks_exact(4).enumerate();
+        let of = row.flat_map(|(x, pixel)| {
+            let [r, g, b, a] = [pixel[0], pixel[1], pixel[2], pixel[3]].map(f64::from);
+            let shown = backdrop.display(x, y, DVec3::new(r, g, b), a);
+            shown.to_array().map(|v| (255.0 * v + dither(x, y)).floor() as u8)
+        });
+        of.collect::<Vec<u8>>()
+    });
+    rows.concat()
 }
 
 fn check_size(width: u32, height: u32, rgba: &[f32]) {
@@ -233,7 +243,7 @@ pub fn image_hash(rgba: &[f32]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::film::{FilmFormat, ToneMap};
+    use crate::model::film::{Film, FilmFormat, ToneMap};
 
     #[test]
     fn bayers_matrix_has_each_threshold_once() {
@@ -246,7 +256,7 @@ mod tests {
         assert!(all.into_iter().eq(0..64));
     }
 
-    fn film(width: u32, height: u32) -> Film {
+    fn film(width: u32, height: u32) -> Backdrop {
         let background = DVec3::new(0.1, 0.5, 0.9);
         Film {
             width,
@@ -256,6 +266,7 @@ mod tests {
             exposure: 1.0,
             tone_map: ToneMap::Clip,
         }
+        .into()
     }
 
     #[test]
@@ -273,7 +284,7 @@ mod tests {
         let read = image::open(&png).unwrap().into_rgb8();
         for (pixel, shown) in rgba.chunks(4).zip(read.pixels()) {
             let rgb = DVec3::new(f64::from(pixel[0]), f64::from(pixel[1]), f64::from(pixel[2]));
-            let exact = film(5, 3).display(rgb, f64::from(pixel[3])) * 255.0;
+            let exact = film(5, 3).film.display(rgb, f64::from(pixel[3])) * 255.0;
             for channel in 0..3 {
                 // Rounding ½ and dither ½: less than one code value.
                 assert!((f64::from(shown[channel]) - exact[channel]).abs() < 1.0);
@@ -289,7 +300,7 @@ mod tests {
         // Nothing covers the background, and 64 pixels are one period of the matrix.
         let empty = [0.0f32; 64 * 4];
         let shown = display_bytes(&film(8, 8), 8, 8, &empty);
-        let exact = film(8, 8).display(DVec3::ZERO, 0.0) * 255.0;
+        let exact = film(8, 8).film.display(DVec3::ZERO, 0.0) * 255.0;
         for channel in 0..3 {
             let mean =
                 shown.iter().skip(channel).step_by(3).map(|v| f64::from(*v)).sum::<f64>() / 64.0;
@@ -300,10 +311,11 @@ mod tests {
                 exact[channel]
             );
         }
-        let white: Vec<f32> = [2.0, 0.0, 1.0, 1.0].repeat(64);
-        assert!(display_bytes(&film(8, 8), 8, 8, &white).chunks(3).all(|c| c == [255, 0, 255]));
-        let nan: Vec<f32> = [f32::NAN, f32::INFINITY, 0.0, 1.0].repeat(64);
-        assert!(display_bytes(&film(8, 8), 8, 8, &nan).chunks(3).all(|c| c == [0, 255, 0]));
+        let is = |pixel: [f32; 4], code: [u8; 3]| {
+            display_bytes(&film(8, 8), 8, 8, &pixel.repeat(64)).chunks(3).all(|c| c == code)
+        };
+        assert!(is([2.0, 0.0, 1.0, 1.0], [255, 0, 255]));
+        assert!(is([f32::NAN, f32::INFINITY, 0.0, 1.0], [0, 255, 0]));
     }
 
     #[test]

@@ -16,6 +16,7 @@ pub mod atomic;
 pub mod bounds;
 pub mod box_file;
 pub mod claim;
+pub mod clip;
 pub mod console;
 mod document;
 pub mod folder;

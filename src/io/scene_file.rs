@@ -53,6 +53,12 @@ impl LoadedScene {
         self.hash.hex()
     }
 
+    /// Returns the scene of a frame with every "auto" resolved to what needs no measurement:
+    /// measured choices may differ between machines and frames, and the pictures would, too.
+    pub fn exact_at_frame(&self, i_frame: u32) -> Scene {
+        self.clone().at_frame(i_frame).exact().into_owned()
+    }
+
     /// Returns the scene of frame `i_frame`; beyond the last phase, the last phase's.
     pub fn at_frame(self, i_frame: u32) -> Scene {
         let mut end = 0u64;

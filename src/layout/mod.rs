@@ -11,6 +11,7 @@ pub mod medium;
 pub mod particle;
 pub mod roof;
 pub mod second;
+pub mod sky;
 pub mod sums;
 pub mod tiles;
 

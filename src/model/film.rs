@@ -35,6 +35,19 @@ named! {
         Neutral = "neutral",
         /// Clamps to 1.
         Clip = "clip",
+        /// The curve of the Academy's reference as Narkowicz 2016 fits it, by channel: a toe, and a
+        /// shoulder that bright colours fade to white on.
+        Filmic = "filmic",
+    }
+}
+
+named! {
+    /// Light that the exposure goes by.
+    pub enum Metering {
+        /// None.
+        None = "none",
+        /// That of suns and skies.
+        Sunlit = "sunlit",
     }
 }
 
@@ -59,10 +72,16 @@ impl Film {
     /// Returns the display value in [0, 1]³ of a premultiplied linear pixel (alpha = 1 −
     /// transmittance).
     pub fn display(&self, rgb: DVec3, alpha: f64) -> DVec3 {
-        let linear = self.exposure * (rgb + (1.0 - alpha) * self.background);
+        self.display_over(rgb, alpha, self.background)
+    }
+
+    /// Returns the same over another radiance than the background's.
+    pub fn display_over(&self, rgb: DVec3, alpha: f64, behind: DVec3) -> DVec3 {
+        let linear = self.exposure * (rgb + (1.0 - alpha) * behind);
         let mapped = match self.tone_map {
             ToneMap::Neutral => neutral(linear),
             ToneMap::Clip => linear,
+            ToneMap::Filmic => linear.map(filmic),
         };
         DVec3::new(srgb_encode(mapped.x), srgb_encode(mapped.y), srgb_encode(mapped.z))
     }
@@ -85,6 +104,15 @@ fn neutral(color: DVec3) -> DVec3 {
     let new_peak = 1.0 - d * d / (peak + d - START_COMPRESSION);
     let gray = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
     (color * (new_peak / peak)).lerp(DVec3::splat(new_peak), gray)
+}
+
+/// Applies the fit of the filmic curve. *Source*: Narkowicz, "ACES Filmic Tone Mapping Curve",
+/// 2016.
+fn filmic(x: f64) -> f64 {
+    // Beyond, the curve is above 1 by 3 %, and the quotient would be ∞/∞.
+    const WHITE: f64 = 1e6;
+    let x = if x > 0.0 { x.min(WHITE) } else { 0.0 };
+    (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)
 }
 
 /// Encodes a linear value as sRGB, clamped to [0, 1]; NaN becomes 0. *Source*: IEC 61966-2-1.
@@ -149,8 +177,18 @@ mod tests {
     }
 
     #[test]
+    fn the_filmic_curve_by_hand() {
+        // At 1: (2.51 + 0.03)/(2.43 + 0.59 + 0.14) = 2.54/3.16; it rises, and has a toe.
+        assert!((filmic(1.0) - 2.54 / 3.16).abs() < 1e-15);
+        assert!(filmic(0.01) < 0.01 && filmic(0.18) > 0.18);
+        let all: Vec<f64> = (0..200).map(|i| filmic(0.1 * f64::from(i))).collect();
+        assert!(all.windows(2).all(|w| w[0] < w[1]));
+        assert_eq!((filmic(-1.0), filmic(f64::NAN)), (0.0, 0.0));
+    }
+
+    #[test]
     fn infinite_radiance_is_white() {
-        for tone_map in [ToneMap::Neutral, ToneMap::Clip] {
+        for tone_map in [ToneMap::Neutral, ToneMap::Clip, ToneMap::Filmic] {
             let white = film(tone_map).display(DVec3::INFINITY, 1.0);
             assert_eq!(white, DVec3::splat(srgb_encode(1.0)));
         }

@@ -5,6 +5,7 @@
 
 pub mod air;
 pub mod animated;
+pub mod backdrop;
 pub mod basis;
 pub mod boxes;
 pub mod camera;
@@ -42,6 +43,7 @@ pub mod resolution;
 pub mod scene;
 pub mod shade;
 pub mod shape;
+pub mod sky;
 pub mod sort_bits;
 pub mod sums;
 pub mod surface;

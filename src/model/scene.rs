@@ -20,6 +20,7 @@ use super::material::Material;
 use super::named::named;
 pub use super::overlap::Overlap;
 use super::resolution::LowResLayout;
+use super::sky::{Sky, SkyView};
 use super::surface::Surface;
 use super::terrain::Terrain;
 
@@ -59,6 +60,8 @@ pub struct Scene {
     pub clouds: Vec<Cloud>,
     /// Air that clouds condense in.
     pub air: Air,
+    /// Clear sky, in place of the film's background.
+    pub sky: Option<Sky>,
 }
 
 /// Times of the frames: frame n is at start_s + n·step_s on every machine.
@@ -212,9 +215,20 @@ impl Scene {
     }
 
     /// Returns whether slices of clouds have the light of the cells where they are, and not that
-    /// of their blobs (model.md §18).
+    /// of their blobs (model.md §18). Behind air they have that of their blobs.
     pub fn has_light_of_cells(&self) -> bool {
-        self.lighting.has_bounces() && self.draw.overlap == Overlap::Slices
+        self.lighting.has_bounces() && self.draw.overlap == Overlap::Slices && !self.has_haze()
+    }
+
+    /// Returns whether air lies between the eye and the scene.
+    pub fn has_haze(&self) -> bool {
+        self.sky.is_some_and(|sky| sky.settings().haze > 0.0)
+    }
+
+    /// Returns the sky as it is seen from `eye`; `None` without.
+    pub fn sky_view(&self, eye: DVec3, time_s: f64) -> Option<SkyView> {
+        let sky = self.sky.as_ref()?;
+        Some(SkyView::new(sky, eye, &self.lights, &self.materials, time_s))
     }
 
     /// Returns whether some cloud's particles have textures.

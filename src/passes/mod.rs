@@ -33,6 +33,7 @@ pub mod first;
 pub mod generate;
 pub mod grid;
 pub mod harmonics;
+pub mod haze;
 pub mod impostors;
 pub mod live;
 pub mod lod;
@@ -95,6 +96,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "grid_spread.comp",
     "grid_turned.comp",
     "harmonics.comp",
+    "haze.comp",
     "impostors.frag",
     "impostors.vert",
     "impostors_part.comp",
@@ -104,6 +106,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/camera.glsl",
     "include/cell_samples.glsl",
     "include/cells.glsl",
+    "include/clear_sky.glsl",
     "include/cull.glsl",
     "include/density.glsl",
     "include/depths.glsl",

@@ -25,7 +25,7 @@ record! {
         size: [u32; 2],
         /// The window's pixel of the picture's top left pixel.
         corner: [i32; 2],
-        /// 0: neutral; 1: linear.
+        /// 0: neutral; 1: linear; 2: filmic.
         tone_map: u32,
         /// 0: none; 1: split; 2: difference; 3: the second picture.
         compare: u32,
@@ -70,56 +70,58 @@ pub struct Shown {
     pub size: [u32; 2],
     /// The window's pixel at which the picture's top left pixel is.
     pub corner: [i32; 2],
-    /// Highlights are compressed instead of clipped.
-    pub is_neutral: bool,
+    /// 0: highlights are compressed; 1: they are clipped; 2: a filmic curve.
+    pub tone_map: u32,
     /// The comparison with a second picture; without one, A is shown.
     pub compare: Option<Compare>,
 }
 
 impl Present {
-    /// Creates the pipeline for pictures in format `from` and images of format `to`.
+    /// Creates the pipeline for pictures in format `from` and images of format `to`. With
+    /// `has_sky`, a sky takes the place of the background.
     ///
     /// # Errors
     /// Fails if a shader does not compile or the pipeline cannot be created.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
-        from: TargetFormat,
-        to: TargetFormat,
+        [from, to]: [TargetFormat; 2],
+        has_sky: bool,
     ) -> Result<Present> {
         let kind = match from {
             TargetFormat::Rgba8 | TargetFormat::Bgra8 => 0,
             TargetFormat::Rgba16f => 1,
             TargetFormat::Rgba32f => 2,
         };
-        let (constants, blend) = ([(0, kind)], (to, BlendMode::Over));
+        let constants = [(0, kind), (1, u32::from(has_sky))];
+        let blend = (to, BlendMode::Over);
         let pipeline =
             DrawPipeline::new(device, compiler, "present", Push::FIELDS, &constants, blend)?;
         Ok(Present { pipeline })
     }
 
     /// Draws `pictures`, A and B, into all of `into`. Both have the same format and size; without a
-    /// comparison B is A.
+    /// comparison B is A. `sky`: `SkyRecord`, one; without a sky it is not read.
     ///
     /// # Errors
     /// Fails if `into` has another format than the pipeline.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        pictures: [&Buffer; 2],
+        [a, b]: [&Buffer; 2],
+        sky: &Buffer,
         into: &mut Image,
         shown: &Shown,
     ) -> Result<()> {
-        let Shown { background, exposure, size, corner, is_neutral, compare } = *shown;
+        let Shown { background, exposure, size, corner, tone_map, compare } = *shown;
         let (compare, split, gain) = match compare {
             None => (0, 0, 0.0),
             Some(Compare::Split { column }) => (1, column, 0.0),
             Some(Compare::Difference { gain }) => (2, 0, gain),
             Some(Compare::Second) => (3, 0, 0.0),
         };
-        let tone_map = u32::from(!is_neutral);
         let push = Push { background, exposure, size, corner, tone_map, compare, split, gain };
         let (target, one) = (Target::color(into), InstanceCount::Known(1));
-        rec.draw(&self.pipeline, target, LoadOp::DontCare, &pictures, &push, one)
+        rec.draw(&self.pipeline, target, LoadOp::DontCare, &[a, b, sky], &push, one)
     }
 }

@@ -24,6 +24,7 @@ pub mod first;
 pub mod generate;
 pub mod grid;
 pub mod harmonics;
+pub mod haze;
 pub mod impostors;
 pub mod layers;
 pub mod live;

@@ -19,6 +19,8 @@ use crate::error::{Error, Result};
 use crate::frame::{Amounts, Counts, DrawnFrame, FrameTimes, Renderer, Stage, light_notes, unseen};
 use crate::gpu::hex;
 use crate::io::image::display_bytes;
+use crate::model::backdrop::Backdrop;
+use crate::model::film::Film;
 use crate::model::scene::{Draw, Lighting, LightingMode, Scene};
 
 /// What a bench tells while it runs.
@@ -211,7 +213,6 @@ impl Bench<'_> {
     /// Keeps what is told of the last frame of a case.
     fn end_case(&mut self, i_case: usize) -> Result<()> {
         let Some(stage) = &mut self.stage else { return Ok(()) };
-        let case = &self.cases[i_case];
         let named = |note: &String| named(self.cases, i_case, note);
         let last = lock(self.outcome)
             .samples
@@ -238,9 +239,9 @@ impl Bench<'_> {
             outcome.invocations.extend(counted.map(|of| (i_case, of)));
         }
         if self.plan.pictures && !is_stopped {
-            let film = case.scene.film;
-            let (width, height) = (film.width, film.height);
-            let rgb = display_bytes(&film, width, height, &rgba);
+            let time_s = last.map_or(scene.time.start_s, |frame| frame.time_s);
+            let (Film { width, height, .. }, backdrop) = (scene.film, Backdrop::of(&scene, time_s));
+            let rgb = display_bytes(&backdrop, width, height, &rgba);
             let picture = CasePicture { i_case, width, height, rgb };
             lock(self.outcome).pictures.push(picture);
         }

@@ -10,7 +10,9 @@ use crate::gpu::{
     Buffer, Commands, Instance, MemoryUsage, Overlay, PresentMode, PresentOutcome, Recorder, Shown,
     Surface, Swapchain,
 };
+use crate::layout::sky::SkyRecord;
 use crate::model::film::{Film, ToneMap};
+use crate::model::scene::Scene;
 use crate::passes::present::{self, Compare, Present};
 
 /// Delay before another attempt while the window has no visible area: too short to notice when the
@@ -82,31 +84,42 @@ impl WindowTarget {
         self.swapchain.as_ref().map(Swapchain::size)
     }
 
-    /// Creates the draw that shows `renderer`'s pictures; `None` without a swapchain.
+    /// Creates the draw that shows `renderer`'s pictures of `scene`; `None` without a swapchain.
     ///
     /// # Errors
     /// The device has no memory for the pictures, or the shader does not compile.
-    pub fn picture_draw(&self, renderer: &Renderer, film: &Film) -> Result<Option<PictureDraw>> {
+    pub fn picture_draw(&self, renderer: &Renderer, scene: &Scene) -> Result<Option<PictureDraw>> {
         let Some(chain) = &self.swapchain else { return Ok(None) };
         let (format, n_bytes) = renderer.picture_format();
-        let Film { width, height, background, exposure, tone_map, .. } = *film;
+        let Film { width, height, background, exposure, tone_map, .. } = scene.film;
         let device = &self.gpu.device;
         let picture = |name| Buffer::new::<u8>(device, name, n_bytes, MemoryUsage::Device);
         let pictures = [picture("window.picture")?, picture("window.other")?];
+        let no_sky = Buffer::new::<SkyRecord>(device, "window.sky", 1, MemoryUsage::Device)?;
         // A picture that was never drawn is transparent, so the background shows.
         Commands::new(device, "window.blank")?.run(|rec| {
-            pictures.iter().for_each(|picture| rec.fill(picture, 0));
+            pictures.iter().chain([&no_sky]).for_each(|buffer| rec.fill(buffer, 0));
             Ok(())
         })?;
         Ok(Some(PictureDraw {
-            present: Present::new(device, self.gpu.compiler(), format, chain.format())?,
+            present: Present::new(
+                device,
+                self.gpu.compiler(),
+                [format, chain.format()],
+                scene.sky.is_some(),
+            )?,
             pictures,
+            no_sky,
             shown: present::Shown {
                 background: background.as_vec3().to_array(),
                 exposure: exposure as f32,
                 size: [width, height],
                 corner: [0, 0],
-                is_neutral: tone_map == ToneMap::Neutral,
+                tone_map: match tone_map {
+                    ToneMap::Neutral => 0,
+                    ToneMap::Clip => 1,
+                    ToneMap::Filmic => 2,
+                },
                 compare: None,
             },
         }))
@@ -134,10 +147,13 @@ impl WindowTarget {
         let widgets = take_widgets(widgets, overlay)?;
         let shown = swapchain.show(begun, |rec, image| {
             let [own_first, own_second] = &draw.pictures;
-            let first = picture(rec, first, own_first);
-            let second = if second.is_some() { picture(rec, second, own_second) } else { first };
+            let [first, sky] = picture(rec, first, [own_first, &draw.no_sky]);
+            let second = match second.is_some() {
+                true => picture(rec, second, [own_second, &draw.no_sky])[0],
+                false => first,
+            };
             let shown = present::Shown { compare, ..draw.shown };
-            draw.present.record(rec, [first, second], image, &shown)?;
+            draw.present.record(rec, [first, second], sky, image, &shown)?;
             widgets.map_or(Ok(()), |widgets| overlay.record(rec, image, &widgets))
         })?;
         Ok(shown != PresentOutcome::Outdated)
@@ -181,18 +197,18 @@ impl WindowTarget {
     }
 }
 
-/// Returns the buffer with `renderer`'s last picture: the renderer's own, or `copy` after a copy
-/// from its image; `copy` as it is without a renderer.
+/// Returns the buffers with `renderer`'s last picture and its sky. The picture is the renderer's
+/// own, or `copy` after a copy from its image; without a renderer or a sky they are as given.
 fn picture<'a>(
     rec: &mut Recorder<'_>,
     renderer: Option<&'a mut Renderer>,
-    copy: &'a Buffer,
-) -> &'a Buffer {
-    let Some(renderer) = renderer else { return copy };
+    [copy, no_sky]: [&'a Buffer; 2],
+) -> [&'a Buffer; 2] {
+    let Some(renderer) = renderer else { return [copy, no_sky] };
     if renderer.picture().is_none() {
         renderer.record_picture(rec, copy);
     }
-    renderer.picture().unwrap_or(copy)
+    [renderer.picture().unwrap_or(copy), renderer.sky().unwrap_or(no_sky)]
 }
 
 /// The draw that tone-maps renderers' pictures into a swapchain image.
@@ -200,5 +216,7 @@ pub struct PictureDraw {
     present: Present,
     /// Copies of pictures that a renderer holds in no buffer.
     pictures: [Buffer; 2],
+    /// The sky until a frame has been drawn.
+    no_sky: Buffer,
     shown: present::Shown,
 }

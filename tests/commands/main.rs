@@ -34,6 +34,7 @@ mod ply;
 #[path = "../harness/program.rs"]
 mod program;
 mod records;
+mod render_frames;
 mod render_reference;
 mod report;
 #[path = "../harness/results.rs"]

@@ -74,7 +74,7 @@ fn unknown_keys_are_refused_with_the_nearest_and_all_known_ones() {
     assert_message(
         "[film]\nheight = 5\nwidht = 3\n",
         "scene.toml:3:1: unknown key `film.widht`; did you mean `width`? known here: \
-         `width`, `height`, `format`, `background`, `exposure`, `tone_map`",
+         `width`, `height`, `format`, `background`, `exposure`, `tone_map`, `metering`",
     );
     assert_message(
         "[time]\nbanana = 1\n",
@@ -189,7 +189,7 @@ fn overrides_that_do_not_fit_are_named() {
         (
             "film.widht=3",
             "unknown key `film.widht`; did you mean `width`? known here: `width`, `height`, \
-             `format`, `background`, `exposure`, `tone_map`",
+             `format`, `background`, `exposure`, `tone_map`, `metering`",
         ),
         ("cloud.1.seed=3", "`cloud.1` does not exist: `cloud` has 1 item, numbered from 0"),
         ("light.-1.kind=sky", "`light`: expected a number from 0 to 1, or *, found `-1`"),
@@ -233,7 +233,11 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
         json!({
             "title": "",
             "film": { "width": 800, "height": 600, "format": "rgba16f",
-            "background": [0.32, 0.52, 0.80], "exposure": 1.0, "tone_map": "neutral" },
+            "background": [0.32, 0.52, 0.80], "exposure": 1.0, "tone_map": "neutral",
+            "metering": "none" },
+            "sky": { "model": "none", "ground": "none", "turbidity": 3.0,
+            "albedo": [0.1, 0.1, 0.1], "metres_per_unit": 1.0, "exaggeration": 1.0,
+            "sea_level": 0.0, "haze": 1.0, "disc": true },
             "camera": { "position": [0.0, 0.0, 18.0], "target": [0.0, 0.0, 0.0],
             "up": [0.0, 1.0, 0.0], "fov_y_deg": 45.0, "near": 0.01 },
             "time": { "start_s": 0.0, "step_s": 0.0333, "frames": 300 },

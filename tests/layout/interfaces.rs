@@ -13,18 +13,19 @@ use nimbus::layout::particle::{
 };
 use nimbus::layout::roof;
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
+use nimbus::layout::sky::SkyRecord;
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 use nimbus::passes::{
-    blobs, chunks, contract, cull, diffusion, facets, first, generate, grid, harmonics, impostors,
-    live, lod, morton, place, present, scatter, second, sort, sprites, surfaces, terrain, texture,
-    tiles, transmit, upsample,
+    blobs, chunks, contract, cull, diffusion, facets, first, generate, grid, harmonics, haze,
+    impostors, live, lod, morton, place, present, scatter, second, sort, sprites, surfaces,
+    terrain, texture, tiles, transmit, upsample,
 };
 
 /// A host record: GLSL's name of it, its fields, its size.
 pub type Record = (&'static str, &'static [Field], usize);
 
 /// All records of the host.
-pub const RECORDS: [Record; 27] = [
+pub const RECORDS: [Record; 28] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Disc", DiscRecord::FIELDS, size_of::<DiscRecord>()),
@@ -52,6 +53,7 @@ pub const RECORDS: [Record; 27] = [
     ("Splat", SplatRecord::FIELDS, size_of::<SplatRecord>()),
     ("Round", RoundRecord::FIELDS, size_of::<RoundRecord>()),
     ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
+    ("Sky", SkyRecord::FIELDS, size_of::<SkyRecord>()),
 ];
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers.
@@ -95,6 +97,7 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, "8 4"),
     ("grid_spread.comp", grid::SpreadPush::FIELDS, "8 4"),
     ("harmonics.comp", harmonics::Push::FIELDS, "T T S"),
+    ("haze.comp", haze::Push::FIELDS, "Facet Lit Slope Sky Lit Slope"),
     ("impostors.frag", impostors::Push::FIELDS, "T"),
     ("impostors.vert", impostors::Push::FIELDS, ""),
     ("impostors_part.comp", impostors::PartPush::FIELDS, "8 4 8 8 T"),
@@ -104,7 +107,7 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("morton_key.comp", morton::KeyPush::FIELDS, "Facet RegionBounds 8"),
     ("morton_order.comp", morton::OrderPush::FIELDS, "8 4"),
     ("place.comp", place::Push::FIELDS, "T 4 Group Mode S"),
-    ("present.frag", present::Push::FIELDS, "T T"),
+    ("present.frag", present::Push::FIELDS, "T T Sky"),
     ("present.vert", &[], ""),
     ("scatter.comp", scatter::Push::FIELDS, "Facet Light 4 T F Lit Medium"),
     (

@@ -18,6 +18,7 @@ mod grid;
 mod harmonics;
 #[path = "../harness/mod.rs"]
 mod harness;
+mod haze;
 mod impostors;
 #[path = "../harness/lights.rs"]
 mod lights;

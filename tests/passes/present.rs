@@ -7,8 +7,14 @@ use glam::{DVec3, DVec4};
 use half::f16;
 use nimbus::gpu::TargetFormat;
 use nimbus::gpu::{Buffer, Compiler, Image, MemoryUsage};
+use nimbus::layout::frame::CameraRecord;
+use nimbus::layout::sky::SkyRecord;
+use nimbus::model::backdrop::Backdrop;
+use nimbus::model::camera::Pose;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
+use nimbus::model::sky::{SUN_RADIUS, Sky, SkySettings, SkyView};
 use nimbus::passes::present::{Compare, Present, Shown};
+use nimbus::reference::haze::{ROUNDING, magnitude};
 use nimbus::reference::present::{Compared, compared_values};
 
 const SIZE: [u32; 2] = [71, 49];
@@ -25,6 +31,73 @@ const OFF: f64 = 2e-3;
 fn film(format: FilmFormat, tone_map: ToneMap) -> Film {
     let background = DVec3::new(0.16, 0.30, 0.55).as_vec3().as_dvec3();
     Film { width: SIZE[0], height: SIZE[1], format, background, exposure: 1.25, tone_map }
+}
+
+/// A picture's film and the sky behind it.
+#[derive(Clone, Copy)]
+struct Set {
+    film: Film,
+    sky: Option<SkyView>,
+}
+
+/// The camera of the sky: level with the horizon, the sun to the right.
+fn pose() -> Pose {
+    let forward = DVec3::new(0.6, 0.0, -0.8);
+    Pose { position: DVec3::ZERO, right: DVec3::new(0.8, 0.0, 0.6), up: DVec3::Y, forward }
+}
+const FOV: f64 = 0.12;
+
+/// A hazy sky with its disc in the picture, over ground.
+fn sky() -> SkyView {
+    let settings = SkySettings {
+        turbidity: 4.0,
+        albedo: DVec3::splat(0.25),
+        metres_per_unit: 2.0,
+        exaggeration: 4.0,
+        sea_level: 0.0,
+        haze: 0.5,
+        has_disc: true,
+        i_ground: None,
+    };
+    let toward = DVec3::new(0.62, 0.03, -0.78).normalize().as_vec3().as_dvec3();
+    let view =
+        SkyView::new(&Sky::new(settings, toward).expect("a sky"), DVec3::Y * 8192.0, &[], &[], 0.0);
+    SkyView {
+        disc: DVec3::new(32.0, 24.0, 8.0),
+        ground: Some(DVec3::new(0.25, 0.5, 0.125)),
+        ..view
+    }
+}
+
+impl Set {
+    fn plain(film: Film) -> Set {
+        Set { film, sky: None }
+    }
+
+    fn backdrop(&self) -> Backdrop {
+        match self.sky {
+            Some(view) => Backdrop::under(self.film, view, &pose(), FOV),
+            None => self.film.into(),
+        }
+    }
+
+    /// The radiance behind a pixel, and the bound of its rounding.
+    fn behind(&self, x: usize, y: usize) -> (DVec3, DVec3) {
+        let found = self.backdrop().at(x, y);
+        let Some(view) = self.sky else { return (found, DVec3::ZERO) };
+        let tan = (0.5 * FOV).tan();
+        let [width, height] = SIZE.map(f64::from);
+        let right = (2.0 * (x as f64 + 0.5) / width - 1.0) * tan * width / height;
+        let up = (1.0 - 2.0 * (y as f64 + 0.5) / height) * tan;
+        let direction = (pose().forward + right * pose().right + up * DVec3::Y).normalize();
+        // A direction is off by some 2^-23, 3e-5 of the sun's radius; the rim is a tenth wide.
+        let near_sun = direction.cross(view.toward_sun()).length() < 1.2 * SUN_RADIUS;
+        let rim = if near_sun { 1e-3 * view.disc } else { DVec3::ZERO };
+        // In level directions the way to the ground has the error of 1/y, 1e-6/y of it. It shows by
+        // 1/e at most, and from 1e-3 down the air is opaque before the ground is reached.
+        let level = 1.0 + 1e-6 / direction.y.abs().max(1e-3) / ROUNDING;
+        (found, ROUNDING * level * (magnitude(&view, direction) + found) + rim)
+    }
 }
 
 /// Ramps over all magnitudes that show, what is beyond, and what is no number.
@@ -116,11 +189,24 @@ fn show(
     gpu: &mut Gpu,
     compiler: Option<&Compiler>,
     (from, into): (TargetFormat, TargetFormat),
-    film: &Film,
+    set: &Set,
     compare: Option<Compare>,
 ) -> Vec<u8> {
-    let pass =
-        Present::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), from, into).expect("present");
+    let Set { film, sky } = set;
+    let compiler = compiler.unwrap_or(&gpu.compiler);
+    let pass = Present::new(&gpu.device, compiler, [from, into], sky.is_some()).expect("present");
+    let tan = (0.5 * FOV).tan() as f32;
+    let pose = pose();
+    let camera = CameraRecord {
+        tan_x: tan * SIZE[0] as f32 / SIZE[1] as f32,
+        tan_y: tan,
+        right: pose.right.as_vec3().to_array(),
+        up: pose.up.as_vec3().to_array(),
+        forward: pose.forward.as_vec3().to_array(),
+        ..Default::default()
+    };
+    let sky = sky.map_or(SkyRecord::default(), |view| SkyRecord::new(&view, camera));
+    let sky = gpu.upload(&[sky]);
     let pictures = [pixels(), others()].map(|pixels| gpu.upload(&bytes_of(from, &pixels)));
     let mut window = Image::color_target(&gpu.device, "test.window", WINDOW[0], WINDOW[1], into)
         .expect("a window");
@@ -132,13 +218,17 @@ fn show(
         exposure: film.exposure as f32,
         size: SIZE,
         corner: CORNER,
-        is_neutral: film.tone_map == ToneMap::Neutral,
+        tone_map: match film.tone_map {
+            ToneMap::Neutral => 0,
+            ToneMap::Clip => 1,
+            ToneMap::Filmic => 2,
+        },
         compare,
     };
     let [a, b] = &pictures;
     let pictures = if compare.is_some() { [a, b] } else { [a, a] };
     gpu.run(|rec| {
-        pass.record(rec, pictures, &mut window, &shown)?;
+        pass.record(rec, pictures, &sky, &mut window, &shown)?;
         rec.copy_image(&mut window, &read);
         Ok(())
     });
@@ -147,12 +237,12 @@ fn show(
 
 /// The first pixel that is another than the law and rounding allow.
 fn first_wrong(
-    film: &Film,
+    set: &Set,
     from: TargetFormat,
     compared: Option<Compared>,
     codes: &[u8],
 ) -> Option<String> {
-    let (a, b) = (pixels(), others());
+    let (a, b, film) = (pixels(), others(), &set.film);
     (0..WINDOW[1] as usize).flat_map(|y| (0..WINDOW[0] as usize).map(move |x| (x, y))).find_map(
         |(x, y)| {
             let code = &codes[4 * (y * WINDOW[0] as usize + x)..][..4];
@@ -162,11 +252,19 @@ fn first_wrong(
             let (truth, off) = if is_inside {
                 let (i, j) = (i as usize, j as usize);
                 let both = [&a, &b].map(|pixels| stored(from, pixels[j * SIZE[0] as usize + i]));
-                let differing = match compared {
-                    Some(Compared::Difference(gain)) => off_by_differing(film, gain, both),
-                    _ => DVec3::ZERO,
+                let (behind, off_behind) = set.behind(i, j);
+                let film = &Film { background: behind, ..*film };
+                let gain = match compared {
+                    Some(Compared::Difference(gain)) => Some(gain),
+                    _ => None,
                 };
-                (compared_values(film, compared, i, j, both), DVec3::splat(OFF) + differing)
+                let differing = gain.map_or(DVec3::ZERO, |gain| off_by_differing(film, gain, both));
+                // 12.92 is the steepest of sRGB, and a tone map rises by 2 at most.
+                let shown = both[0].w.abs().max(both[1].w.abs()) + 1.0;
+                let of_sky =
+                    255.0 * 12.92 * 2.0 * gain.unwrap_or(1.0) * film.exposure * shown * off_behind;
+                let off = DVec3::splat(OFF) + differing + of_sky;
+                (compared_values(film, behind, compared, i, j, both), off)
             } else {
                 (DVec3::ZERO, DVec3::ZERO)
             };
@@ -192,14 +290,20 @@ const FORMATS: [(TargetFormat, FilmFormat); 3] = [
 fn windows_show_what_files_have() {
     let mut gpu = Gpu::new();
     for (from, format) in FORMATS {
-        for tone_map in [ToneMap::Neutral, ToneMap::Clip] {
-            let film = film(format, tone_map);
-            let mut codes_of = |compare, into| show(&mut gpu, None, (from, into), &film, compare);
+        for (tone_map, sky) in [
+            (ToneMap::Neutral, None),
+            (ToneMap::Clip, None),
+            (ToneMap::Filmic, None),
+            (ToneMap::Clip, Some(sky())),
+            (ToneMap::Filmic, Some(sky())),
+        ] {
+            let set = Set { film: film(format, tone_map), sky };
+            let mut codes_of = |compare, into| show(&mut gpu, None, (from, into), &set, compare);
             let codes = codes_of(None, TargetFormat::Rgba8);
             for (compare, compared) in COMPARED {
                 let codes = codes_of(compare, TargetFormat::Rgba8);
                 assert_eq!(
-                    first_wrong(&film, from, compared, &codes),
+                    first_wrong(&set, from, compared, &codes),
                     None,
                     "{format:?} {tone_map:?} {compare:?}"
                 );
@@ -219,13 +323,13 @@ fn windows_show_what_files_have() {
 #[test]
 fn wrong_windows_are_noticed() {
     let mut gpu = Gpu::new();
-    let film = film(FilmFormat::Rgba16f, ToneMap::Neutral);
+    let set = Set::plain(film(FilmFormat::Rgba16f, ToneMap::Neutral));
     let (split, apart) = (COMPARED[2], COMPARED[7]);
     for (from, to, (compare, compared)) in [
         ("push.exposure * (pixel", "(pixel", ALONE),
         ("/ 2.4", "/ 2.2", ALONE),
         ("+ dither(uvec2(at))", "+ 0.5", ALONE),
-        ("(1.0 - pixel.a) * push.background", "push.background", ALONE),
+        ("(1.0 - pixel.a) * behind", "behind", ALONE),
         ("- push.corner", "", ALONE),
         ("START_COMPRESSION = 0.8", "START_COMPRESSION = 0.9", ALONE),
         ("peak > 3e38 ? vec3(1.0) : ", "", ALONE),
@@ -240,16 +344,45 @@ fn wrong_windows_are_noticed() {
         ("push.gain * (", "(", apart),
         ("push.exposure * abs(", "abs(", apart),
         ("* abs(", "* (", apart),
-        ("d.rgb - d.a * push.background", "d.rgb", apart),
+        ("d.rgb - d.a * behind", "d.rgb", apart),
         ("mix(vec3(1.0), far, greaterThanEqual(far, vec3(0.0)))", "far", apart),
     ] {
         let wrong = Gpu::wrong_compiler("present.frag", from, to);
         let formats = (TargetFormat::Rgba16f, TargetFormat::Rgba8);
-        let codes = show(&mut gpu, Some(&wrong), formats, &film, compare);
+        let codes = show(&mut gpu, Some(&wrong), formats, &set, compare);
         assert!(
-            first_wrong(&film, TargetFormat::Rgba16f, compared, &codes).is_some(),
+            first_wrong(&set, TargetFormat::Rgba16f, compared, &codes).is_some(),
             "{to} was not noticed"
         );
+    }
+}
+
+/// Wrong skies, and a wrong curve of the film.
+#[test]
+fn wrong_skies_are_noticed() {
+    let mut gpu = Gpu::new();
+    let formats = (TargetFormat::Rgba32f, TargetFormat::Rgba8);
+    let set = Set { film: film(FilmFormat::Rgba32f, ToneMap::Filmic), sky: Some(sky()) };
+    let is_right = |codes: &[u8]| first_wrong(&set, formats.0, None, codes).is_none();
+    assert!(is_right(&show(&mut gpu, None, formats, &set, None)));
+    for (file, from, to) in [
+        ("present.frag", "0.59) + 0.14", "0.59) + 0.16"),
+        ("present.frag", "push.tone_map == FILMIC", "push.tone_map == NEUTRAL"),
+        ("present.frag", "vec2(p) + 0.5", "vec2(p)"),
+        ("present.frag", "ray.y * camera.up", "ray.y * camera.right"),
+        (
+            "include/clear_sky.glsl",
+            "taken_by(depth) * radiance_of_air(sky, direction)\n               +",
+            "",
+        ),
+        ("include/clear_sky.glsl", "(1.05 - off)", "(1.3 - off)"),
+        ("include/clear_sky.glsl", "* share_of_disc", "* 0.0 * share_of_disc"),
+        ("include/clear_sky.glsl", "haze.through * sky.ground", "sky.ground"),
+        ("include/clear_sky.glsl", "sky.unit * sky.flatness", "sky.unit"),
+        ("include/clear_sky.glsl", "depth_to_space(sky, sky.height,", "depth_to_space(sky, 0.0,"),
+    ] {
+        let wrong = Gpu::wrong_compiler(file, from, to);
+        assert!(!is_right(&show(&mut gpu, Some(&wrong), formats, &set, None)), "{to} was missed");
     }
 }
 
@@ -258,9 +391,9 @@ fn wrong_windows_are_noticed() {
 #[test]
 fn the_same_picture_twice_is_black() {
     let mut gpu = Gpu::new();
-    let film = film(FilmFormat::Rgba32f, ToneMap::Neutral);
+    let set = Set::plain(film(FilmFormat::Rgba32f, ToneMap::Neutral));
     let apart = Some(Compare::Difference { gain: 1e9 });
-    let codes = show(&mut gpu, None, (TargetFormat::Rgba32f, TargetFormat::Rgba8), &film, apart);
+    let codes = show(&mut gpu, None, (TargetFormat::Rgba32f, TargetFormat::Rgba8), &set, apart);
     let (a, b) = (pixels(), others());
     let mut n_same = 0;
     for (k, (a, b)) in

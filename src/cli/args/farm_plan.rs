@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::values::{at_least_one, limited, parse_size};
+use crate::io::image::ImageKind;
 use crate::reference::picture::{MAX_SAMPLES, ReferenceKind};
 
 /// Arguments of `nimbus farm plan`.
@@ -149,6 +150,15 @@ pub enum FormatArg {
     Png,
     /// Linear premultiplied RGBA
     Exr,
+}
+
+impl From<FormatArg> for ImageKind {
+    fn from(format: FormatArg) -> ImageKind {
+        match format {
+            FormatArg::Png => ImageKind::Png,
+            FormatArg::Exr => ImageKind::Exr,
+        }
+    }
 }
 
 /// Arguments of `nimbus farm calibrate`.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args as ClapArgs;
 
+use super::farm_plan::{FormatArg, Span, parse_span};
 use super::scene::{BudgetArgs, SceneArgs};
 use super::values::{parse_positive, parse_samples};
 use crate::reference::picture::ReferenceKind;
@@ -23,18 +24,28 @@ use crate::reference::picture::ReferenceKind;
     The picture of a device and of its reference, layer by layer:\n  \
     nimbus render scenes/hello.toml --layers -o layers.exr\n  \
     nimbus render scenes/hello.toml --layers --reference thin -o f64.exr\n\n\
+    The first frames of a scene:\n  \
+    nimbus render scenes/hello.toml --frames 0..12 -o frames\n\n\
     The second reflection of a reference is integrated over areas, which takes minutes for \
     hundreds of facets. \
     --set 'lighting.mode=\"first\"' leaves it out.")]
 pub struct RenderArgs {
     /// Scene file
     pub scene: PathBuf,
-    /// Picture: .png (tone-mapped, over the background) or .exr (linear RGBA, premultiplied)
+    /// Picture: .png (tone-mapped, over background or sky) or .exr (linear RGBA, premultiplied);
+    /// with --frames a folder of pictures, or a clip .mp4, which ffmpeg encodes
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Frame number
     #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "time")]
     pub frame: u32,
+    /// Frames to draw: FIRST..END (without END), or their number from 0
+    #[arg(long, value_name = "FIRST..END", value_parser = parse_span)]
+    #[arg(conflicts_with_all = ["frame", "time", "reference", "layers", "capture"])]
+    pub frames: Option<Span>,
+    /// Format of the pictures of --frames [default: png]
+    #[arg(long, value_enum, requires = "frames")]
+    pub format: Option<FormatArg>,
     /// Time in seconds, in place of a frame number
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub time: Option<f64>,

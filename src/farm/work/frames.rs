@@ -16,6 +16,8 @@ use crate::io::atomic;
 use crate::io::image::{ImageKind, encoded};
 use crate::io::result_folder::ResultFolder;
 use crate::io::scene_file::LoadedScene;
+use crate::model::backdrop::Backdrop;
+use crate::model::film::Film;
 use crate::model::scene::{Impostors, Scene};
 use crate::timing::machine::{Device, device_record};
 
@@ -50,7 +52,7 @@ impl Work for Frames {
     }
 
     fn outputs(&self, items: Range<u32>) -> Vec<String> {
-        items.map(|i_frame| file_name(i_frame, self.format)).collect()
+        items.map(|i_frame| self.format.frame_name(i_frame)).collect()
     }
 
     /// Refuses scenes in which a frame does not follow from its number alone.
@@ -80,26 +82,28 @@ impl Work for Frames {
         let loaded = task.loaded;
         let mut playing: Option<(Arc<Scene>, Player)> = None;
         task.make_files(
-            |i_frame| file_name(i_frame, self.format),
+            |i_frame| self.format.frame_name(i_frame),
             |i_frame| {
                 let (scene, player) = match playing.take() {
                     // A scene without phases is the same in all frames.
                     Some((scene, player))
-                        if loaded.phases.is_empty() || *scene == scene_at(loaded, i_frame) =>
+                        if loaded.phases.is_empty() || *scene == loaded.exact_at_frame(i_frame) =>
                     {
                         playing.insert((scene, player))
                     }
                     previous => {
                         // Frees the device's memory before the next phase allocates.
                         drop(previous);
-                        let scene = Arc::new(scene_at(loaded, i_frame));
+                        let scene = Arc::new(loaded.exact_at_frame(i_frame));
                         playing.insert((scene.clone(), gpu.player(scene, true)?))
                     }
                 };
                 let packet = player.game.step(i_frame)?;
                 player.renderer.step(packet)?;
-                let (rgba, film) = (player.renderer.image()?, scene.film);
-                encoded(self.format, &film, film.width, film.height, &rgba)
+                let rgba = player.renderer.image()?;
+                let backdrop = Backdrop::of(scene, scene.time.at(i_frame));
+                let Film { width, height, .. } = scene.film;
+                encoded(self.format, &backdrop, width, height, &rgba)
             },
         )?;
         drop(playing);
@@ -117,17 +121,6 @@ impl Work for Frames {
         let written = folder.finish(&names, |staged| copy_all(merge.results, staged));
         Ok(Merged { n: names.len(), summary: String::new(), written })
     }
-}
-
-/// Returns the scene of a frame with every "auto" resolved to what needs no measurement: measured
-/// choices may differ between nodes, and their pictures would, too.
-fn scene_at(loaded: &LoadedScene, i_frame: u32) -> Scene {
-    loaded.clone().at_frame(i_frame).exact().into_owned()
-}
-
-/// Returns a frame's file name. Names sort as the frames do.
-fn file_name(i_frame: u32, format: ImageKind) -> String {
-    format!("frame-{i_frame:08}.{}", format.extension())
 }
 
 /// Copies all files to a folder and verifies each copy.

@@ -15,6 +15,7 @@ use crate::io::image::{ImageKind, encoded, image_hash};
 use crate::io::input_file;
 use crate::io::result_folder::ResultFolder;
 use crate::io::scene_file::LoadedScene;
+use crate::model::backdrop::Backdrop;
 use crate::model::scene::Scene;
 use crate::reference::picture::{
     self, MAX_SAMPLES, N_VALUES, PairwiseSum, Pixels, ReferenceKind, ReferenceRequest, SampleSums,
@@ -220,7 +221,8 @@ impl Work for ReferenceWork {
         let scene = self.scene(&(merge.load)()?);
         let mean = self.total(merge.results)?.mean();
         let rgba = picture::to_f32(&mean.rgba);
-        let picture = encoded(self.format, &scene.film, self.width, self.height, &rgba)?;
+        let backdrop = Backdrop::of(&scene, scene.time.at(self.frame));
+        let picture = encoded(self.format, &backdrop, self.width, self.height, &rgba)?;
         let file = format!("reference.{}", self.format.extension());
         let manifests = || merge.results.iter().map(|result| &result.manifest);
         let nodes: BTreeSet<&str> = manifests().map(|m| m.node.as_str()).collect();

@@ -37,6 +37,7 @@ fn packet(x: f64, z: f64) -> Packet {
         modes: vec![],
         discs: vec![],
         live: None,
+        sky: None,
         placed: None,
         bounds: vec![],
         regions: vec![],

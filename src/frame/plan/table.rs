@@ -133,6 +133,10 @@ passes! {
             Tensors::TooLarge { bytes, most } => Some(Reason::TooLarge { bytes, most }),
         },
         unless |same| same.light && same.eye => "light and materials are the same";
+    /// Puts the air before the facets.
+    Haze "haze", Facets,
+        needs |f, _| unless(f.has_haze, "no air before the scene"),
+        unless |same| same.hazed => "the light is the same, nor did the eye move";
     /// Keeps the particles that can show.
     Cull "cull", Particles,
         needs |f, _| match f.has_impostors {

@@ -58,6 +58,8 @@ pub(super) struct Unchanged {
     pub diffusion: bool,
     /// Facets, lights and materials.
     pub light: bool,
+    /// Light and eye.
+    pub hazed: bool,
     drawn: bool,
     /// Particles that can show.
     pub kept: bool,
@@ -82,7 +84,8 @@ impl Unchanged {
         let same_groups = |a: &Packet, b: &Packet| a.groups == b.groups && a.modes == b.modes;
         let places =
             live && same(&|a, b| a.placed == b.placed && (b.placed.is_some() || same_groups(a, b)));
-        let colors = places && same(&|a, b| a.camera.eye == b.camera.eye);
+        let same_eye = same(&|a, b| a.camera.eye == b.camera.eye);
+        let colors = places && same_eye;
         let grid = places && same(&|a, b| a.grid == b.grid);
         let morton = places && same(&|a, b| a.bounds == b.bounds);
         let geometry = same(&|a, b| {
@@ -94,7 +97,7 @@ impl Unchanged {
             && same(&|a, b| a.groups == b.groups)
             && (morton || !features.is_grouped);
         // Without a lobe, radiance is the same in all directions.
-        let eye = !features.is_glossy || same(&|a, b| a.camera.eye == b.camera.eye);
+        let eye = !features.is_glossy || same_eye;
         let materials = same(&|a, b| {
             a.regions == b.regions && a.table == b.table && a.coefficients == b.coefficients
         });
@@ -135,6 +138,7 @@ impl Unchanged {
             rays: facets && same(&has_same_rays),
             eye,
             response,
+            hazed: light && same_eye,
             diffusion: grid && geometry && media && lights && (materials || !features.has_solids()),
             light,
             drawn,
@@ -153,6 +157,7 @@ impl Unchanged {
             (self.drawn, "other particles are drawn"),
             (self.geometry, "surfaces moved"),
             ((self.light && self.eye) || !features.is_lit, "light changed"),
+            (self.hazed || !features.has_haze, "the air between changed"),
         ];
         changes.into_iter().find(|(is_same, _)| !is_same).map(|(_, change)| change)
     }

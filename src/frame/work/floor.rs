@@ -94,6 +94,10 @@ pub fn floor(pass: Pass, of: &Amounts) -> Option<Work> {
         Pass::Contract => of
             .tensor_numbers
             .and_then(|numbers| work(numbers * NUMBER + of.facets * 2.0 * VECTOR, 6.0 * numbers)),
+        // Reads position and light, writes the light. The way through two layers of air takes an
+        // exponent and a quotient each (6), and a channel of the dome three exponents, a root and
+        // 12 more operations, and of the air 6.
+        Pass::Haze => work(of.facets * 3.0 * VECTOR, of.facets * (20.0 + 3.0 * 24.0)),
         // Reads position, σ and κ of the drawn particles, writes key and index of the kept ones.
         // Three dot products with the camera's axes.
         Pass::Cull => {

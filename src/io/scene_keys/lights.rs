@@ -9,6 +9,7 @@ use crate::io::bounds::{AMOUNT, Bounds, COORDINATE, GREATEST, GREATEST_SHARE, LE
 use crate::io::document::section::Section;
 use crate::io::document::suggest::shown;
 use crate::model::light::Light;
+use crate::model::sky::{Sky, SkySettings};
 use crate::model::weather::{steps, sun};
 
 /// Lights of a scene without any `[[light]]`: a sun from the upper right, and the sky.
@@ -23,7 +24,13 @@ irradiance = [0.8, 0.87, 1.0]
 constant = 0.55
 "#;
 
-type Reader = fn(&mut Section) -> Result<Light>;
+/// Irradiance of the sun and of the sky that a clear sky has.
+pub struct Clear {
+    sun: DVec3,
+    sky: DVec3,
+}
+
+type Reader = fn(&mut Section, Option<&Clear>) -> Result<Light>;
 
 /// A kind of light: its keys beside `kind`, and their reader.
 type LightKind = (&'static [Keys], Reader);
@@ -40,6 +47,9 @@ fn radius() -> Spec<f64> {
     number(1e-3, Bounds::Within(LEAST_LIGHT_RADIUS, GREATEST))
 }
 
+/// The key that a clear sky has a default for.
+const IRRADIANCE: &str = "irradiance";
+
 /// Range of a half angle, degrees.
 const HALF_ANGLE: Bounds = Bounds::Within(0.0, 180.0);
 
@@ -48,14 +58,23 @@ keys! {
     KIND: pub fn kind(s) -> LightKind = "kind": choice("", KINDS).required();
 }
 
-keys! { DIRECTIONAL: fn directional(s) -> Light { Light::Directional;
+/// Irradiance whose default a clear sky sets, if there is one.
+fn irradiance(clear: Option<DVec3>) -> Spec<DVec3> {
+    let spec = required_vector(AMOUNT);
+    match clear {
+        Some(default) => spec.or(default.to_array()),
+        None => spec,
+    }
+}
+
+keys! { DIRECTIONAL: fn directional(s, clear: Option<&Clear>) -> Light { Light::Directional;
     /// Direction in which the light travels.
     direction: required_vector(Bounds::Any) => |d| unit_vector(s, &d);
-    /// Linear RGB irradiance on a plane across the direction.
-    irradiance: required_vector(AMOUNT);
+    /// Linear RGB irradiance on a plane across the direction. A `[sky]` has a default for it.
+    irradiance: required_vector(AMOUNT) => |_| irradiance(clear.map(|c| c.sun)).take(s, IRRADIANCE);
 }}
 
-keys! { POINT: fn point(s) -> Light { Light::Point;
+keys! { POINT: fn point(s, _clear: Option<&Clear>) -> Light { Light::Point;
     /// Place of the light.
     position: required_vector(COORDINATE), "unit";
     /// Linear RGB power for each solid angle.
@@ -89,9 +108,9 @@ keys! { SPOT: fn spot(s, cone: Cone) -> Light { Light::Spot;
     radius: radius(), "unit";
 }}
 
-keys! { SKY: fn sky(s) -> Light { Light::Sky;
-    /// Linear RGB irradiance from above.
-    irradiance: required_vector(AMOUNT);
+keys! { SKY: fn sky(s, clear: Option<&Clear>) -> Light { Light::Sky;
+    /// Linear RGB irradiance from above. A `[sky]` has a default for it.
+    irradiance: required_vector(AMOUNT) => |_| irradiance(clear.map(|c| c.sky)).take(s, IRRADIANCE);
     /// Share of the irradiance that reaches every facet, whatever is in the way.
     constant: number(0.15, Bounds::Within(0.0, GREATEST_SHARE));
 }}
@@ -104,32 +123,61 @@ struct Sun {
     irradiance: DVec3,
 }
 
-keys! { SUN: fn sun(s) -> Sun { Sun;
+keys! { SUN: fn sun(s, clear: Option<&Clear>) -> Sun { Sun;
     /// Date and time, such as "2005-08-28 18:00:00".
     time_s ["date"]: required_text(), "UTC" => |date| time_of(s, &date);
     /// Latitude, positive to the north.
     latitude ["latitude_deg"]: number(0.0, Bounds::Within(-90.0, 90.0)), "degree";
     /// Longitude, positive to the east.
     longitude ["longitude_deg"]: number(0.0, Bounds::Within(-180.0, 360.0)), "degree";
-    /// Linear RGB irradiance on a plane across the light.
-    irradiance: required_vector(AMOUNT);
+    /// Linear RGB irradiance on a plane across the light. A `[sky]` has a default for it.
+    irradiance: required_vector(AMOUNT) => |_| irradiance(clear.map(|c| c.sun)).take(s, IRRADIANCE);
 }}
+
+/// Returns the sky of the scene's only sun.
+///
+/// # Errors
+/// There is none or there are several, or the sun is below the horizon.
+pub fn under_sky(root: &mut Section, settings: SkySettings) -> Result<Sky> {
+    let mut suns = Vec::new();
+    for s in &mut root.sections("light")? {
+        let (_, read) = kind(s)?;
+        // What the sky sets does not matter for the place of its sun.
+        let any = Some(&Clear { sun: DVec3::ZERO, sky: DVec3::ZERO });
+        if let Light::Directional { direction, .. } = read(s, any)? {
+            suns.push(-direction);
+        }
+    }
+    let [toward] = suns[..] else {
+        let n = suns.len();
+        let what = format!(
+            "a sky has the light of one sun: expected one [[light]] of kind \"sun\" or \
+             \"directional\", found {n}"
+        );
+        return Err(root.section("sky")?.fault("model", what));
+    };
+    Sky::new(settings, toward).map_err(|what| match root.section("sky") {
+        Ok(s) => s.fault("model", format!("the sky cannot be computed: {what}")),
+        Err(error) => error,
+    })
+}
 
 /// Lists the kinds of lights and the keys of each.
 pub fn kinds() -> impl Iterator<Item = (&'static str, &'static [Keys])> {
     KINDS.iter().map(|(name, (lists, _))| (*name, *lists))
 }
 
-/// Reads every `[[light]]`.
-pub fn read_lights(root: &mut Section) -> Result<Vec<Light>> {
+/// Reads every `[[light]]`. Under a clear sky, sun and sky need no `irradiance`.
+pub fn read_lights(root: &mut Section, sky: Option<&Sky>) -> Result<Vec<Light>> {
+    let clear = sky.map(|sky| Clear { sun: sky.of_sun(), sky: sky.of_sky() });
     read_tables(root, "light", |s, _| {
         let (lists, read) = kind(s)?;
         s.expect_keys(names(&[&[KIND], lists].concat()))?;
-        read(s)
+        read(s, clear.as_ref())
     })
 }
 
-fn read_spot(s: &mut Section) -> Result<Light> {
+fn read_spot(s: &mut Section, _: Option<&Clear>) -> Result<Light> {
     let cone = cone(s)?;
     let Cone { outer, inner } = cone;
     if inner <= outer {
@@ -158,8 +206,8 @@ fn time_of(s: &mut Section, date: &Spec<String>) -> Result<f64> {
 }
 
 /// Reads a sun; x is east and z south.
-fn read_sun(s: &mut Section) -> Result<Light> {
-    let Sun { time_s, latitude, longitude, irradiance } = sun(s)?;
+fn read_sun(s: &mut Section, clear: Option<&Clear>) -> Result<Light> {
+    let Sun { time_s, latitude, longitude, irradiance } = sun(s, clear)?;
     let toward = sun::toward(time_s, latitude.to_radians(), longitude.to_radians());
     if toward.y <= 0.0 {
         let below = -toward.y.asin().to_degrees();
@@ -180,6 +228,6 @@ mod tests {
     fn default_lights_are_toml() {
         let mut document = Document::parse("title = ''".to_owned(), Path::new("x.toml")).unwrap();
         document.default_to("light", DEFAULT_LIGHTS);
-        assert_eq!(read_lights(&mut Section::root(&document).unwrap()).unwrap().len(), 2);
+        assert_eq!(read_lights(&mut Section::root(&document).unwrap(), None).unwrap().len(), 2);
     }
 }

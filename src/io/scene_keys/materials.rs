@@ -104,6 +104,15 @@ keys! {
         };
 }
 
+keys! {
+    /// Name of the material of an endless plane at sea level, or "none" for no plane.
+    PLANE: pub fn plane_named(s, materials: &[Material]) -> Option<usize> =
+        "ground": text("none") => |name| match name.take(s, "ground")?.as_str() {
+            "none" => Ok(None),
+            name => number_of(s, "ground", name, materials).map(Some),
+        };
+}
+
 /// Keys of `[[material]]`.
 pub const KEYS: [Keys; 4] = [MATERIAL, SCATTERING, DROPLET, BRDF];
 /// Keys of the entries of a material's path.

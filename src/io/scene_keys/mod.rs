@@ -16,6 +16,7 @@ mod particle_count;
 mod phases;
 mod picture;
 mod right_form;
+mod sky;
 mod spec;
 mod surfaces;
 mod weather;
@@ -37,7 +38,9 @@ use super::document::section::Section;
 use super::document::tree::{Document, KeyNames, without_numbers};
 use super::scene_hash::Content;
 use crate::error::{Error, Result};
+use crate::model::film::Metering;
 use crate::model::scene::{FacetCount, Lighting, LightingMode, Scene};
+use crate::model::sky::sunlit_exposure;
 
 /// A table of a scene file and its keys.
 pub struct Table {
@@ -83,9 +86,9 @@ keys! {
 }
 
 /// Names of a scene's tables.
-const TABLES: [&str; 12] = [
+const TABLES: [&str; 13] = [
     "film", "camera", "time", "lighting", "draw", "threads", "light", "material", "surface", "air",
-    "cloud", "phase",
+    "sky", "cloud", "phase",
 ];
 
 /// Lists the tables of a scene file and their keys.
@@ -99,6 +102,7 @@ pub fn tables() -> Vec<Table> {
     tables.push(table("[draw]", &draw::KEYS));
     tables.push(table("[lighting]", &lighting::KEYS));
     tables.push(table("[air]", &air::KEYS));
+    tables.push(table("[sky]", &sky::KEYS));
     tables.push(table("[[light]]", &[lights::KIND]));
     for (kind, lists) in lights::kinds() {
         tables.push(table(&format!("[[light]] kind = \"{kind}\""), lists));
@@ -196,13 +200,18 @@ pub(super) fn read_scene(
     let s = &mut root;
     let title = title(s)?;
     let mut warnings = Vec::new();
-    let film = picture::read_film(s)?;
+    let (mut film, metering) = picture::read_film(s)?;
     let camera = picture::read_camera(s)?;
     let time = picture::read_time(s)?;
     let draw = draw::read_draw(s)?;
     let threads = picture::read_threads(s)?;
-    let lights = lights::read_lights(s)?;
     let materials = materials::read_materials(s, &mut warnings)?;
+    let sky = sky::read_sky(s, &materials)?;
+    let sky = sky.map(|settings| lights::under_sky(s, settings)).transpose()?;
+    let lights = lights::read_lights(s, sky.as_ref())?;
+    if metering == Metering::Sunlit {
+        film.exposure *= sunlit_exposure(&lights);
+    }
     let glossy = materials.iter().flat_map(|m| &m.keys).filter(|k| k.brdf.ks != DVec3::ZERO);
     let exponents: Vec<f64> = glossy.map(|k| k.brdf.ns).collect();
     let lighting = lighting::read_lighting(s, &exponents)?;
@@ -245,6 +254,7 @@ pub(super) fn read_scene(
         terrains,
         clouds,
         air,
+        sky,
     };
     // Particles are numbered in u32, on the device as in the model.
     let (n_particles, n_facets) = (scene.n_particles(), scene.n_solid_facets());

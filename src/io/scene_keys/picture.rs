@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::io::bounds::{AMOUNT, Bounds, COORDINATE, DIVISOR, GREATEST, rounded, shortest};
 use crate::io::document::section::Section;
 use crate::model::camera::{Camera, CameraKey};
-use crate::model::film::{Film, FilmFormat, ToneMap};
+use crate::model::film::{Film, FilmFormat, Metering, ToneMap};
 use crate::model::scene::{Simulate, Threading, Threads, Time};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
@@ -25,7 +25,7 @@ keys! { FILM: fn film(s) -> Film { Film;
     background: vector([0.32, 0.52, 0.80], AMOUNT);
     /// Factor on radiance before the tone map.
     exposure: number(1.0, AMOUNT);
-    /// Tone map of PNG files and of the window: Khronos PBR Neutral, or cut at 1.
+    /// Tone map of PNG files and of the window: Khronos PBR Neutral, cut at 1, or filmic.
     tone_map: choice("neutral", &ToneMap::NAMES);
 }}
 
@@ -75,7 +75,7 @@ keys! { THREADS: fn threads(s) -> Threads { Threads;
 
 /// Tables of this file and their keys.
 pub const TABLES: [(&str, &[Keys]); 5] = [
-    ("[film]", &[FILM]),
+    ("[film]", &[FILM, METERING]),
     ("[camera]", CAMERA_KEYS),
     ("[camera] path", &[WAYPOINT]),
     ("[time]", &[TIME]),
@@ -84,9 +84,15 @@ pub const TABLES: [(&str, &[Keys]); 5] = [
 
 const CAMERA_KEYS: &[Keys] = &[VIEW, CAMERA];
 
-/// Reads `[film]`.
-pub fn read_film(root: &mut Section) -> Result<Film> {
-    read_table(root, "film", &[FILM], film)
+keys! {
+    /// Light that the exposure goes by: none, or that of suns and skies, in which a white surface
+    /// across it gets 0.8 before `exposure` (model.md §19).
+    METERING: fn metering(s) -> Metering = "metering": choice("none", &Metering::NAMES);
+}
+
+/// Reads `[film]`, and what its exposure goes by.
+pub fn read_film(root: &mut Section) -> Result<(Film, Metering)> {
+    read_table(root, "film", &[FILM, METERING], |s| Ok((film(s)?, metering(s)?)))
 }
 
 /// Reads `[camera]`.

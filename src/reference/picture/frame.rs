@@ -14,6 +14,7 @@ use crate::model::medium::{MeanMedium, Medium, ScatterLaw};
 use crate::model::parallel::parallel_map;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::shade::FacetSlope;
+use crate::model::sky::SkyView;
 use crate::reference::area::adaptive::{Accuracy, Estimate};
 use crate::reference::area::{AreaScene, DiscFacet, Receiver};
 use crate::reference::facets::{Facet, FacetPlace, FacetSources};
@@ -58,6 +59,8 @@ pub struct FrameReference {
     pub indirect: Vec<DVec3>,
     /// L2 of every facet toward the eye; empty unless the lighting mode is "two-reflection".
     pub second: Vec<DVec3>,
+    /// The sky whose air lies before the facets; `None` without.
+    pub sky: Option<SkyView>,
     /// Estimated error of `second`, greatest channel.
     pub second_error: Vec<f64>,
     /// Greatest of three channels of Σ A |L1 − L1'| / Σ A L1 over the facets of ground and clouds,
@@ -145,6 +148,7 @@ impl FrameReference {
         reference::place::add_gusts(&mut placed, &positions, &groups, &scene.clouds, time_s);
         let blobs = reference::place::blobs(&generated, &placed);
         Ok(FrameReference {
+            sky: scene.sky_view(state.pose.position, time_s).filter(|_| scene.has_haze()),
             colors: colors(scene, &blobs, state.pose.position - state.light_origin),
             state,
             groups,

@@ -10,9 +10,20 @@ use crate::reference::sprites::CellLight;
 use crate::reference::{self, Blob};
 
 impl FrameReference {
-    /// Returns L1 + L2 of facet `i` toward the eye.
+    /// Returns L1 + L2 of facet `i` toward the eye, and behind the air where the scene has some.
     pub fn facet_radiance(&self, i: usize) -> DVec3 {
-        self.radiance[i] + self.second.get(i).copied().unwrap_or(DVec3::ZERO)
+        self.seen_facet(i).0
+    }
+
+    /// Returns the radiance of facet `i` as it is seen, and the factor of its change that the air
+    /// makes.
+    fn seen_facet(&self, i: usize) -> (DVec3, f64) {
+        let radiance = self.radiance[i] + self.second.get(i).copied().unwrap_or(DVec3::ZERO);
+        let eye = self.state.pose.position - self.state.light_origin;
+        match &self.sky {
+            Some(view) => reference::haze::seen(view, self.facets[i].position - eye, radiance),
+            None => (radiance, 1.0),
+        }
     }
 
     /// Returns the radiance that every particle is drawn with: that of its facet, or its own
@@ -40,6 +51,7 @@ impl FrameReference {
         }
         let shade = |(blob, i): (&Blob, u32)| {
             let FacetSlope { relative, position } = self.slopes[i as usize];
+            let relative = self.seen_facet(i as usize).1 * relative;
             let is_apart = scene.groups_facets() || scene.draw.lod > 0.0;
             let apart = if is_apart { blob.position - position } else { DVec3::ZERO };
             Shade::new(relative, apart, blob.sigma, &blob.shape)

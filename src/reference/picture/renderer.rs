@@ -33,6 +33,13 @@ impl ReferenceKind {
         if self == ReferenceKind::Transport {
             check_transport(scene)?;
         }
+        let has_air = !matches!(self.blob_model(), BlobModel::AsDrawn) && self != Self::Volume;
+        if has_air && scene.has_haze() {
+            return Err(Error::usage(format!(
+                "{self}: this reference has no air between eye and scene; expected --set \
+                 sky.haze=0, or one of thin, slices and volume"
+            )));
+        }
         Ok(())
     }
 

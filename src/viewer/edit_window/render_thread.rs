@@ -244,7 +244,7 @@ impl EditRenderer {
 
     fn activate(&self, state: &DrawState) -> Result<ActiveDocument> {
         let player = self.target.gpu.player(self.scene(state), true)?;
-        let draw = self.target.picture_draw(&player.renderer, &player.scene.film)?;
+        let draw = self.target.picture_draw(&player.renderer, &player.scene)?;
         let draw = draw.ok_or_else(|| Error::usage("the window has no visible area"))?;
         let scene = PosedPlayer::new(player, state.pose);
         let (document, picture) = (state.document.clone(), state.picture);

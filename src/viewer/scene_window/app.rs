@@ -149,8 +149,8 @@ impl ApplicationHandler<RenderEvent> for App {
             }
             RenderEvent::Message(text) => self.tell(&text),
             RenderEvent::Note(text) => self.print(&text),
-            RenderEvent::Capture { format, film, rgba } => {
-                let saved = self.captures.save_picture(format, &film, &rgba);
+            RenderEvent::Capture { format, backdrop, rgba } => {
+                let saved = self.captures.save_picture(format, &backdrop, &rgba);
                 self.tell_saved(saved);
             }
             RenderEvent::Readback(readback) => {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf, absolute};
 use crate::error::Result;
 use crate::io::atomic::{make_folder, write_synced};
 use crate::io::image::{self, ImageKind};
-use crate::model::film::Film;
+use crate::model::backdrop::Backdrop;
 use crate::viewer::free_path::write_free;
 
 /// The folder that files are saved to, and the beginning of their names.
@@ -25,8 +25,8 @@ impl Captures {
     ///
     /// # Errors
     /// The folder cannot be made, or the file cannot be written.
-    pub fn save_picture(&self, kind: ImageKind, film: &Film, rgba: &[f32]) -> Result<PathBuf> {
-        let bytes = image::encoded(kind, film, film.width, film.height, rgba)?;
+    pub fn save_picture(&self, kind: ImageKind, shown: &Backdrop, rgba: &[f32]) -> Result<PathBuf> {
+        let bytes = image::encoded(kind, shown, shown.film.width, shown.film.height, rgba)?;
         let extension = match kind {
             ImageKind::Png => "png",
             ImageKind::Exr => "exr",

@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::frame::{Counts, FrameTimes, Game, Renderer, parallel, serial};
 use crate::gpu::{Captured, Shown};
 use crate::measure::stats::Summary;
+use crate::model::backdrop::Backdrop;
 use crate::model::scene::{Scene, Threading};
 use crate::viewer::fly_camera::FlyCamera;
 use crate::viewer::posed_player::PosedPlayer;
@@ -217,7 +218,12 @@ impl FrameLoop<'_> {
         let (version, film) = (self.begun.version, self.scene.film);
         let (capture, wants_readback) = lock(&self.links.state).take_readbacks(version);
         if let Some(format) = capture {
-            self.links.send(RenderEvent::Capture { format, film, rgba: renderer.image()? });
+            let time_s = self.scene.time.at(i_frame);
+            let backdrop = Box::new(match camera {
+                Some(camera) => Backdrop::seen(self.scene, &camera.pose(), time_s),
+                None => Backdrop::of(self.scene, time_s),
+            });
+            self.links.send(RenderEvent::Capture { format, backdrop, rgba: renderer.image()? });
         }
         if let (true, Some(camera)) = (wants_readback, camera) {
             let b = self.variant.as_mut().map(|variant| variant.player.renderer.image());

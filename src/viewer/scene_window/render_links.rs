@@ -8,6 +8,7 @@ use winit::event_loop::EventLoopProxy;
 use super::status::SharedStatus;
 use super::view_state::ViewState;
 use crate::io::image::ImageKind;
+use crate::model::backdrop::Backdrop;
 use crate::model::film::Film;
 use crate::viewer::egui_layer::SharedWidgets;
 use crate::viewer::fly_camera::FlyCamera;
@@ -23,7 +24,7 @@ pub enum RenderEvent {
     /// A message for the terminal alone.
     Note(String),
     /// A picture to save: premultiplied linear RGBA, rows from the top.
-    Capture { format: ImageKind, film: Film, rgba: Vec<f32> },
+    Capture { format: ImageKind, backdrop: Box<Backdrop>, rgba: Vec<f32> },
     /// Pictures that the error measurement has asked for.
     Readback(Readback),
     /// The status has a new error.

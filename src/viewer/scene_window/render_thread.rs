@@ -243,7 +243,7 @@ impl SceneRenderer {
             Ok(PosedPlayer::new(player, state.camera.pose()))
         });
         let variant = variant.transpose()?;
-        let draw = self.target.picture_draw(&player.renderer, &player.scene.film)?;
+        let draw = self.target.picture_draw(&player.renderer, &player.scene)?;
         Ok(draw.map(|draw| ActiveScene { draw, player, variant }))
     }
 

@@ -1,0 +1,110 @@
+// The clear sky, and the air before things of the scene (model.md §19, src/model/sky/). Needs
+// records.glsl.
+
+// Least sine of an elevation: below it the air to space is opaque.
+const float LEAST_UP = 1e-6;
+// A smaller step along the height is taken as level.
+const float LEAST_STEP = 1e-3;
+
+// Returns the angle between unit vectors whose cosine is `cosine`, to 1e-7 (Abramowitz and Stegun,
+// 4.4.46). GLSL's atan may be off by 5e-4 of its value.
+float angle_between(vec3 a, vec3 b, float cosine) {
+    const float PI = 3.14159265359, SQRT_HALF = 0.70710678119;
+    float x = min(abs(cosine), 1.0);
+    // sqrt(1 - x), without the difference of near numbers.
+    float root = SQRT_HALF * length(cosine < 0.0 ? a + b : a - b);
+    float high = ((0.0308918810 - x * (0.0170881256 - x * (0.0066700901 - x * 0.0012624911))) * x
+                  - 0.0501743046) * x + 0.0889789874;
+    float angle = root * ((high * x - 0.2145988016) * x + 1.5707963050);
+    return cosine < 0.0 ? PI - angle : angle;
+}
+
+// Returns the radiance of the dome from a unit direction (Hosek and Wilkie 2012, eq. 8). Below the
+// horizon the height counts as above it.
+vec3 dome_radiance(Sky sky, vec3 direction) {
+    float cos_sun = dot(direction, sky.toward_sun);
+    float from_sun = angle_between(direction, sky.toward_sun, cos_sun);
+    float up = abs(direction.y);
+    float square = cos_sun * cos_sun;
+    // 1 + i^2 - 2 i cos, without the difference of near numbers close to the sun.
+    vec3 chord = direction - sky.toward_sun;
+    vec3 around = (1.0 - sky.i) * (1.0 - sky.i) + sky.i * dot(chord, chord);
+    vec3 halo = (1.0 + square) / (around * sqrt(around));
+    vec3 of_height = 1.0 + sky.a * exp(sky.b / (up + 0.01));
+    vec3 of_sun = sky.c + sky.d * exp(sky.e * from_sun) + sky.f * square + sky.g * halo
+                  + sky.h * sqrt(up);
+    return max(sky.scale * of_height * of_sun, 0.0);
+}
+
+// Returns the share of light that air of an optical depth takes. Below 1e-2 it is the series, whose
+// next term is 4e-10 of it.
+vec3 taken_by(vec3 depth) {
+    vec3 small = depth * (1.0 - depth * (0.5 - depth * (1.0 / 6.0 - depth / 24.0)));
+    return mix(1.0 - exp(-depth), small, lessThan(depth, vec3(1e-2)));
+}
+
+// Returns the optical depth from a height to space.
+vec3 depth_to_space(Sky sky, float height, float up) {
+    float low = max(height, 0.0);
+    vec3 all = sky.molecules * exp(-low * sky.inv_molecules)
+               + sky.aerosol * exp(-low * sky.inv_aerosol);
+    return all / max(up, LEAST_UP);
+}
+
+// Returns the mean of e^(-h/H) between two heights.
+float mean_density(float low, float high, float inverse) {
+    float x = (high - low) * inverse;
+    float mean = x > LEAST_STEP ? (1.0 - exp(-x)) / x : 1.0 - 0.5 * x;
+    return exp(-low * inverse) * mean;
+}
+
+// Returns the optical depth of a straight way from one height to another.
+vec3 depth_between(Sky sky, float from, float to, float way) {
+    float low = max(min(from, to), 0.0), high = max(max(from, to), 0.0);
+    return way
+           * (sky.molecules * (sky.inv_molecules * mean_density(low, high, sky.inv_molecules))
+              + sky.aerosol * (sky.inv_aerosol * mean_density(low, high, sky.inv_aerosol)));
+}
+
+// Returns the radiance of opaque air in a unit direction.
+vec3 radiance_of_air(Sky sky, vec3 direction) {
+    return dome_radiance(sky, direction) / taken_by(depth_to_space(sky, 0.0, abs(direction.y)));
+}
+
+struct Haze {
+    vec3 through;
+    vec3 added;
+};
+
+// Returns the air before a place at `offset` from the eye.
+Haze haze_before(Sky sky, vec3 offset) {
+    float far = length(offset);
+    if (!(far > 0.0)) {
+        return Haze(vec3(1.0), vec3(0.0));
+    }
+    vec3 way = offset * (sky.unit * vec3(1.0, sky.flatness, 1.0));
+    vec3 depth = sky.haze * depth_between(sky, sky.height, sky.height + way.y, length(way));
+    vec3 taken = taken_by(depth);
+    return Haze(1.0 - taken, taken * radiance_of_air(sky, offset / far));
+}
+
+// Returns the share of the sun's disc that a direction sees.
+float share_of_disc(Sky sky, vec3 direction) {
+    float off = length(cross(direction, sky.toward_sun)) * sky.inv_sun;
+    return dot(direction, sky.toward_sun) < 0.0 ? 0.0 : clamp((1.05 - off) * 10.0, 0.0, 1.0);
+}
+
+// Returns the radiance behind everything, in a unit direction.
+vec3 sky_behind(Sky sky, vec3 direction) {
+    if (direction.y >= 0.0) {
+        vec3 depth = depth_to_space(sky, sky.height, direction.y);
+        return taken_by(depth) * radiance_of_air(sky, direction)
+               + sky.disc * share_of_disc(sky, direction);
+    }
+    if (sky.has_ground == 0u || !(sky.height > 0.0)) {
+        return radiance_of_air(sky, direction);
+    }
+    float height = sky.height / (sky.unit * sky.flatness);
+    Haze haze = haze_before(sky, direction * (height / -direction.y));
+    return haze.through * sky.ground + haze.added;
+}

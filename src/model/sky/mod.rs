@@ -1,0 +1,264 @@
+//! A clear sky: what is seen behind the clouds, the light that it gives, and the air before them
+//! (model.md §19).
+//!
+//! Energies are photometric: an irradiance of 1 is 10⁵/π lx, so that a white surface in 100 klx,
+//! full sunlight, has the radiance 1.
+
+mod air;
+mod dome;
+mod sunlight;
+mod units;
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+
+use air::ClearAir;
+pub use air::{LEAST_UP, SCALE_HEIGHTS_M};
+use dome::Dome;
+pub use dome::N_COEFFICIENTS;
+use sunlight::sunlight;
+pub use units::{UNIT_LX, luminance};
+
+use super::light::{Light, UP};
+use super::material::Material;
+use super::named::named;
+
+/// Angular radius of the sun, radians.
+pub const SUN_RADIUS: f64 = 4.65e-3;
+/// Greatest radiance of the sun's disc. Half floats keep a picture's transmittance to 2⁻¹²; a
+/// brighter disc would show through opaque clouds.
+const GREATEST_DISC: f64 = 32.0;
+
+named! {
+    /// Law of a sky's light.
+    pub enum SkyModel {
+        /// The film's background.
+        None = "none",
+        /// Hošek and Wilkie 2012.
+        HosekWilkie = "hosek-wilkie",
+    }
+}
+
+/// Returns the exposure at which a white surface across the light of all suns, in that of the
+/// skies, has a luminance of 0.8; 1 without such light.
+pub fn sunlit_exposure(lights: &[Light]) -> f64 {
+    const SHOWN: f64 = 0.8;
+    let is_far = |light: &&Light| light.is_sky() || matches!(light, Light::Directional { .. });
+    let all = luminance(lights.iter().filter(is_far).map(Light::energy).sum());
+    if all > 0.0 { SHOWN * PI / all } else { 1.0 }
+}
+
+/// What a scene says of its sky.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SkySettings {
+    /// Optical depth of all air over that of its molecules: 1 to 10.
+    pub turbidity: f64,
+    /// Albedo of the ground that lights the sky, linear RGB.
+    pub albedo: DVec3,
+    /// Length of a scene unit, m.
+    pub metres_per_unit: f64,
+    /// Factor of the scene's heights.
+    pub exaggeration: f64,
+    /// Height of the sea level, scene units.
+    pub sea_level: f64,
+    /// Factor of the air's depth before things of the scene.
+    pub haze: f64,
+    /// Whether the sun's disc is drawn.
+    pub has_disc: bool,
+    /// Material of the plane at sea level.
+    pub i_ground: Option<usize>,
+}
+
+/// A clear sky.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sky {
+    settings: SkySettings,
+    dome: Dome,
+    air: ClearAir,
+    /// Irradiance of the sky on a level plane.
+    irradiance: DVec3,
+}
+
+impl Sky {
+    /// Returns the sky of a sun.
+    ///
+    /// # Errors
+    /// The sun is below the horizon, or a setting is out of its range.
+    pub fn new(settings: SkySettings, toward_sun: DVec3) -> Result<Sky, String> {
+        let dome = Dome::new(toward_sun, settings.turbidity, settings.albedo)?;
+        Ok(Sky {
+            settings,
+            dome,
+            air: ClearAir::new(settings.turbidity),
+            irradiance: level_irradiance(&dome),
+        })
+    }
+
+    /// Returns the sun's irradiance across its light at sea level, linear RGB.
+    pub fn of_sun(&self) -> DVec3 {
+        sunlight(self.dome.toward_sun.y, self.settings.turbidity)
+    }
+
+    /// Returns the sky's irradiance on a level plane, linear RGB.
+    pub fn of_sky(&self) -> DVec3 {
+        self.irradiance
+    }
+
+    /// Returns the share of light that all air over the sea takes, in a direction whose sine of
+    /// elevation is `up`.
+    pub fn taken_from_sea(&self, up: f64) -> DVec3 {
+        taken(self.air.toward_space(0.0, up))
+    }
+
+    /// Returns the settings.
+    pub fn settings(&self) -> &SkySettings {
+        &self.settings
+    }
+}
+
+/// Points of a quadrature along the azimuth and the height.
+const N_AZIMUTHS: u32 = 64;
+const N_HEIGHTS: u32 = 128;
+
+fn azimuth(k: u32) -> (f64, f64) {
+    ((f64::from(k) + 0.5) * TAU / f64::from(N_AZIMUTHS)).sin_cos()
+}
+
+/// Returns ∫ L n·up over the upper half of the directions.
+fn level_irradiance(dome: &Dome) -> DVec3 {
+    let at = |(i, k): (u32, u32)| {
+        // Uniform in the square of the sine of the elevation, of which π du is the projected angle.
+        let square = (f64::from(i) + 0.5) / f64::from(N_HEIGHTS);
+        let (up, across) = (square.sqrt(), (1.0 - square).sqrt());
+        let (sin, cos) = azimuth(k);
+        dome.radiance(DVec3::new(across * cos, up, across * sin))
+    };
+    let all = (0..N_HEIGHTS).flat_map(|i| (0..N_AZIMUTHS).map(move |k| (i, k)));
+    all.map(at).sum::<DVec3>() * (PI / f64::from(N_HEIGHTS * N_AZIMUTHS))
+}
+
+/// Returns the share of light that air of an optical depth takes.
+fn taken(depth: DVec3) -> DVec3 {
+    depth.map(|depth| -(-depth).exp_m1())
+}
+
+/// The air between the eye and a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Haze {
+    /// Share of the light that comes through.
+    pub through: DVec3,
+    /// Radiance that the air adds.
+    pub added: DVec3,
+}
+
+impl Haze {
+    /// Returns what is seen of a radiance.
+    pub fn over(&self, radiance: DVec3) -> DVec3 {
+        self.through * radiance + self.added
+    }
+}
+
+/// A sky as an eye sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SkyView {
+    /// The sky.
+    pub sky: Sky,
+    /// Height of the eye over the sea, m.
+    pub height_m: f64,
+    /// Radiance of the sun's disc; 0 without.
+    pub disc: DVec3,
+    /// Radiance of the plane at sea level; `None` without.
+    pub ground: Option<DVec3>,
+}
+
+impl SkyView {
+    /// Returns the view from `eye` with the scene's lights and materials.
+    pub fn new(
+        sky: &Sky,
+        eye: DVec3,
+        lights: &[Light],
+        materials: &[Material],
+        time_s: f64,
+    ) -> SkyView {
+        let SkySettings { metres_per_unit, exaggeration, sea_level, .. } = sky.settings;
+        let suns = lights.iter().filter(|light| matches!(light, Light::Directional { .. }));
+        let sun: DVec3 = suns.map(Light::energy).sum();
+        let disc = sun / (PI * SUN_RADIUS.sin().powi(2));
+        let dimmed = disc * (GREATEST_DISC / disc.max_element().max(GREATEST_DISC));
+        // The law of a facet that faces up (model.md §7), with nothing in the way.
+        let level = |light: &Light| light.share(UP, &light.arrival(DVec3::ZERO), 1.0);
+        let far = |light: &&Light| light.is_sky() || matches!(light, Light::Directional { .. });
+        let on_ground: DVec3 = lights.iter().filter(far).map(|l| l.energy() * level(l)).sum();
+        let ground = |i: usize| materials[i].at(time_s).kd * on_ground / PI;
+        SkyView {
+            sky: *sky,
+            height_m: (eye.y - sea_level) * metres_per_unit / exaggeration,
+            disc: if sky.settings.has_disc { dimmed } else { DVec3::ZERO },
+            ground: sky.settings.i_ground.map(ground),
+        }
+    }
+
+    /// Returns the dome's coefficients by channel.
+    pub fn coefficients(&self) -> [DVec3; N_COEFFICIENTS] {
+        self.sky.dome.coefficients
+    }
+
+    /// Returns the factor of the dome.
+    pub fn scale(&self) -> DVec3 {
+        self.sky.dome.scale
+    }
+
+    /// Returns the unit vector toward the sun.
+    pub fn toward_sun(&self) -> DVec3 {
+        self.sky.dome.toward_sun
+    }
+
+    /// Returns the vertical optical depths of molecules and aerosol.
+    pub fn vertical_depths(&self) -> [DVec3; 2] {
+        self.sky.air.vertical
+    }
+
+    /// Returns the radiance that opaque air has in a unit direction: the sky's over the share of
+    /// light that its air takes. Down, air is seen as high up as above the horizon.
+    fn of_air(&self, direction: DVec3) -> DVec3 {
+        self.sky.dome.radiance(direction) / self.sky.taken_from_sea(direction.y.abs())
+    }
+
+    /// Returns the air before a place at `offset` from the eye, scene units.
+    pub fn before(&self, offset: DVec3) -> Haze {
+        let SkySettings { metres_per_unit, exaggeration, haze, .. } = self.sky.settings;
+        let Some(direction) = offset.try_normalize() else {
+            return Haze { through: DVec3::ONE, added: DVec3::ZERO };
+        };
+        let true_offset = offset * metres_per_unit / DVec3::new(1.0, exaggeration, 1.0);
+        let to_m = self.height_m + true_offset.y;
+        let depth = haze * self.sky.air.between(self.height_m, to_m, true_offset.length());
+        let taken = taken(depth);
+        Haze { through: 1.0 - taken, added: taken * self.of_air(direction) }
+    }
+
+    /// Returns the radiance behind everything, in a unit direction.
+    pub fn behind(&self, direction: DVec3) -> DVec3 {
+        let of_air = self.of_air(direction);
+        if direction.y >= 0.0 {
+            let depth = self.sky.air.toward_space(self.height_m, direction.y);
+            return taken(depth) * of_air + self.disc * self.share_of_disc(direction);
+        }
+        let Some(ground) = self.ground.filter(|_| self.height_m > 0.0) else { return of_air };
+        let SkySettings { metres_per_unit, exaggeration, .. } = self.sky.settings;
+        let height = self.height_m * exaggeration / metres_per_unit;
+        self.before(direction * (height / -direction.y)).over(ground)
+    }
+
+    /// Returns the share of the sun's disc that a direction sees. Its rim is a tenth of its radius
+    /// wide.
+    fn share_of_disc(&self, direction: DVec3) -> f64 {
+        let sun = self.sky.dome.toward_sun;
+        let off = direction.cross(sun).length() / SUN_RADIUS;
+        if direction.dot(sun) < 0.0 { 0.0 } else { ((1.05 - off) / 0.1).clamp(0.0, 1.0) }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,116 @@
+use super::*;
+
+fn settings() -> SkySettings {
+    SkySettings {
+        turbidity: 3.0,
+        albedo: DVec3::splat(0.1),
+        metres_per_unit: 1.0,
+        exaggeration: 1.0,
+        sea_level: 0.0,
+        haze: 1.0,
+        has_disc: true,
+        i_ground: None,
+    }
+}
+
+fn toward(elevation: f64) -> DVec3 {
+    let (sin, cos) = elevation.to_radians().sin_cos();
+    DVec3::new(cos, sin, 0.0)
+}
+
+fn view(elevation: f64, settings: SkySettings, eye: DVec3) -> SkyView {
+    let sky = Sky::new(settings, toward(elevation)).unwrap();
+    let sun = Light::Directional { direction: -toward(elevation), irradiance: sky.of_sun() };
+    SkyView::new(&sky, eye, &[sun], &[], 0.0)
+}
+
+#[test]
+fn a_clear_sky_gives_the_light_that_is_measured() {
+    // A clear sky gives 5 to 20 klx beside the sun, and the sun several times as much.
+    for elevation in [20.0, 40.0, 60.0] {
+        let sky = Sky::new(settings(), toward(elevation)).unwrap();
+        let (of_sky, of_sun) = (luminance(sky.of_sky()), luminance(sky.of_sun()));
+        assert!((5e3..20e3).contains(&(UNIT_LX * of_sky)), "{}", UNIT_LX * of_sky);
+        assert!((3.0..20.0).contains(&(of_sun / of_sky)), "{of_sun} {of_sky}");
+        // It is blue, and the sun is not.
+        assert!(sky.of_sky().z > 1.3 * sky.of_sky().x && sky.of_sun().z < sky.of_sun().x);
+    }
+}
+
+#[test]
+fn a_far_thing_takes_the_colour_of_the_sky_behind_it() {
+    let view = view(30.0, SkySettings { ..settings() }, DVec3::new(0.0, 2000.0, 0.0));
+    for direction in [DVec3::new(0.3, 0.05, 0.9), DVec3::new(-1.0, 0.4, 0.1), DVec3::X] {
+        let direction = direction.normalize();
+        let far = view.before(direction * 1e7);
+        let behind = view.behind(direction);
+        // What comes through of the far thing is what comes through from space.
+        let through = (-view.sky.air.toward_space(2000.0, direction.y)).map(f64::exp);
+        assert!((far.through - through).abs().max_element() < 1e-6, "{far:?} {through}");
+        assert!((far.added - behind).abs().max_element() < 1e-6, "{far:?} {behind}");
+    }
+}
+
+#[test]
+fn the_air_before_two_things_adds_up() {
+    // Behind a nearer thing of transmittance 1 the farther one is seen through both parts.
+    let view = view(50.0, settings(), DVec3::new(0.0, 500.0, 0.0));
+    let offset = DVec3::new(20e3, 3e3, -4e3);
+    let (near, far) = (view.before(0.4 * offset), view.before(offset));
+    let there = SkyView { height_m: 500.0 + 0.4 * 3e3, ..view };
+    let rest = there.before(0.6 * offset);
+    assert!((near.over(rest.over(DVec3::ONE)) - far.over(DVec3::ONE)).length() < 1e-12);
+}
+
+#[test]
+fn the_horizon_has_no_seam() {
+    for height in [1.0, 1e3, 12e3, 30e3] {
+        let eye = DVec3::new(0.0, height, 0.0);
+        let view = SkyView { ground: Some(DVec3::ZERO), ..view(25.0, settings(), eye) };
+        let (above, below) = (DVec3::new(0.6, 1e-7, 0.8), DVec3::new(0.6, -1e-7, 0.8));
+        let off = view.behind(above) - view.behind(below);
+        assert!(off.abs().max_element() < 1e-3, "{height}: {off}");
+    }
+}
+
+#[test]
+fn less_air_is_darker_and_no_direction_is_special() {
+    let at = |height| view(45.0, settings(), DVec3::new(0.0, height, 0.0));
+    let zenith = |height| luminance(at(height).behind(DVec3::Y));
+    assert!(zenith(0.0) > zenith(5e3) && zenith(5e3) > 10.0 * zenith(60e3));
+    let view = at(1e3);
+    for direction in [DVec3::Y, -DVec3::Y, DVec3::X, DVec3::new(1e-9, -1.0, 0.0).normalize()] {
+        let before = view.before(1e4 * direction);
+        assert!(view.behind(direction).is_finite() && before.added.is_finite());
+    }
+    // Straight down there is no azimuth.
+    let down = |x: f64, z: f64| view.of_air(DVec3::new(x, -1.0, z).normalize());
+    assert!((down(1e-6, 0.0) - down(-1e-6, 0.0)).length() < 1e-5);
+    assert_eq!(view.before(DVec3::ZERO), Haze { through: DVec3::ONE, added: DVec3::ZERO });
+}
+
+#[test]
+fn the_disc_is_where_the_sun_is() {
+    let view = view(30.0, settings(), DVec3::ZERO);
+    let off = |radii: f64| {
+        let angle = 30f64.to_radians() + radii * SUN_RADIUS;
+        luminance(view.behind(DVec3::new(angle.cos(), angle.sin(), 0.0)))
+    };
+    assert!(off(0.0) > 20.0 && off(0.9) > 20.0 && off(1.2) < 2.0);
+    let dark = SkyView { disc: DVec3::ZERO, ..view };
+    assert!(
+        (view.behind(-DVec3::X + DVec3::Y) - dark.behind(-DVec3::X + DVec3::Y)).length() == 0.0
+    );
+}
+
+#[test]
+fn exaggerated_heights_count_as_they_are() {
+    let tall = SkySettings { exaggeration: 6.0, metres_per_unit: 10.0, ..settings() };
+    let (flat, tall) = (
+        view(30.0, settings(), DVec3::new(0.0, 600.0, 0.0)),
+        view(30.0, tall, DVec3::new(0.0, 360.0, 0.0)),
+    );
+    assert_eq!(flat.height_m, tall.height_m);
+    let (a, b) = (flat.before(DVec3::new(9e3, 1e3, 0.0)), tall.before(DVec3::new(9e2, 6e2, 0.0)));
+    assert!((a.through - b.through).abs().max_element() < 1e-12);
+}

@@ -1,0 +1,199 @@
+//! The pass haze against its f64 reference: whole buffers, every radiance at its own bound.
+
+use crate::harness::{Gpu, assert_within_and_say, check_within};
+use glam::DVec3;
+use nimbus::gpu::Compiler;
+use nimbus::layout::facet::{FacetRecord, LitRecord, SlopeRecord};
+use nimbus::layout::frame::CameraRecord;
+use nimbus::layout::sky::SkyRecord;
+use nimbus::model::philox::philox4x32_10;
+use nimbus::model::sky::{Sky, SkySettings, SkyView};
+use nimbus::passes::haze::{HazeBuffers, HazePass};
+use nimbus::reference::haze::{rounding, seen};
+
+const N: usize = 3000;
+const EYE: [f32; 3] = [250.0, -40.5, 1e3];
+
+/// Returns numbers from −1 to 1.
+fn some(i: u32, k: u32) -> [f32; 4] {
+    philox4x32_10([3, 4], [i, k, 0, 0]).map(|word| word as f32 / (1u64 << 31) as f32 - 1.0)
+}
+
+/// Views whose numbers are those of their records: from the ground into a low sun, and from high up
+/// over exaggerated heights in other units.
+fn views() -> [SkyView; 2] {
+    let low = SkySettings {
+        turbidity: 2.0,
+        albedo: DVec3::new(0.1, 0.2, 0.5),
+        metres_per_unit: 1.0,
+        exaggeration: 1.0,
+        sea_level: 0.0,
+        haze: 1.0,
+        has_disc: true,
+        i_ground: None,
+    };
+    let high = SkySettings {
+        turbidity: 6.5,
+        metres_per_unit: 12.5,
+        exaggeration: 4.0,
+        haze: 0.25,
+        sea_level: -96.0,
+        ..low
+    };
+    let view = |settings: SkySettings, toward: DVec3, height: f64| {
+        let toward = toward.normalize().as_vec3().as_dvec3();
+        let sky = Sky::new(settings, toward).expect("a sky");
+        let eye = DVec3::Y * (settings.sea_level + height);
+        SkyView::new(&sky, eye, &[], &[], 0.0)
+    };
+    [view(low, DVec3::new(0.8, 0.05, -0.6), 2.0), view(high, DVec3::new(-0.3, 0.9, 0.2), 4096.0)]
+}
+
+fn facet(i: u32) -> FacetRecord {
+    let [x, y, z, size] = some(i, 0);
+    let far = 10f32.powf(2.5 + 2.5 * size);
+    let offset = match i {
+        // At the eye, straight up and down, and level.
+        0 => [0.0; 3],
+        1 => [0.0, 500.0, 0.0],
+        2 => [0.0, -500.0, 0.0],
+        3 => [7e3, 0.0, -2e3],
+        _ => [x, y, z].map(|v| far * v),
+    };
+    FacetRecord { position: [0, 1, 2].map(|k| EYE[k] + offset[k]), ..Default::default() }
+}
+
+fn lit(i: u32) -> LitRecord {
+    let color = |k: u32| some(i, k).map(|v| 0.5 + 0.5 * v);
+    let [r, g, b, _] = color(1);
+    let [r2, g2, b2, bright] = color(2);
+    LitRecord {
+        direct: [7.0; 3],
+        first: [r, g, b].map(|v| 4.0 * bright * v),
+        second: if i.is_multiple_of(3) { [0.0; 3] } else { [r2, g2, b2] },
+        unresolved: 5.0,
+        ..Default::default()
+    }
+}
+
+fn slope(i: u32) -> SlopeRecord {
+    let [x, y, z, _] = some(i, 3);
+    SlopeRecord { relative: [x, y, z], position: facet(i).position, ..Default::default() }
+}
+
+/// Returns light and slopes after the pass.
+fn run(
+    gpu: &mut Gpu,
+    compiler: Option<&Compiler>,
+    view: &SkyView,
+    has_slopes: bool,
+) -> (Vec<LitRecord>, Vec<SlopeRecord>) {
+    let pass = HazePass::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), has_slopes)
+        .expect("the pass");
+    let all = || 0..N as u32;
+    let facets = gpu.upload(&all().map(facet).collect::<Vec<_>>());
+    let light = gpu.upload(&all().map(lit).collect::<Vec<_>>());
+    let slopes = gpu.upload(&all().map(slope).collect::<Vec<_>>());
+    let camera = CameraRecord { eye: EYE, ..Default::default() };
+    let sky = gpu.upload(&[SkyRecord::new(view, camera)]);
+    let hazed = gpu.upload(&vec![LitRecord { second: [9.0; 3], ..Default::default() }; N]);
+    let hazed_slopes = gpu.upload(&vec![SlopeRecord::default(); N]);
+    let buffers = HazeBuffers {
+        facets: &facets,
+        lit: &light,
+        slopes: &slopes,
+        sky: &sky,
+        hazed: &hazed,
+        hazed_slopes: &hazed_slopes,
+    };
+    gpu.run(|rec| pass.record(rec, &buffers, N as u32));
+    (gpu.download(&hazed, N), gpu.download(&hazed_slopes, N))
+}
+
+fn vector(v: [f32; 3]) -> DVec3 {
+    DVec3::from(v.map(f64::from))
+}
+
+/// Returns radiances and slopes in f64, and their bounds.
+fn truth(view: &SkyView) -> [Vec<f64>; 4] {
+    let mut all = [vec![], vec![], vec![], vec![]];
+    for i in 0..N as u32 {
+        let offset = vector(facet(i).position) - vector(EYE);
+        let light = vector(lit(i).first) + vector(lit(i).second);
+        let (color, share) = seen(view, offset, light);
+        let bound = rounding(view, offset, light);
+        all[0].extend(color.to_array());
+        all[1].extend(bound.to_array());
+        let relative = vector(slope(i).relative);
+        all[2].extend((share * relative).to_array());
+        // The quotient of two sums of three channels.
+        let off = 2.0 * bound.element_sum() / color.element_sum() + 1e-6;
+        all[3].extend((off * relative.abs() + 1e-9).to_array());
+    }
+    all
+}
+
+fn radiances(of: &[LitRecord]) -> Vec<f64> {
+    of.iter().flat_map(|l| l.first.map(f64::from)).collect()
+}
+
+#[test]
+fn light_behind_air_equals_the_reference() {
+    let mut gpu = Gpu::new();
+    for (view, name) in views().iter().zip(["low", "high"]) {
+        let [colors, bounds, relative, of_relative] = truth(view);
+        let (found, slopes) = run(&mut gpu, None, view, true);
+        assert_within_and_say(name, &radiances(&found), &colors, &bounds);
+        let found_slopes: Vec<f64> =
+            slopes.iter().flat_map(|s| s.relative.map(f64::from)).collect();
+        assert_within_and_say(name, &found_slopes, &relative, &of_relative);
+        for (i, (l, s)) in (0u32..).zip(found.iter().zip(&slopes)) {
+            assert_eq!((l.direct, l.unresolved, l.second), ([7.0; 3], 5.0, [0.0; 3]), "{i}");
+            assert_eq!(s.position, facet(i).position, "{i}");
+        }
+        // Without slopes they are left as they are.
+        let (same, untouched) = run(&mut gpu, None, view, false);
+        assert!(same == found && untouched.iter().all(|s| *s == SlopeRecord::default()));
+    }
+}
+
+#[test]
+fn wrong_shaders_are_noticed() {
+    let mut gpu = Gpu::new();
+    let views = views();
+    let truths = views.map(|view| truth(&view));
+    for (file, from, to) in [
+        ("haze.comp", "(light.first + light.second)", "light.first"),
+        ("haze.comp", "through + haze.added", "through"),
+        ("haze.comp", ".position - sky.camera.eye", ".position"),
+        ("haze.comp", "sum(through) / all", "1.0"),
+        ("haze.comp", "light.second = vec3(0.0);", ""),
+        ("include/clear_sky.glsl", "(up + 0.01)", "(up + 0.02)"),
+        ("include/clear_sky.glsl", "sky.d * exp", "exp"),
+        (
+            "include/clear_sky.glsl",
+            "float up = abs(direction.y)",
+            "float up = max(direction.y, 0.0)",
+        ),
+        ("include/clear_sky.glsl", "cosine < 0.0 ? PI - angle", "cosine < 0.0 ? angle"),
+        ("include/clear_sky.glsl", "a + b : a - b", "a - b : a - b"),
+        ("include/clear_sky.glsl", "around * sqrt(around)", "around"),
+        ("include/clear_sky.glsl", "+ sky.h * sqrt(up)", ""),
+        ("include/clear_sky.glsl", "vec3(1.0, sky.flatness, 1.0)", "vec3(1.0)"),
+        ("include/clear_sky.glsl", "sky.haze * depth_between", "depth_between"),
+        ("include/clear_sky.glsl", "taken * radiance_of_air", "radiance_of_air"),
+        ("include/clear_sky.glsl", "x > LEAST_STEP ?", "x > 1e3 ?"),
+        ("include/clear_sky.glsl", "lessThan(depth, vec3(1e-2))", "lessThan(depth, vec3(1.0))"),
+    ] {
+        let compiler = Gpu::wrong_compiler(file, from, to);
+        let is_noticed = views.iter().zip(&truths).any(|(view, [colors, bounds, slopes, off])| {
+            let (found, found_slopes) = run(&mut gpu, Some(&compiler), view, true);
+            let of_slopes: Vec<f64> =
+                found_slopes.iter().flat_map(|s| s.relative.map(f64::from)).collect();
+            check_within("wrong", &radiances(&found), colors, bounds).is_err()
+                || check_within("wrong", &of_slopes, slopes, off).is_err()
+                || found.iter().any(|l| l.second != [0.0; 3])
+        });
+        assert!(is_noticed, "{to} was not noticed");
+    }
+}

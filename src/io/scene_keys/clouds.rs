@@ -15,7 +15,7 @@ use super::motion::{
     GROWTH, GUST, POSITION, TEXTURE, read_growth, read_gust, read_position, read_texture,
 };
 use super::spec::{choice, integer, number, required_text, vector};
-use super::weather::{WEATHER, ground_of, read_settings};
+use super::weather::{DETAIL, WEATHER, ground_of, read_settings};
 use crate::error::{Error, Result};
 use crate::io::bounds::{AMOUNT, COORDINATE, GREATEST, is_carried_place, shortest};
 use crate::io::document::section::Section;
@@ -104,7 +104,7 @@ const KINDS: &[(&str, CloudKind)] = &[
     (
         "weather",
         CloudKind {
-            lists: &[FILE, WEATHER, GROUND, BASE, GROWTH],
+            lists: &[FILE, WEATHER, DETAIL, GROUND, BASE, GROWTH],
             read: read_weather,
             default_facing: "up",
         },
@@ -297,11 +297,11 @@ fn read_particles(s: &mut Section, reading: &mut Reading) -> Result<CloudSource>
 fn read_weather(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
     let around = reading.around;
     let (file, _) = open_file(s, around.folder, |path| around.files.weather(path))?;
-    let settings = read_settings(s, &file, around.simulate)?;
+    let seed = read_seed(s, reading)?;
+    let settings = read_settings(s, &file, around.simulate, seed)?;
     if let Some(note) = blobs::note(&file) {
         reading.found.notes.push(format!("cloud {}: {note}", reading.i_cloud));
     }
-    let seed = read_seed(s, reading)?;
     let found = &mut *reading.found;
     if let Some(i_material) = ground_named(s, around.materials)? {
         let origin = read_position(s)?;

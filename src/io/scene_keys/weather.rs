@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::key::keys;
-use super::spec::{integer, number};
+use super::spec::{integer, number, vector};
 use crate::error::Result;
 use crate::io::bounds::{Bounds, GREATEST};
 use crate::io::document::section::Section;
@@ -13,13 +13,26 @@ use crate::io::weather::blobs::Settings;
 use crate::io::weather::wrf::WeatherFile;
 use crate::model::scene::Simulate;
 use crate::model::terrain::Terrain;
+use crate::model::weather::detail::Detail;
 
 /// Most blobs of a file; a blob takes some 48 bytes.
 const MOST_PARTICLES: u32 = 20_000_000;
+/// Range of winds, faster than any on earth.
+const WIND: Bounds = Bounds::Within(-1000.0, 1000.0);
 /// Greatest speed of weather: a day in a second.
 const GREATEST_SPEED: f64 = 86_400.0;
 
-keys! { WEATHER: pub fn settings(s, last: u32) -> Settings { Settings;
+keys! { DETAIL: pub fn detail(s, seed: u32) -> Detail { Detail;
+    /// Strength of clouds' invented detail below the cells, a turbulence that keeps every cell's
+    /// mass; 0: none.
+    strength ["detail"]: number(0.0, Bounds::Within(0.0, 1.0));
+    /// Velocity at which moving weather takes its detail along: east, up, south.
+    wind ["detail_wind"]: vector([0.0; 3], WIND), "m/s";
+    seed => seed;
+}}
+
+keys! { WEATHER: pub fn settings(s, last: u32, detail: Detail) -> Settings { Settings;
+    detail => detail;
     /// Step of the file, from 0, that time 0 shows.
     i_step ["step"]: integer(0, 0, u32::MAX)
         => |_| integer(0, 0, last).map(|i| i as usize).take(s, "step");
@@ -32,9 +45,15 @@ keys! { WEATHER: pub fn settings(s, last: u32) -> Settings { Settings;
 }}
 
 /// Reads the keys that say how `file` is shown.
-pub fn read_settings(s: &mut Section, file: &WeatherFile, simulate: Simulate) -> Result<Settings> {
+pub fn read_settings(
+    s: &mut Section,
+    file: &WeatherFile,
+    simulate: Simulate,
+    seed: u32,
+) -> Result<Settings> {
     let last = u32::try_from(file.n_steps.saturating_sub(1)).unwrap_or(u32::MAX);
-    let settings = settings(s, last)?;
+    let detail = detail(s, seed)?;
+    let settings = settings(s, last, detail)?;
     if settings.speed != 0.0 && simulate == Simulate::Gpu {
         let what = "expected 0 where threads.simulate is \"gpu\", the default: it is the game \
                     thread that goes from step to step";

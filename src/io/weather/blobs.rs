@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::io::bounds::GREATEST;
 use crate::model::cloud::{MIN_ASPECT, Particle, Shape};
 use crate::model::terrain::Terrain;
+use crate::model::weather::detail::{self, Detail};
 use crate::model::weather::particles::{Layout, WeatherBlob};
 
 /// How a scene shows a weather file.
@@ -21,6 +22,8 @@ pub struct Settings {
     pub exaggeration: f64,
     /// Seconds of the file in a second of the scene; 0: the step stands still.
     pub speed: f64,
+    /// Modulation below the cells.
+    pub detail: Detail,
 }
 
 /// Returns the note that the clouds of a file are not its own, if so.
@@ -37,7 +40,8 @@ pub fn note(file: &WeatherFile) -> Option<&'static str> {
 pub fn particles(file: &WeatherFile, settings: &Settings, seed: u32) -> Result<Vec<Particle>> {
     let step = file.step(settings.i_step)?;
     let layout = Layout::new(&step.grid, &[&step.extinction], settings.n_particles as usize, seed);
-    let blobs = layout.blobs(&step.grid, &step.extinction);
+    let mut blobs = layout.blobs(&step.grid, &step.extinction);
+    detail::apply(&settings.detail.effects(&layout, &step.grid, 0.0), &mut blobs, &layout);
     Ok(blobs
         .iter()
         .filter(|b| b.kappa > 0.0)

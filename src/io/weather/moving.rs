@@ -12,7 +12,7 @@ use super::wrf::{Step, WeatherFile};
 use crate::error::Result;
 use crate::model::animated::{AnimatedParticles, Animation};
 use crate::model::cloud::{MIN_ASPECT, Particle, Shape, mass};
-use crate::model::weather::particles::Layout;
+use crate::model::weather::particles::{Layout, SPREAD, WeatherBlob};
 use crate::model::weather::steps::between;
 
 /// Factor by which heights of steps that were not read may exceed those of the steps that were.
@@ -109,12 +109,13 @@ impl Bounds {
         }
         let more = DVec3::Y * (MORE_HEIGHT - 1.0) * (high.y - low.y);
         let shape = DVec3::new(1.0, stretch, 1.0);
-        // A blob is no wider than a uniform density over its cell, whose σ is 1/√12 of the width.
+        // A blob is no higher than a uniform density over its cell, whose σ is 1/√12 of the size,
+        // and no wider than a single one among equal cells.
         let even = |size: f64| size / 12f64.sqrt();
         Bounds {
             low: shape * (low - more),
             high: shape * (high + more),
-            sigma: even(widest),
+            sigma: SPREAD * widest,
             sigma_y: even(MORE_HEIGHT * stretch * thickest),
         }
     }
@@ -129,11 +130,13 @@ impl Animation for Steps {
         let is_before = file_s < self.times_s.first().copied().unwrap_or(file_s);
         let ends = if is_before { (i, i) } else { self.spans.ends_from(i) };
         let span = self.spans.get(ends)?;
-        let of = |slot: usize| match span.blob(slot, weight) {
-            Some(blob) => self.kept_to(particle(&blob, self.settings.exaggeration)),
+        let Settings { n_particles, detail, exaggeration, speed, .. } = self.settings;
+        let blobs = span.blobs(n_particles as usize, weight, &detail, speed * time_s);
+        let of = |blob: &Option<WeatherBlob>| match blob {
+            Some(blob) => self.kept_to(particle(blob, exaggeration)),
             None => self.nothing(),
         };
-        Ok(Arc::new((0..self.settings.n_particles as usize).map(of).collect()))
+        Ok(Arc::new(blobs.iter().map(of).collect()))
     }
 }
 
@@ -170,13 +173,16 @@ mod tests {
 
     use super::*;
     use crate::io::weather::wrf;
+    use crate::model::weather::detail::Detail;
 
     /// Two layouts that fade into each other have the mass of one layout, stay in the bounds, and
     /// no visible particle jumps.
     #[test]
     fn layouts_of_a_file_of_many_steps_fade_into_each_other() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/weather/supercell.nc");
-        let settings = Settings { i_step: 0, n_particles: 2001, exaggeration: 2.0, speed: 60.0 };
+        let detail = Detail { strength: 0.0, wind: DVec3::ZERO, seed: 0 };
+        let settings =
+            Settings { i_step: 0, n_particles: 2001, exaggeration: 2.0, speed: 60.0, detail };
         let of = |most_together| {
             moving_by(wrf::open(&path).unwrap(), settings, 3, most_together).unwrap()
         };

@@ -6,6 +6,7 @@ use std::thread::JoinHandle;
 
 use super::wrf::WeatherFile;
 use crate::error::{Error, Result};
+use crate::model::weather::detail::Detail;
 use crate::model::weather::interval::{Interval, StepClouds};
 use crate::model::weather::particles::{Layout, WeatherBlob};
 use crate::model::weather::steps::LONGEST_INTERPOLATED_S;
@@ -41,21 +42,30 @@ pub struct Span {
 }
 
 impl Span {
-    /// Returns the blob in slot `i` at `weight` of the way to the second step, or `None` in a slot
-    /// that the layout does not use.
-    pub fn blob(&self, i: usize, weight: f64) -> Option<WeatherBlob> {
-        let (half, i) = match i.checked_sub(self.n_first) {
-            None => (&self.halves[0], i),
-            Some(i) => (&self.halves[1], i),
-        };
-        let (interval, fade) = half.as_ref()?;
-        let blob = interval.blob(i, weight)?;
-        let share = match fade {
-            Fade::Always => 1.0,
-            Fade::Out => 1.0 - weight,
-            Fade::In => weight,
-        };
-        Some(WeatherBlob { kappa: share * blob.kappa, ..blob })
+    /// Returns the blobs in `n` slots at `weight` of the way to the second step, with the detail
+    /// that they have at a time; `None` in slots that the layout does not use.
+    pub fn blobs(
+        &self,
+        n: usize,
+        weight: f64,
+        detail: &Detail,
+        time_s: f64,
+    ) -> Vec<Option<WeatherBlob>> {
+        let mut all = vec![None; n];
+        let (first, second) = all.split_at_mut(self.n_first.min(n));
+        for (half, slots) in self.halves.iter().zip([first, second]) {
+            let Some((interval, fade)) = half else { continue };
+            let share = match fade {
+                Fade::Always => 1.0,
+                Fade::Out => 1.0 - weight,
+                Fade::In => weight,
+            };
+            let blobs = interval.blobs(weight, detail, time_s);
+            for (slot, blob) in slots.iter_mut().zip(blobs) {
+                *slot = Some(WeatherBlob { kappa: share * blob.kappa, ..blob });
+            }
+        }
+        all
     }
 }
 

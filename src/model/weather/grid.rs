@@ -1,6 +1,8 @@
 //! Places of WRF's cells: sizes on the ground from map factors, bottoms and tops from staggered
 //! heights.
 
+use glam::DVec3;
+
 /// Number of cells west–east, south–north and upward.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shape {
@@ -137,6 +139,16 @@ impl Grid {
     /// Returns the number of cells.
     pub fn shape(&self) -> Shape {
         self.ground.shape
+    }
+
+    /// Returns the mean size of the cells, m: east, up, south.
+    pub fn mean_cell(&self) -> DVec3 {
+        let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len().max(1) as f64;
+        let Shape { nz, .. } = self.shape();
+        let n = self.shape().n_columns();
+        let whole = (0..n).map(|i| self.heights_m[nz * n + i] - self.heights_m[i]).sum::<f64>();
+        let thickness = whole / (n * nz).max(1) as f64;
+        DVec3::new(mean(&self.ground.dx_m), thickness, mean(&self.ground.dy_m))
     }
 
     /// Returns the height of a cell's bottom.

@@ -1,6 +1,11 @@
 //! The blobs between two steps, or of one step alone. They are laid out once; any moment is then
 //! one interpolation a blob.
 
+use std::sync::OnceLock;
+
+use glam::DVec3;
+
+use super::detail::{self, Detail, Effect};
 use super::grid::Grid;
 use super::particles::{Layout, WeatherBlob};
 
@@ -17,6 +22,10 @@ pub struct StepClouds {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interval {
     from: Vec<WeatherBlob>,
+    layout: Layout,
+    grid: Grid,
+    /// The effects of the first detail that was asked for and has no wind.
+    still: OnceLock<(Detail, Vec<Effect>)>,
     /// `None` for a single step.
     to: Option<Vec<WeatherBlob>>,
 }
@@ -26,7 +35,23 @@ impl Interval {
     /// a step alone.
     pub fn laid_out(layout: &Layout, a: &StepClouds, b: Option<&StepClouds>) -> Self {
         let blobs = |step: &StepClouds| layout.blobs(&step.grid, &step.extinction);
-        Interval { from: blobs(a), to: b.map(blobs) }
+        let (layout, grid) = (layout.clone(), a.grid.clone());
+        Interval { from: blobs(a), to: b.map(blobs), layout, grid, still: OnceLock::new() }
+    }
+
+    /// Returns all blobs at `weight` of the way, with the detail that they have at a time.
+    pub fn blobs(&self, weight: f64, detail: &Detail, time_s: f64) -> Vec<WeatherBlob> {
+        let mut all: Vec<WeatherBlob> =
+            (0..self.from.len()).filter_map(|i| self.blob(i, weight)).collect();
+        let effects = || detail.effects(&self.layout, &self.grid, time_s);
+        if detail.wind != DVec3::ZERO {
+            detail::apply(&effects(), &mut all, &self.layout);
+            return all;
+        }
+        let (of, kept) = self.still.get_or_init(|| (*detail, effects()));
+        let made = if of == detail { None } else { Some(effects()) };
+        detail::apply(made.as_ref().unwrap_or(kept), &mut all, &self.layout);
+        all
     }
 
     /// Returns a blob at `weight` of the way from the first step to the second, or `None` past the

@@ -6,10 +6,12 @@
 //! the south, each row from the west.
 
 pub mod air;
+pub mod detail;
 pub mod diagnosed;
 pub mod extinction;
 pub mod grid;
 pub mod interval;
+mod opaque;
 pub mod particles;
 pub mod places;
 pub mod profile;

@@ -6,6 +6,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::grid::{Grid, Shape};
+use super::opaque::open_columns;
 use super::places::CellSeed;
 use super::profile::{Plane, Profile};
 
@@ -20,6 +21,9 @@ pub const AFFORDED: usize = 10;
 pub const SPREAD: f64 = 0.45;
 /// σ of a uniform distribution over a length of 1: 1/√12.
 const EVEN: f64 = 0.288_675_134_594_812_9;
+/// Variance across that blobs of a cell among equal ones have more than an even cell, over the
+/// square of its size: ½² together.
+const REACH: f64 = 0.25 - EVEN * EVEN;
 /// σ_z over the thickness of a cell with several blobs. Their heights, over half of the cell, add
 /// the rest of the variance: 1/16 + 1/48 = 1/12.
 const THICKNESS: f64 = 0.25;
@@ -65,6 +69,8 @@ pub struct Layout {
     courses: Vec<Course>,
     /// For every cell the cell whose blobs hold its mass; itself if it has blobs.
     hosts: Vec<u32>,
+    /// For every column, the columns around it that its blobs may enter ([`Layout::open`]).
+    open: Vec<u16>,
     /// All blobs, in an order of which any first part represents all cells evenly.
     places: Vec<Place>,
 }
@@ -89,7 +95,8 @@ impl Layout {
         ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
         let places = ordered.into_iter().map(|(_, place)| place).collect();
         let courses = courses(grid, &depths, |i| n_blobs[i] > 0);
-        Layout { seed, n_blobs, courses, hosts, places }
+        let open = open_columns(grid.shape(), &depths);
+        Layout { seed, n_blobs, courses, hosts, open, places }
     }
 
     /// Returns all blobs in drawing order.
@@ -118,30 +125,85 @@ impl Layout {
             .collect()
     }
 
+    /// Returns where a blob of a cell would be, from −½ to ½, if its extinction were even.
+    pub fn even(&self, place: Place) -> DVec3 {
+        CellSeed::new(self.seed, place.i_cell).place(place.number)
+    }
+
+    /// Returns how the extinction of a cell runs.
+    pub fn course(&self, i_cell: usize) -> &Course {
+        &self.courses[i_cell]
+    }
+
+    /// Returns the columns around one that its blobs may be displaced into: bit 3 east + south,
+    /// each from 0 to 2 with 1 for its own. All of
+    /// them are opaque.
+    pub fn open(&self, i_column: usize) -> u16 {
+        self.open[i_column]
+    }
+
+    /// Returns the extinction at a blob's place over the mean of its cell.
+    pub fn relative(&self, place: Place) -> f64 {
+        let at = self.place_in_cell(place);
+        let Course { across, upward, .. } = self.courses[place.i_cell as usize];
+        across.at(at.x, at.z) * upward.at(at.y)
+    }
+
+    /// Returns a blob's place in its cell, from −½ to ½.
+    pub fn place_in_cell(&self, place: Place) -> DVec3 {
+        let even = self.even(place);
+        let Course { across, upward, .. } = self.courses[place.i_cell as usize];
+        let [x, z] = across.place([even.x, even.z]);
+        DVec3::new(x, upward.place(even.y), z)
+    }
+
     fn blob(&self, grid: &Grid, place: Place, mass_of_cell: f64) -> WeatherBlob {
-        let (i, n) = (place.i_cell as usize, f64::from(self.n_blobs[place.i_cell as usize]));
-        let i_column = i % grid.shape().n_columns();
-        let ground = &grid.ground;
-        let (dx, dy, thickness) =
-            (ground.dx_m[i_column], ground.dy_m[i_column], grid.thickness_m(i));
-        let sigma_xy = (SPREAD * (dx * dy / n).sqrt()).min(EVEN * dx.min(dy));
-        let sigma_z = if n > 1.0 { THICKNESS } else { EVEN } * thickness;
-        // Centres and widths together have the cell's variance: the centres' range shrinks as blobs
-        // are wider.
-        let room =
-            |size: f64, sigma: f64| size * (1.0 - (sigma / (EVEN * size)).powi(2)).max(0.0).sqrt();
-        let room = DVec3::new(room(dx, sigma_xy), room(thickness, sigma_z), room(dy, sigma_xy));
+        let i = place.i_cell as usize;
+        let (i_column, ground) = (i % grid.shape().n_columns(), &grid.ground);
+        let SizeInCell { sigma_xy, sigma_z, room } = self.size_in_cell(grid, i);
         let middle =
             DVec3::new(ground.east_m[i_column], grid.middle_m(i), ground.south_m[i_column]);
-        let even = CellSeed::new(self.seed, place.i_cell).place(place.number);
-        let Course { across, upward } = self.courses[i];
-        let [x, z] = across.place([even.x, even.z]);
-        let at = DVec3::new(x, upward.place(even.y), z);
-        let position = middle + room * at;
+        let position = middle + room * self.place_in_cell(place);
         let mut blob = WeatherBlob { position, sigma_xy, sigma_z, kappa: 1.0 };
-        blob.kappa = mass_of_cell / n / blob.mass();
+        blob.kappa = mass_of_cell / f64::from(self.n_blobs[i]) / blob.mass();
         blob
     }
+
+    /// Returns the widths of a cell's blobs, and the room of their centres.
+    pub fn size_in_cell(&self, grid: &Grid, i: usize) -> SizeInCell {
+        let (n, ground) = (f64::from(self.n_blobs[i]), &grid.ground);
+        let i_column = i % grid.shape().n_columns();
+        let (dx, dy, thickness) =
+            (ground.dx_m[i_column], ground.dy_m[i_column], grid.thickness_m(i));
+        // Where the cells around are alike, blobs may reach into them: single ones would be a row
+        // of balls.
+        let across = (EVEN * EVEN + self.courses[i].evenness * REACH).sqrt();
+        let sigma_xy = (SPREAD * (dx * dy / n).sqrt()).min(across * dx.min(dy));
+        let sigma_z = if n > 1.0 { THICKNESS } else { EVEN } * thickness;
+        // Centres and widths together have this variance: the centres' range shrinks as blobs are
+        // wider.
+        let room = |size: f64, sigma: f64, together: f64| {
+            let centers = (together * together - (sigma / size).powi(2)).max(0.0).sqrt();
+            size * (centers / EVEN).min(1.0)
+        };
+        let room = DVec3::new(
+            room(dx, sigma_xy, across),
+            room(thickness, sigma_z, EVEN),
+            room(dy, sigma_xy, across),
+        );
+        SizeInCell { sigma_xy, sigma_z, room }
+    }
+}
+
+/// Widths of the blobs of a cell, and the extent of their centres.
+#[derive(Debug, Clone, Copy)]
+pub struct SizeInCell {
+    /// Standard deviation along x and z, m.
+    pub sigma_xy: f64,
+    /// Standard deviation along y, m.
+    pub sigma_z: f64,
+    /// Extent of the centres along x, y and z, m.
+    pub room: DVec3,
 }
 
 /// Returns the vertical optical depth of every cell, the greatest of all moments.
@@ -157,11 +219,14 @@ pub struct Course {
     pub across: Plane,
     /// Upward.
     pub upward: Profile,
+    /// Least extinction of the eight cells around over the cell's own, at most 1; 0 at the edge of
+    /// the domain.
+    pub evenness: f64,
 }
 
 impl Course {
     /// The same throughout.
-    const EVEN: Course = Course { across: Plane::EVEN, upward: Profile::EVEN };
+    const EVEN: Course = Course { across: Plane::EVEN, upward: Profile::EVEN, evenness: 0.0 };
 }
 
 /// Returns how the extinction runs in cells of vertical optical depths `depths`, where `has` says
@@ -180,10 +245,16 @@ pub fn courses(grid: &Grid, depths: &[f64], has: impl Fn(usize) -> bool) -> Vec<
             let (x, y) = ((x + east).checked_sub(1)?, (y + 1).checked_sub(south)?);
             (x < nx && y < ny).then(|| extinction(x + nx * (y + ny * k)))
         };
-        let across = Plane::among([0, 1, 2].map(|east| [0, 1, 2].map(|south| at(east, south))));
+        let around = [0, 1, 2].map(|east| [0, 1, 2].map(|south| at(east, south)));
+        let across = Plane::among(around);
+        let least = around
+            .as_flattened()
+            .iter()
+            .fold(extinction(i), |least, other| least.min(other.unwrap_or(0.0)));
+        let evenness = if extinction(i) > 0.0 { least / extinction(i) } else { 0.0 };
         let below = (k > 0).then(|| extinction(i - nx * ny));
         let above = (k + 1 < nz).then(|| extinction(i + nx * ny));
-        Course { across, upward: Profile::between(below, extinction(i), above) }
+        Course { across, upward: Profile::between(below, extinction(i), above), evenness }
     };
     (0..depths.len()).map(of).collect()
 }

@@ -1,0 +1,344 @@
+//! Detail of clouds below the cells of a weather file (model.md §15): a turbulent modulation of the
+//! blobs' masses that leaves every cell's mass as it is, and a turbulent displacement. It is
+//! invented; only its spectrum is that of turbulence.
+
+use glam::DVec3;
+
+use super::grid::Grid;
+use super::particles::{Layout, Place, WeatherBlob};
+use crate::model::parallel::parallel_map;
+use crate::model::philox::{philox4x32_10, uniform};
+
+/// Number of octaves, from [`LONGEST`] down to about a quarter of a cell.
+const OCTAVES: u32 = 4;
+/// Length of the first octave, cells.
+const LONGEST: f64 = 2.0;
+/// Length of an octave over that of the next one. Not 2, so that their lattices do not meet.
+const LACUNARITY: f64 = 1.93;
+/// Standard deviation of one octave: gradient noise with gradients in the cube (−1, 1)³.
+const DEVIATION: f64 = 0.1909;
+/// Strength of the modulation with `detail` = 1, over the mean extinction.
+const STRENGTH: f64 = 1.6;
+/// What is taken off the noise where the extinction is half of the cell's mean, and elsewhere in
+/// proportion to 1/extinction − 1: clouds fray at their edges.
+const FRAY: f64 = 0.35;
+/// Least extinction over the mean that counts there.
+const THINNEST: f64 = 0.25;
+/// Standard deviation of the displacement with `detail` = 1, cells.
+const SHIFT: f64 = 0.45;
+/// Most cells in height of one unit of the modulation, so that flat cells do not make pancakes.
+const FLATTEST: f64 = 4.0;
+/// "deta": a Philox stream of its own.
+const STREAM: u32 = 0x6465_7461;
+/// Blobs of one piece of work.
+const BLOBS_A_JOB: usize = 4096;
+
+/// A modulation of blobs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Detail {
+    /// Strength: 0 is none, 1 much.
+    pub strength: f64,
+    /// Velocity of the modulation: m/s, x east, y up, z south.
+    pub wind: DVec3,
+    /// Seed.
+    pub seed: u32,
+}
+
+/// Returns which column around its own a blob comes to, eastward and southward from 0 to 2 with 1
+/// for its own, and where it is there. `even`: its place in its own column, from −½ to ½, if
+/// extinction were even; `shift` in columns; `is_open` tells which columns it may enter. It is
+/// turned back at the face of another.
+fn displaced(
+    even: [f64; 2],
+    shift: [f64; 2],
+    is_open: impl Fn(usize, usize) -> bool,
+) -> ([usize; 2], [f64; 2]) {
+    let to = [0, 1].map(|k| (even[k] + shift[k]).clamp(-1.49, 1.49));
+    let [x, z] = to.map(|v| if v < -0.5 { 0 } else { 1 + usize::from(v > 0.5) });
+    let column = if is_open(x, z) {
+        [x, z]
+    } else if is_open(x, 1) {
+        [x, 1]
+    } else if is_open(1, z) {
+        [1, z]
+    } else {
+        [1, 1]
+    };
+    let within = [0, 1].map(|k| match (column[k], to[k]) {
+        // Turned back at the face.
+        (1, v) if v.abs() > 0.5 => v.signum() - v,
+        (of, v) => v + 1.0 - of as f64,
+    });
+    (column, within)
+}
+
+impl Detail {
+    /// Returns the effect on the blobs of a layout at a time. Without a wind it is the same at all
+    /// times. It depends on the ground, but not on the heights of `grid`.
+    pub fn effects(&self, layout: &Layout, grid: &Grid, time_s: f64) -> Vec<Effect> {
+        if self.strength == 0.0 {
+            return vec![];
+        }
+        let (ground, places) = (&grid.ground, layout.places());
+        let (nx, n_columns) = (grid.shape().nx, grid.shape().n_columns());
+        let space = Space::new(grid);
+        let of_blob = |i: usize| {
+            let i_cell = places[i].i_cell as usize;
+            let noise_at = space.of(layout, grid, places[i]) - space.moved(self.wind * time_s);
+            let fray = FRAY * (1.0 / layout.relative(places[i]).clamp(THINNEST, 1.0) - 1.0);
+            let noise = turbulence(self.seed, FIELDS[0], noise_at) - fray;
+            let weight = (1.0 + STRENGTH * self.strength * noise).max(0.0);
+            let shift = |field| SHIFT * self.strength * turbulence(self.seed, field, noise_at);
+            let even = layout.even(places[i]);
+            let open = layout.open(i_cell % n_columns);
+            let ([east, south], within) =
+                displaced([even.x, even.z], [shift(FIELDS[1]), shift(FIELDS[2])], |east, south| {
+                    open >> (3 * east + south) & 1 == 1
+                });
+            // Rows run north, and z points south.
+            let to = i_cell + east + nx - 1 - nx * south;
+            let [x, z] = layout.course(to).across.place(within);
+            let room = layout.size_in_cell(grid, i_cell).room;
+            let column = to % n_columns;
+            let place = [ground.east_m[column] + room.x * x, ground.south_m[column] + room.z * z];
+            Effect { weight, place }
+        };
+        let n_jobs = places.len().div_ceil(BLOBS_A_JOB);
+        let of_job = |job: usize| {
+            let range = job * BLOBS_A_JOB..places.len().min((job + 1) * BLOBS_A_JOB);
+            range.map(of_blob).collect::<Vec<Effect>>()
+        };
+        parallel_map(n_jobs, of_job).concat()
+    }
+}
+
+/// What detail does to a blob.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effect {
+    /// Share of its cell's mass over that of a blob of the same mass without detail.
+    weight: f64,
+    /// Place east and south, m.
+    place: [f64; 2],
+}
+
+/// Gives the blobs of a layout their detail: none without effects. Every cell keeps its mass.
+pub fn apply(effects: &[Effect], blobs: &mut [WeatherBlob], layout: &Layout) {
+    let Some(n_cells) = layout.places().iter().map(|p| p.i_cell as usize + 1).max() else { return };
+    let mut sums = vec![[0.0; 2]; n_cells];
+    let both = || effects.iter().zip(layout.places());
+    for (blob, (effect, place)) in blobs.iter().zip(both()) {
+        let (sum, mass) = (&mut sums[place.i_cell as usize], blob.mass());
+        *sum = [sum[0] + mass, sum[1] + effect.weight * mass];
+    }
+    for (blob, (effect, place)) in blobs.iter_mut().zip(both()) {
+        (blob.position.x, blob.position.z) = (effect.place[0], effect.place[1]);
+        let [mass, weighted] = sums[place.i_cell as usize];
+        // A cell of which nothing would be left stays as it is.
+        blob.kappa *= if weighted > 1e-3 * mass { effect.weight * mass / weighted } else { 1.0 };
+    }
+}
+
+/// The space of the noise: the first octave has the length 1 in it. Heights count by levels, so
+/// that levels that rise and fall from step to step take their detail along.
+struct Space {
+    /// Lengths of a unit, m.
+    unit_m: DVec3,
+    /// Levels of a unit.
+    levels: f64,
+}
+
+impl Space {
+    fn new(grid: &Grid) -> Space {
+        let cell = grid.mean_cell();
+        let levels = (cell.x / cell.y).round().clamp(1.0, FLATTEST) * LONGEST;
+        let unit_m = DVec3::new(LONGEST * cell.x, levels * cell.y, LONGEST * cell.z);
+        Space { unit_m, levels }
+    }
+
+    /// Returns the place of a blob.
+    fn of(&self, layout: &Layout, grid: &Grid, place: Place) -> DVec3 {
+        let (ground, n_columns) = (&grid.ground, grid.shape().n_columns());
+        let (column, level) =
+            (place.i_cell as usize % n_columns, place.i_cell as usize / n_columns);
+        let at = layout.place_in_cell(place);
+        DVec3::new(
+            (ground.east_m[column] + at.x * ground.dx_m[column]) / self.unit_m.x,
+            (level as f64 + 0.5 + at.y) / self.levels,
+            (ground.south_m[column] + at.z * ground.dy_m[column]) / self.unit_m.z,
+        )
+    }
+
+    /// Returns a way of metres.
+    fn moved(&self, way_m: DVec3) -> DVec3 {
+        way_m / self.unit_m
+    }
+}
+
+/// The fields: of the masses, and of the displacements eastward and southward.
+const FIELDS: [u32; 3] = [0, 1, 2];
+
+/// Returns noise of mean 0 and deviation 1 whose octaves have the variance of k^{−5/3}: a band of
+/// wave numbers around k has k^{−2/3}.
+fn turbulence(seed: u32, field: u32, place: DVec3) -> f64 {
+    let gain = LACUNARITY.powf(-1.0 / 3.0);
+    let (mut sum, mut square, mut amplitude, mut at) = (0.0, 0.0, 1.0, place);
+    for octave in 0..OCTAVES {
+        sum += amplitude * gradient_noise(seed, OCTAVES * field + octave, at);
+        square += amplitude * amplitude;
+        amplitude *= gain;
+        // Turned by the angle of a 3-4-5 triangle about two axes, so that no octave has the axes of
+        // the cells but the first.
+        let DVec3 { x, y, z } = LACUNARITY * at;
+        let (x, z) = (0.8 * x - 0.6 * z, 0.6 * x + 0.8 * z);
+        at = DVec3::new(0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y, z);
+    }
+    sum / (DEVIATION * f64::sqrt(square))
+}
+
+/// Returns gradient noise: 0 at the points of a lattice, where its gradients are random. *Source*:
+/// Perlin, "Improving Noise" (2002), with random gradients in place of twelve.
+fn gradient_noise(seed: u32, number: u32, place: DVec3) -> f64 {
+    let low = place.floor();
+    let t = place - low;
+    let fade = t * t * t * (t * (t * 6.0 - 15.0) + 10.0);
+    let corner = |k: [i64; 3]| {
+        let offset = DVec3::new(k[0] as f64, k[1] as f64, k[2] as f64);
+        // The lattice repeats after 2³² units.
+        let [x, y, z] = (low + offset).to_array().map(|v| v as i64 as u32);
+        let [a, b, c, _] = philox4x32_10([seed, STREAM], [x, y, z, number]).map(uniform);
+        (2.0 * DVec3::new(a, b, c) - 1.0).dot(t - offset)
+    };
+    let along = |y: i64, z: i64| {
+        let (a, b) = (corner([0, y, z]), corner([1, y, z]));
+        a + fade.x * (b - a)
+    };
+    let across = |z: i64| {
+        let (a, b) = (along(0, z), along(1, z));
+        a + fade.y * (b - a)
+    };
+    let (a, b) = (across(0), across(1));
+    a + fade.z * (b - a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::weather::grid::{Ground, Shape};
+
+    /// Places of a line through the noise, in no direction of its lattices.
+    fn line(n: usize, step: f64) -> Vec<f64> {
+        let direction = DVec3::new(0.71, 0.23, 0.67).normalize();
+        (0..n)
+            .map(|i| turbulence(5, 0, direction * (step * i as f64) + DVec3::splat(0.3)))
+            .collect()
+    }
+
+    #[test]
+    fn noise_has_mean_0_and_deviation_1() {
+        let all = line(200_000, 0.37);
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        let square = all.iter().map(|v| v * v).sum::<f64>() / all.len() as f64;
+        assert!(mean.abs() < 0.02 && (square - 1.0).abs() < 0.02, "{mean} {square}");
+    }
+
+    #[test]
+    fn noise_is_smooth_and_follows_its_seed() {
+        let at = DVec3::new(1.3, -7.7, 0.2);
+        assert_eq!(turbulence(1, 0, at), turbulence(1, 0, at));
+        assert_ne!(turbulence(1, 0, at), turbulence(2, 0, at));
+        assert_ne!(turbulence(1, 0, at), turbulence(1, 1, at));
+        let steps = line(10_000, 1e-3);
+        let steepest = steps.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+        assert!(steepest < 0.05, "{steepest}");
+    }
+
+    /// The structure function of a spectrum of k^{−5/3} rises with r^{2/3}.
+    #[test]
+    fn the_spectrum_is_that_of_turbulence() {
+        let step = 0.02;
+        let all = line(400_000, step);
+        let structure = |lag: usize| {
+            let pairs = all.iter().zip(&all[lag..]);
+            pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / (all.len() - lag) as f64
+        };
+        // From 0.12 to 0.48 units: within the octaves.
+        let slope = (structure(24) / structure(6)).ln() / 4f64.ln();
+        assert!((0.45..0.95).contains(&slope), "{slope}");
+    }
+
+    /// Cells of 100 x 100 x 50 m: 8 thick ones in a row, and clear ones around them.
+    fn row_of_clouds() -> (Grid, Vec<f64>) {
+        let shape = Shape { nx: 10, ny: 3, nz: 2 };
+        let ones = vec![1.0; 30];
+        let ground = Ground::new(shape, (100.0, 100.0), (&ones, &ones), false).unwrap();
+        let heights = (0..90).map(|i| 50.0 * f64::from(i / 30)).collect();
+        let extinction = (0..60).map(|i| if (11..19).contains(&(i % 30)) { 1.0 } else { 0.0 });
+        (Grid::new(ground, heights).unwrap(), extinction.collect())
+    }
+
+    #[test]
+    fn every_cell_keeps_its_mass_and_the_wind_takes_the_detail_along() {
+        let (grid, extinction) = row_of_clouds();
+        let layout = Layout::new(&grid, &[&extinction], 4000, 7);
+        let plain = layout.blobs(&grid, &extinction);
+        let detail = Detail { strength: 1.0, wind: DVec3::X * 7.0, seed: 3 };
+        let of = |detail: &Detail, time_s: f64| {
+            let mut all = plain.clone();
+            apply(&detail.effects(&layout, &grid, time_s), &mut all, &layout);
+            all
+        };
+        let found = of(&detail, 0.0);
+        let masses = |all: &[WeatherBlob]| {
+            let mut masses = vec![0.0; 60];
+            let both = layout.places().iter().zip(all);
+            both.for_each(|(place, blob)| masses[place.i_cell as usize] += blob.mass());
+            masses
+        };
+        for (a, b) in masses(&found).iter().zip(masses(&plain)) {
+            assert!((a - b).abs() <= 1e-12 * b);
+        }
+        // Some of it is gone, some is several times as dense, and some has changed its column, but
+        // none is where it was clear.
+        let n_gone = found.iter().filter(|b| b.kappa == 0.0).count();
+        assert!((800..2400).contains(&n_gone), "{n_gone}");
+        let most = plain.iter().map(|b| b.kappa).fold(0.0, f64::max);
+        assert!(found.iter().any(|b| b.kappa > 2.0 * most));
+        let column = |b: &WeatherBlob| (b.position.x / 100.0).floor();
+        let n_elsewhere = plain.iter().zip(&found).filter(|(a, b)| column(a) != column(b)).count();
+        assert!(n_elsewhere > 400, "{n_elsewhere}");
+        for b in &found {
+            assert!(b.position.x.abs() < 400.0 && b.position.z.abs() < 50.0, "{}", b.position);
+        }
+        // A wind takes it along, steadily; 21 m in 3 s are 0.105 units of 200 m.
+        assert!((Space::new(&grid).moved(detail.wind * 3.0).x - 0.105).abs() < 1e-12);
+        let (soon, later) = (of(&detail, 0.01), of(&detail, 9.0));
+        let change = |all: &[WeatherBlob]| {
+            let off = found.iter().zip(all).map(|(a, b)| (a.kappa - b.kappa).abs() / most);
+            off.fold(0.0, f64::max)
+        };
+        assert!(change(&soon) < 0.02 && change(&later) > 0.5);
+        let calm = Detail { wind: DVec3::ZERO, ..detail };
+        assert_eq!(of(&calm, 9.0), found);
+        assert_eq!(of(&Detail { strength: 0.0, ..detail }, 5.0), plain);
+    }
+
+    #[test]
+    fn blobs_turn_back_at_closed_columns() {
+        let of = |open: &[[usize; 2]], shift: [f64; 2]| {
+            displaced([0.4, 0.25], shift, |x, z| [x, z] == [1, 1] || open.contains(&[x, z]))
+        };
+        let is = |(column, at): ([usize; 2], [f64; 2]), of: [usize; 2], expected: [f64; 2]| {
+            column == of && at.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12)
+        };
+        // 0.3 eastward leads into the next column, 0.2 beyond the face.
+        assert!(is(of(&[], [0.3, 0.0]), [1, 1], [0.3, 0.25]));
+        assert!(is(of(&[[2, 1]], [0.3, 0.0]), [2, 1], [-0.3, 0.25]));
+        // Into the corner: the column beside is open, that of the corner is not.
+        assert!(is(of(&[[2, 1]], [0.3, 0.5]), [2, 1], [-0.3, 0.25]));
+        assert!(is(of(&[[2, 2]], [0.3, 0.5]), [2, 2], [-0.3, -0.25]));
+        assert!(is(of(&[[1, 2]], [0.3, 0.5]), [1, 2], [0.3, -0.25]));
+        // No blob comes farther than the next column.
+        assert!(is(of(&[], [-0.8, -0.7]), [1, 1], [-0.4, -0.45]));
+        assert!(is(of(&[[2, 1]], [9.0, 0.0]), [2, 1], [0.49, 0.25]));
+    }
+}

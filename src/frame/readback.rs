@@ -147,15 +147,30 @@ impl Renderer {
         Ok((self.read(device, |b| &b.facets, n)?, self.read(device, |b| &b.lit, n)?))
     }
 
-    /// Returns the slopes of the last frame's light inside of blobs, by facet. The slopes of
-    /// surfaces and ground have no meaning. None where the light does not change there.
+    /// Returns the light of the last frame's facets behind the air, all of it as the first
+    /// reflection; none where no air lies before them.
+    ///
+    /// # Errors
+    /// Fails if a frame is in flight or the device is lost.
+    pub fn hazed(&mut self, device: &Device) -> Result<Vec<LitRecord>> {
+        let has_haze = self.passes.features.has_haze;
+        let n = if has_haze { self.passes.constants.march.n_facets } else { 0 };
+        self.read(device, |b| &b.hazed, n)
+    }
+
+    /// Returns the slopes of the last frame's light inside of blobs, by facet, as they are drawn.
+    /// The slopes of surfaces and ground have no meaning. None where the light does not change
+    /// there.
     ///
     /// # Errors
     /// Fails if a frame is in flight or the device is lost.
     pub fn slopes(&mut self, device: &Device) -> Result<Vec<SlopeRecord>> {
         let n = self.passes.constants.march.n_facets;
         let n = if self.passes.constants.has_slopes { n } else { 0 };
-        self.read(device, |b| &b.slopes, n)
+        match self.passes.features.has_haze {
+            true => self.read(device, |b| &b.hazed_slopes, n),
+            false => self.read(device, |b| &b.slopes, n),
+        }
     }
 
     /// Returns the last frame's transmittance from each light to each facet, `[facet][light]`,

@@ -27,7 +27,9 @@ pub struct DevicePicture {
     pub rgba: Vec<[f64; 4]>,
     /// First and second reflection of every facet, W m⁻² sr⁻¹; empty if nothing is lit.
     pub light: Vec<[[f32; 3]; 2]>,
-    /// Change of that inside of blobs, by facet; empty where there is none.
+    /// Their radiance behind the air; empty where there is none.
+    pub hazed: Vec<[f32; 3]>,
+    /// Change of the light that is drawn inside of blobs, by facet; empty where there is none.
     pub slopes: Vec<FacetSlope>,
 }
 

@@ -242,8 +242,7 @@ impl Bench<'_> {
             let time_s = last.map_or(scene.time.start_s, |frame| frame.time_s);
             let (Film { width, height, .. }, backdrop) = (scene.film, Backdrop::of(&scene, time_s));
             let rgb = display_bytes(&backdrop, width, height, &rgba);
-            let picture = CasePicture { i_case, width, height, rgb };
-            lock(self.outcome).pictures.push(picture);
+            lock(self.outcome).pictures.push(CasePicture { i_case, width, height, rgb });
         }
         Ok(())
     }
@@ -285,8 +284,18 @@ fn keep_drawn(
     };
     let slopes = stage.renderer.slopes(&stage.device)?.iter().map(|s| s.read()).collect();
     let (scene, loop_name, hash) = (stage.scene.clone(), of.name(), hash.to_owned());
-    let picture =
-        DevicePicture { i_case, loop_name, hash, scene, i_frame, time_s, rgba, light, slopes };
+    let picture = DevicePicture {
+        i_case,
+        loop_name,
+        hash,
+        scene,
+        i_frame,
+        time_s,
+        rgba,
+        light,
+        hazed: stage.renderer.hazed(&stage.device)?.iter().map(|l| l.first).collect(),
+        slopes,
+    };
     lock(outcome).drawn.push(picture);
     Ok(())
 }

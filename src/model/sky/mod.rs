@@ -2,7 +2,7 @@
 //! (model.md §19).
 //!
 //! Energies are photometric: an irradiance of 1 is 10⁵/π lx, so that a white surface in 100 klx,
-//! full sunlight, has the radiance 1.
+//! full sunlight, has the radiance 1. Colours are balanced for daylight: D55 is white.
 
 mod air;
 mod dome;
@@ -18,6 +18,7 @@ pub use air::{LEAST_UP, SCALE_HEIGHTS_M};
 use dome::Dome;
 pub use dome::N_COEFFICIENTS;
 use sunlight::sunlight;
+use units::balanced;
 pub use units::{UNIT_LX, luminance};
 
 use super::light::{Light, UP};
@@ -87,6 +88,7 @@ impl Sky {
     /// The sun is below the horizon, or a setting is out of its range.
     pub fn new(settings: SkySettings, toward_sun: DVec3) -> Result<Sky, String> {
         let dome = Dome::new(toward_sun, settings.turbidity, settings.albedo)?;
+        let dome = Dome { scale: balanced(dome.scale), ..dome };
         Ok(Sky {
             settings,
             dome,
@@ -97,7 +99,7 @@ impl Sky {
 
     /// Returns the sun's irradiance across its light at sea level, linear RGB.
     pub fn of_sun(&self) -> DVec3 {
-        sunlight(self.dome.toward_sun.y, self.settings.turbidity)
+        balanced(sunlight(self.dome.toward_sun.y, self.settings.turbidity))
     }
 
     /// Returns the sky's irradiance on a level plane, linear RGB.

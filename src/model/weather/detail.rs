@@ -25,7 +25,7 @@ const FRAY: f64 = 0.35;
 /// Least extinction over the mean that counts there.
 const THINNEST: f64 = 0.25;
 /// Standard deviation of the displacement with `detail` = 1, cells.
-const SHIFT: f64 = 0.45;
+const SHIFT: f64 = 0.5;
 /// Most cells in height of one unit of the modulation, so that flat cells do not make pancakes.
 const FLATTEST: f64 = 4.0;
 /// "deta": a Philox stream of its own.

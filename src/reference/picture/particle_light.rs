@@ -12,18 +12,19 @@ use crate::reference::{self, Blob};
 impl FrameReference {
     /// Returns L1 + L2 of facet `i` toward the eye, and behind the air where the scene has some.
     pub fn facet_radiance(&self, i: usize) -> DVec3 {
-        self.seen_facet(i).0
+        self.behind_air(i).map_or_else(|| self.radiance_of(i), |(radiance, _)| radiance)
+    }
+
+    fn radiance_of(&self, i: usize) -> DVec3 {
+        self.radiance[i] + self.second.get(i).copied().unwrap_or(DVec3::ZERO)
     }
 
     /// Returns the radiance of facet `i` as it is seen, and the factor of its change that the air
-    /// makes.
-    fn seen_facet(&self, i: usize) -> (DVec3, f64) {
-        let radiance = self.radiance[i] + self.second.get(i).copied().unwrap_or(DVec3::ZERO);
+    /// makes; `None` without air.
+    fn behind_air(&self, i: usize) -> Option<(DVec3, f64)> {
         let eye = self.state.pose.position - self.state.light_origin;
-        match &self.sky {
-            Some(view) => reference::haze::seen(view, self.facets[i].position - eye, radiance),
-            None => (radiance, 1.0),
-        }
+        let offset = || self.facets[i].position - eye;
+        self.sky.map(|view| reference::haze::seen(&view, offset(), self.radiance_of(i)))
     }
 
     /// Returns the radiance that every particle is drawn with: that of its facet, or its own
@@ -51,7 +52,7 @@ impl FrameReference {
         }
         let shade = |(blob, i): (&Blob, u32)| {
             let FacetSlope { relative, position } = self.slopes[i as usize];
-            let relative = self.seen_facet(i as usize).1 * relative;
+            let relative = self.behind_air(i as usize).map_or(1.0, |(_, share)| share) * relative;
             let is_apart = scene.groups_facets() || scene.draw.lod > 0.0;
             let apart = if is_apart { blob.position - position } else { DVec3::ZERO };
             Shade::new(relative, apart, blob.sigma, &blob.shape)

@@ -59,7 +59,9 @@ pub fn check(device: &DevicePicture, plan: &CheckPlan<'_>) -> Result<Check> {
     let exact = &ReferenceKind::drawn_by(&device.scene).without_approximations(&device.scene);
     if let Err(error) = ReferenceKind::Thin.check(&device.scene, device.time_s) {
         let mut frame = FrameReference::unlit(exact, device.time_s)?;
+        // The device's light and slopes are those behind the air.
         frame.slopes.clone_from(&device.slopes);
+        frame.sky = None;
         if exact.has_light_of_cells() {
             frame.cells = FrameReference::new(exact, device.time_s)?.cells;
         }
@@ -69,8 +71,8 @@ pub fn check(device: &DevicePicture, plan: &CheckPlan<'_>) -> Result<Check> {
         return Ok(Check { reason, seconds, ..found });
     }
     let cached = plan.folder.map(|folder| cache::path(folder, exact, device.time_s, &pixels));
-    // The kept file has no light of cells.
-    let cached = cached.filter(|_| !exact.has_light_of_cells());
+    // The kept file has neither light of cells nor places of facets.
+    let cached = cached.filter(|_| !exact.has_light_of_cells() && !exact.has_haze());
     let kept = cached.as_deref().and_then(|path| cache::read(path, exact.n_facets()));
     let from_cache = kept.is_some();
     let mut found = match kept {
@@ -126,7 +128,9 @@ impl<'a> Drawing<'a> {
         let is_lit = exact.lighting.mode != LightingMode::None;
         let by_device: Vec<[DVec3; 2]> =
             device.light.iter().map(|l| l.map(|l| DVec3::from(l.map(f64::from)))).collect();
+        let hazed = || device.hazed.iter().map(|l| DVec3::from(l.map(f64::from))).collect();
         let radiance: Vec<DVec3> = match is_lit {
+            true if !device.hazed.is_empty() => hazed(),
             true => by_device.iter().map(|[first, second]| *first + *second).collect(),
             false => Emitters::radiance(exact, frame),
         };

@@ -159,7 +159,7 @@ impl Steps {
     fn nothing(&self) -> Particle {
         Particle {
             position: 0.5 * (self.bounds.low + self.bounds.high),
-            sigma: self.bounds.sigma,
+            sigma: self.bounds.sigma.min(self.bounds.sigma_y),
             shape: Shape::BALL,
             kappa: 0.0,
             color: DVec3::ONE,

@@ -311,7 +311,7 @@ mod tests {
         }
         // A wind takes it along, steadily; 21 m in 3 s are 0.105 units of 200 m.
         assert!((Space::new(&grid).moved(detail.wind * 3.0).x - 0.105).abs() < 1e-12);
-        let (soon, later) = (of(&detail, 0.01), of(&detail, 9.0));
+        let (soon, later) = (of(&detail, 0.001), of(&detail, 9.0));
         let change = |all: &[WeatherBlob]| {
             let off = found.iter().zip(all).map(|(a, b)| (a.kappa - b.kappa).abs() / most);
             off.fold(0.0, f64::max)

@@ -63,9 +63,8 @@ pub struct FrameReference {
     pub sky: Option<SkyView>,
     /// Estimated error of `second`, greatest channel.
     pub second_error: Vec<f64>,
-    /// Greatest of three channels of Σ A |L1 − L1'| / Σ A L1 over the facets of ground and clouds,
-    /// L1 in closed form and L1' through the density grid; 0 unless the lighting mode is
-    /// "two-reflection".
+    /// Greatest of three channels of Σ A |L1 − L1'| / Σ A L1 over facets of ground and clouds, L1
+    /// in closed form and L1' through the density grid; 0 unless the mode is "two-reflection".
     pub grid_error: f64,
 }
 

@@ -6,8 +6,8 @@
 
 // Puts the air before facets (model.md §19, passes.md "haze"). In: facets, their light, the sky.
 // Out: the light as the eye sees it, as "first" alone, and its changes inside of blobs. Law: light
-// times the share that comes through, plus the light of the air. Error: 1e-5 of the greatest
-// radiance of light and air.
+// times the share that comes through, plus the light of the air. Error: 1e-5 of the magnitudes that
+// are added up.
 
 // 1: the light changes inside of blobs.
 layout(constant_id = 0) const uint SLOPES = 0;
@@ -27,7 +27,10 @@ float sum(vec3 v) { return v.r + v.g + v.b; }
 void main() {
     FOR_EACH(i, push.n_facets) {
         Sky sky = skies[0];
-        Haze haze = haze_before(sky, facets[i].position - sky.camera.eye);
+        vec3 offset = facets[i].position - sky.camera.eye;
+        float far = length(offset);
+        // At the eye there is no air, whatever the direction.
+        Haze haze = haze_before(sky, far > 0.0 ? offset / far : vec3(0.0, 1.0, 0.0), far);
         Lit light = lit[i];
         vec3 through = haze.through * (light.first + light.second);
         light.first = through + haze.added;

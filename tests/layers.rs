@@ -297,6 +297,7 @@ fn what_has_no_layers_is_refused_and_nothing_is_written() {
         ),
         ("a.exr", vec!["--reference", "thin", "--samples", "4"], "expected --samples 1"),
         ("a.exr", vec!["--set", "draw.resolution=0.5"], "--set draw.resolution=1"),
+        ("a.exr", vec!["--set", "sky.model=\"hosek-wilkie\""], "--set sky.haze=0"),
     ] {
         let out = path(&dir, name);
         let args = ["render", "scenes/hello.toml", "--layers", "-o", &out];

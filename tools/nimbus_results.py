@@ -18,7 +18,7 @@
     Ledger      nimbus ledger --out DIR or --json              rows
     Stress      nimbus stress --json or --csv                  cases
     Comparison  nimbus compare A B --json                      measures
-    Frames      nimbus farm merge of pictures                  pictures
+    Frames      nimbus farm merge, nimbus render --frames      pictures
 
 A table is a dict of numpy arrays by column. Numbers that were not measured are NaN, and texts are
 object arrays. Times are in milliseconds and errors in units of full scale (premultiplied linear
@@ -1535,7 +1535,7 @@ class History(_Result):
 
 
 class Frames(_Result):
-    """The merged frames of `nimbus farm merge`: an animation, a picture a file.
+    """Frames of `nimbus farm merge` or `nimbus render --frames`: an animation, a picture a file.
 
     `pictures`: a row for each picture, in the order of frames: its number, `file`, `format` (png or
     exr), `bytes`, and `sha256` as frames.sha256 lists it. `missing` has the numbers between the
@@ -1626,7 +1626,7 @@ def _read_record(record_path: Path, path: Path, folder: Optional[Path], verify: 
 
 
 def _read_frames(folder: Path, path: Path, verify: bool) -> Frames:
-    """Reads the merged pictures of a farm."""
+    """Reads pictures of frames."""
     verified = verify and _check_list(folder, "frames")
     lines = _text_of(folder / "frames.sha256").rstrip("\n").split("\n")
     pairs = (line.partition("  ") for line in lines if line)

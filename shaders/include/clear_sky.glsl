@@ -3,8 +3,6 @@
 
 // Least sine of an elevation: below it the air to space is opaque.
 const float LEAST_UP = 1e-6;
-// A smaller step along the height is taken as level.
-const float LEAST_STEP = 1e-3;
 
 // Returns the angle between unit vectors whose cosine is `cosine`, to 1e-7 (Abramowitz and Stegun,
 // 4.4.46). GLSL's atan may be off by 5e-4 of its value.
@@ -36,11 +34,15 @@ vec3 dome_radiance(Sky sky, vec3 direction) {
     return max(sky.scale * of_height * of_sun, 0.0);
 }
 
-// Returns the share of light that air of an optical depth takes. Below 1e-2 it is the series, whose
-// next term is 4e-10 of it.
+// Returns (1 - e^-x)/x. Below 1e-2, where the difference loses digits, it is the series; its next
+// term is 1e-10.
+float mean_decay(float x) {
+    return x < 1e-2 ? 1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0)) : (1.0 - exp(-x)) / x;
+}
+
+// Returns the share of light that air of an optical depth takes.
 vec3 taken_by(vec3 depth) {
-    vec3 small = depth * (1.0 - depth * (0.5 - depth * (1.0 / 6.0 - depth / 24.0)));
-    return mix(1.0 - exp(-depth), small, lessThan(depth, vec3(1e-2)));
+    return depth * vec3(mean_decay(depth.r), mean_decay(depth.g), mean_decay(depth.b));
 }
 
 // Returns the optical depth from a height to space.
@@ -53,9 +55,7 @@ vec3 depth_to_space(Sky sky, float height, float up) {
 
 // Returns the mean of e^(-h/H) between two heights.
 float mean_density(float low, float high, float inverse) {
-    float x = (high - low) * inverse;
-    float mean = x > LEAST_STEP ? (1.0 - exp(-x)) / x : 1.0 - 0.5 * x;
-    return exp(-low * inverse) * mean;
+    return exp(-low * inverse) * mean_decay((high - low) * inverse);
 }
 
 // Returns the optical depth of a straight way from one height to another.
@@ -76,16 +76,16 @@ struct Haze {
     vec3 added;
 };
 
-// Returns the air before a place at `offset` from the eye.
-Haze haze_before(Sky sky, vec3 offset) {
-    float far = length(offset);
-    if (!(far > 0.0)) {
-        return Haze(vec3(1.0), vec3(0.0));
-    }
-    vec3 way = offset * (sky.unit * vec3(1.0, sky.flatness, 1.0));
-    vec3 depth = sky.haze * depth_between(sky, sky.height, sky.height + way.y, length(way));
+// Returns the air before a place that is `far` scene units away in a unit direction.
+Haze haze_before(Sky sky, vec3 direction, float far) {
+    // The squares of far ways have no number.
+    vec3 flat_direction = direction * vec3(1.0, sky.flatness, 1.0);
+    float metres = far * sky.unit;
+    float to = sky.height + metres * flat_direction.y;
+    vec3 depth =
+        sky.haze * depth_between(sky, sky.height, to, metres * length(flat_direction));
     vec3 taken = taken_by(depth);
-    return Haze(1.0 - taken, taken * radiance_of_air(sky, offset / far));
+    return Haze(1.0 - taken, taken * radiance_of_air(sky, direction));
 }
 
 // Returns the share of the sun's disc that a direction sees.
@@ -105,6 +105,6 @@ vec3 sky_behind(Sky sky, vec3 direction) {
         return radiance_of_air(sky, direction);
     }
     float height = sky.height / (sky.unit * sky.flatness);
-    Haze haze = haze_before(sky, direction * (height / -direction.y));
+    Haze haze = haze_before(sky, direction, height / -direction.y);
     return haze.through * sky.ground + haze.added;
 }

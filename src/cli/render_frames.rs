@@ -5,34 +5,32 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::args::{RenderArgs, Span};
 use super::interrupt::{self, PATIENCE, graceful_stop};
 use super::output;
 use super::progress::progress;
-use super::scene::{device_choice, load};
+use super::scene::{check_time, device_choice, load};
 use crate::error::{Error, Result};
-use crate::frame::{GpuContext, Player};
+use crate::frame::{FrameDrawer, GpuContext};
 use crate::io::clip::Clip;
 use crate::io::console::say;
 use crate::io::image::{self, ImageKind};
 use crate::io::result_folder::{Existing, ResultFolder};
-use crate::model::backdrop::Backdrop;
+use crate::io::scene_file::LoadedScene;
 use crate::model::film::Film;
 use crate::model::scene::{Scene, Time};
 use crate::timing::machine::device_record;
 
-/// Kind of the results: the record is `frames.json`.
+/// Kind of the results, which have pictures and their list, as those of `farm merge`.
 const KIND: &str = "frames";
-/// The record, which is written last.
-const RECORD: &str = "frames.json";
 /// Pictures a second of a clip whose scene has another step than a film has.
 const USUAL_RATE: f64 = 30.0;
 
 /// The place of the pictures.
 enum Sink {
-    Folder { folder: ResultFolder, format: ImageKind },
+    Folder(ResultFolder),
     Clip(Clip),
 }
 
@@ -53,12 +51,10 @@ pub fn run(args: &RenderArgs, span: Span) -> Result<()> {
     if is_clip && args.format.is_some() {
         return Err(Error::usage("--format is that of single pictures; a clip has none"));
     }
-    output::refuse_existing(&args.output, args.force)?;
+    output::check_out(&args.output, args.force)?;
     let loaded = load(&args.scene, &args.options)?;
     let quiet = args.options.quiet;
     let gpu = GpuContext::open(&device_choice(&args.options))?;
-    let first = loaded.exact_at_frame(span.first);
-    let Film { width, height, .. } = first.film;
     let format = args.format.map_or(ImageKind::Png, Into::into);
     let _claim = if is_clip { output::claim_file(&args.output, args.force)? } else { None };
     let sink = SharedSink::default();
@@ -67,41 +63,32 @@ pub fn run(args: &RenderArgs, span: Span) -> Result<()> {
         interrupt::keep(PATIENCE, move || keep(&sink, &place, quiet))
     };
     *lock(&sink) = Some(if is_clip {
-        Sink::Clip(Clip::start(&args.output, [width, height], rate(&first.time))?)
+        let Scene { film, time, .. } = &loaded.scene;
+        check_sizes(&loaded)?;
+        Sink::Clip(Clip::start(&args.output, [film.width, film.height], rate(time))?)
     } else {
-        let names = (span.first..span.end).map(|i| format.frame_name(i));
-        let planned: Vec<String> = names.chain([RECORD.to_owned()]).collect();
+        let planned: Vec<String> = (span.first..span.end).map(|i| format.frame_name(i)).collect();
         let existing = Existing::new(args.force);
-        Sink::Folder { folder: ResultFolder::open(&args.output, KIND, existing, &planned)?, format }
+        Sink::Folder(ResultFolder::open(&args.output, KIND, existing, &planned)?)
     });
 
     let (stop, begin) = (graceful_stop(), Instant::now());
     let bar = progress(u64::from(span.end - span.first), "frames", quiet);
-    let mut playing: Option<(Arc<Scene>, Player)> = None;
+    let mut drawer = FrameDrawer::new(&gpu, !args.options.no_skip);
     for i_frame in span.first..span.end {
         if stop.load(Ordering::Relaxed) {
             drop(bar);
             return Err(keep(&sink, &args.output, quiet));
         }
         let scene = loaded.exact_at_frame(i_frame);
-        let (scene, player) = match playing.take() {
-            Some((same, player)) if *same == scene => playing.insert((same, player)),
-            previous => {
-                // Frees the device's memory before the next phase allocates.
-                drop(previous);
-                let scene = Arc::new(scene);
-                playing.insert((scene.clone(), gpu.player(scene, !args.options.no_skip)?))
-            }
-        };
-        let packet = player.game.step(i_frame)?;
-        player.renderer.step(packet)?;
-        let rgba = player.renderer.image()?;
-        let shown = Backdrop::of(scene, scene.time.at(i_frame));
+        check_time(&scene, scene.time.at(i_frame))?;
+        let (rgba, shown) = drawer.draw(scene, i_frame)?;
+        let Film { width, height, .. } = shown.film;
         match &mut *lock(&sink) {
             Some(Sink::Clip(clip)) => {
                 clip.add(&image::display_bytes(&shown, width, height, &rgba))?
             }
-            Some(Sink::Folder { folder, format }) => {
+            Some(Sink::Folder(folder)) => {
                 let name = format.frame_name(i_frame);
                 folder.add(&name, |path| image::write(path, &shown, width, height, &rgba))?;
             }
@@ -109,16 +96,17 @@ pub fn run(args: &RenderArgs, span: Span) -> Result<()> {
         }
         bar.advance();
     }
-    drop((bar, playing));
+    drop((bar, drawer));
     let device = device_record(gpu.device.info());
     gpu.close()?;
-    let record = json!({
-        "scene": args.scene.display().to_string(), "first": span.first, "end": span.end,
-        "width": width, "height": height, "device": device,
-        "seconds": begin.elapsed().as_secs_f64(),
-    });
-    finish(lock(&sink).take(), &args.output, &record, quiet)?;
-    if args.json { output::object(&record) } else { Ok(()) }
+    finish(lock(&sink).take(), &args.output, quiet)?;
+    if !args.json {
+        return Ok(());
+    }
+    output::object(&json!({
+        "file": args.output.display().to_string(), "first": span.first, "end": span.end,
+        "device": device, "seconds": begin.elapsed().as_secs_f64(),
+    }))
 }
 
 /// Returns whether the pictures become a clip.
@@ -134,6 +122,19 @@ fn is_clip(output: &Path) -> Result<bool> {
     }
 }
 
+/// Checks that all pictures of a clip have one size.
+fn check_sizes(loaded: &LoadedScene) -> Result<()> {
+    let size = |scene: &Scene| (scene.film.width, scene.film.height);
+    let whole = size(&loaded.scene);
+    match loaded.phases.iter().find(|phase| size(&phase.scene) != whole) {
+        None => Ok(()),
+        Some(phase) => Err(Error::usage(format!(
+            "phase \"{}\" has pictures of another size, and a clip has one size; expected -o DIR",
+            phase.name
+        ))),
+    }
+}
+
 /// Returns the pictures a second of a clip: as many as the scene has, if films have as many.
 fn rate(time: &Time) -> f64 {
     let rate = (1.0 / time.step_s).round();
@@ -141,20 +142,15 @@ fn rate(time: &Time) -> f64 {
 }
 
 /// Puts finished pictures into their place.
-fn finish(sink: Option<Sink>, place: &Path, record: &Value, quiet: bool) -> Result<()> {
+fn finish(sink: Option<Sink>, place: &Path, quiet: bool) -> Result<()> {
     match sink {
         Some(Sink::Clip(clip)) => {
             let n = clip.n_frames();
             clip.finish()?;
             output::wrote(place, &format!("{n} frames"), quiet);
         }
-        Some(Sink::Folder { mut folder, .. }) => {
-            let write = |staged: &Path| {
-                let path = staged.join(RECORD);
-                let text = format!("{record:#}\n");
-                std::fs::write(&path, text).map_err(|cause| Error::io(&path, cause))
-            };
-            folder.finish(&[RECORD], write)?;
+        Some(Sink::Folder(mut folder)) => {
+            folder.finish(&[], |_| Ok(()))?;
             output::wrote_folder(&folder, true, quiet);
         }
         None => {}
@@ -172,7 +168,7 @@ fn keep(sink: &SharedSink, place: &Path, quiet: bool) -> Error {
                 Err(error) => return error,
             }
         }
-        Some(Sink::Folder { folder, .. }) if folder.unfinished_at().is_some() => {
+        Some(Sink::Folder(folder)) if folder.unfinished_at().is_some() => {
             output::wrote_folder(&folder, false, quiet);
         }
         _ => say!("no frame was finished, nothing is kept"),

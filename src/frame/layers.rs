@@ -4,7 +4,7 @@
 //! with the radiance of the other one taken away. Depth, optical depth and the number of particles
 //! are sums over the layers of a pixel, which one draw call adds up by blending.
 
-use super::features::{blob_variant, has_second, is_lit};
+use super::features::{blob_variant, has_haze, has_second, is_lit};
 use super::merging::drawn;
 use super::packet::Packet;
 use super::plan::{Pass, Plan};
@@ -29,9 +29,15 @@ const MOST_DEPTH24: f32 = 16_777_215.0;
 /// and with "auto" for the resolution settled.
 ///
 /// # Errors
-/// Fails if blobs are drawn into a smaller picture: enlarging it cuts off what is below 0, so that
-/// its reflections do not add up.
+/// Fails if reflections do not add up to the picture: in a smaller picture, because enlarging it
+/// cuts off what is below 0, and behind air, which has light of its own.
 pub fn scene_of_layers(mut scene: Scene) -> Result<Scene> {
+    if has_haze(&scene) {
+        return Err(Error::usage(
+            "--layers: the air between eye and scene adds light of its own, so that the \
+             reflections do not add up; expected none, as --set sky.haze=0 sets it",
+        ));
+    }
     scene.draw.impostors = Impostors::Off;
     match scene.draw.resolution {
         Resolution::Full => {}

@@ -14,6 +14,7 @@ mod constants;
 mod counts;
 mod culling;
 mod dark_lights;
+mod drawer;
 mod features;
 mod frame_passes;
 mod game;
@@ -58,6 +59,7 @@ pub use buffers::n_cells;
 pub use choice::{Candidate, Choice, ImpostorChoice, LightChoice, chosen_texts, toml_name};
 pub use chunked_sprites::{ChunkCount, ChunkedSprites};
 pub use counts::Counts;
+pub use drawer::FrameDrawer;
 pub use features::{
     SceneFeatures, Tensors, gathers_from_tree, is_glossy, saturation_bound, target_format,
 };

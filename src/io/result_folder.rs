@@ -241,8 +241,8 @@ impl ResultFolder {
         write: &dyn Fn(&Path) -> Result<()>,
     ) -> Result<()> {
         let list = self.list();
-        let Some((record, before)) = names.split_last() else { return Ok(()) };
-        let all = [others, before, &[&list, record]].concat();
+        let (before, record) = names.split_at(names.len().saturating_sub(1));
+        let all = [others, before, &[&list], record].concat();
         let sums = RefCell::new(Sums::new());
         replace_files(folder, &all, |staged| {
             write(staged)?;

@@ -29,7 +29,7 @@ impl FilmFormat {
 }
 
 named! {
-    /// Tone map of the display.
+    /// Tone map of the display. Shaders have the same numbers.
     pub enum ToneMap {
         /// Khronos PBR Neutral: the identity for displayable values, with highlights compressed.
         Neutral = "neutral",

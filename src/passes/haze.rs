@@ -1,8 +1,8 @@
 //! haze: the air between the eye and the facets.
 //!
 //! In: facets, their light and its changes, the sky. Out: the light as the eye sees it. Law: T L +
-//! A, T and A in closed form. Source: model.md §19. Error: 1e-5 of the greatest radiance of light
-//! and air.
+//! A, T and A in closed form. Source: model.md §19. Error: 1e-5 of the magnitudes that are added
+//! up.
 
 use crate::error::Result;
 use crate::gpu::{Compiler, Device, Kernel, Recorder};

@@ -70,7 +70,7 @@ pub struct Shown {
     pub size: [u32; 2],
     /// The window's pixel at which the picture's top left pixel is.
     pub corner: [i32; 2],
-    /// 0: highlights are compressed; 1: they are clipped; 2: a filmic curve.
+    /// Number of the tone map: 0 compresses highlights, 1 clips them, 2 is a filmic curve.
     pub tone_map: u32,
     /// The comparison with a second picture; without one, A is shown.
     pub compare: Option<Compare>,

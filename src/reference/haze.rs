@@ -17,10 +17,12 @@ pub fn seen(view: &SkyView, offset: DVec3, radiance: DVec3) -> (DVec3, f64) {
     (all, if sum > 0.0 { through.element_sum() / sum } else { 1.0 })
 }
 
-/// Bound of the rounding of a device's pixel: exponents of the dome up to 12 take (3 + 2 · 12) 2⁻²⁴
-/// (Vulkan's precision of exp), its halo and the angle from the sun as much, some 40 products and
-/// sums 2.4e-6, and the depth of the air, whose error shows by 1/e at most, the same again: 6e-6 of
-/// the magnitudes that are added up.
+/// Bound of the rounding of a device's pixel, over the magnitudes that are added up.
+///
+/// Exponents of the dome are up to 12 and take (3 + 2 · 12) 2⁻²⁴, by Vulkan's precision of exp. Its
+/// halo and the angle from the sun take as much, and some 40 products and sums take 2.4e-6. A
+/// difference 1 − e^{−x} from x = 1e-2 on errs by 6e-6 of itself, which shows by 1/e in the depth.
+/// All together are 8e-6.
 pub const ROUNDING: f64 = 1e-5;
 
 /// Returns the magnitudes that the radiance of the air in a unit direction is the sum of.
@@ -53,16 +55,7 @@ mod tests {
     use crate::model::sky::{Sky, SkySettings};
 
     fn view(haze: f64) -> SkyView {
-        let settings = SkySettings {
-            turbidity: 2.0,
-            albedo: DVec3::splat(0.2),
-            metres_per_unit: 1.0,
-            exaggeration: 1.0,
-            sea_level: 0.0,
-            haze,
-            has_disc: false,
-            i_ground: None,
-        };
+        let settings = SkySettings { haze, ..SkySettings::of_turbidity(2.0) };
         let sky = Sky::new(settings, DVec3::new(0.6, 0.8, 0.0)).unwrap();
         SkyView::new(&sky, DVec3::ZERO, &[], &[], 0.0)
     }

@@ -11,7 +11,7 @@ use crate::gpu::{
     Surface, Swapchain,
 };
 use crate::layout::sky::SkyRecord;
-use crate::model::film::{Film, ToneMap};
+use crate::model::film::Film;
 use crate::model::scene::Scene;
 use crate::passes::present::{self, Compare, Present};
 
@@ -115,11 +115,7 @@ impl WindowTarget {
                 exposure: exposure as f32,
                 size: [width, height],
                 corner: [0, 0],
-                tone_map: match tone_map {
-                    ToneMap::Neutral => 0,
-                    ToneMap::Clip => 1,
-                    ToneMap::Filmic => 2,
-                },
+                tone_map: tone_map as u32,
                 compare: None,
             },
         }))

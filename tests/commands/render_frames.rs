@@ -35,17 +35,17 @@ fn frames_are_those_of_single_pictures() {
             let frame = Path::new(&out).join(format!("frame-{i:08}.{extension}"));
             assert!(fs::read(frame).expect("a frame") == fs::read(&single).expect("a picture"));
         }
-        // The list and the record.
+        // The pictures and their list.
         let names: Vec<_> = fs::read_dir(&out).expect("results").collect();
-        assert_eq!(names.len(), 5);
+        assert_eq!(names.len(), 4);
         let list = fs::read_to_string(Path::new(&out).join("frames.sha256")).expect("a list");
-        assert_eq!(list.lines().count(), 4);
+        assert_eq!(list.lines().count(), 3);
         // They stay, unless they may be replaced.
         let again = render(&[&["--frames", "1", "-o", &out], format].concat());
         assert_eq!(again.status.code(), Some(2));
         let again = render(&[&["--frames", "1", "--force", "-o", &out], format].concat());
         assert!(again.status.success(), "{}", told(&again));
-        assert_eq!(fs::read_dir(&out).expect("results").count(), 3);
+        assert_eq!(fs::read_dir(&out).expect("results").count(), 2);
     }
 }
 
@@ -64,6 +64,38 @@ fn faulty_arguments_are_told() {
     assert!(of(&["--frames", "2", "--format", "exr"], "a.mp4").contains("a clip has none"));
     assert!(of(&["--frames", "2", "--frame", "1"], "a").contains("cannot be used"));
     assert!(of(&["--format", "exr"], "a.exr").contains("--frames"));
+}
+
+/// Phases may have pictures of their own sizes: single ones are drawn, and a clip is refused.
+#[test]
+fn phases_of_other_sizes_have_single_pictures_alone() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let scene = path(dir.path(), "sizes.toml");
+    let phase = |name: &str, width: u32| {
+        format!("[[phase]]\nname = '{name}'\nframes = 1\nset.film.width = {width}\n")
+    };
+    let text = format!(
+        "[film]\nwidth = 32\nheight = 24\n[lighting]\nmode = 'none'\n{}{}",
+        phase("a", 32),
+        phase("b", 40)
+    );
+    fs::write(&scene, text).expect("a scene");
+    let of = |name: &str| {
+        let place = path(dir.path(), name);
+        (nimbus(&["render", &scene, "--frames", "2", "-o", &place]).output(), place)
+    };
+    let (output, place) = of("frames");
+    let output = output.expect("it runs");
+    assert!(output.status.success(), "{}", told(&output));
+    let widths = [0, 1].map(|i| {
+        let file = Path::new(&place).join(format!("frame-{i:08}.png"));
+        image::open(file).expect("a picture").width()
+    });
+    assert_eq!(widths, [32, 40]);
+    let (output, place) = of("clip.mp4");
+    let output = output.expect("it runs");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(told(&output).contains("another size") && !Path::new(&place).exists());
 }
 
 /// Writes a program called ffmpeg into a folder, and returns the folder as PATH.
@@ -89,7 +121,7 @@ fn clip(bin: &str, place: &str, frames: &str) -> Command {
 fn clips_get_the_pictures_of_the_frames() {
     let dir = tempfile::tempdir().expect("a folder");
     let place = path(dir.path(), "clip.mp4");
-    // What comes in is the clip, and the arguments are kept beside it.
+    // The stand-in writes its input as the clip, and its arguments beside it.
     let keep = format!("echo \"$@\" > {}/arguments\nfor last; do :; done\ncat > $last", {
         dir.path().display()
     });

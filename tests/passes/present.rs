@@ -50,14 +50,11 @@ const FOV: f64 = 0.12;
 /// A hazy sky with its disc in the picture, over ground.
 fn sky() -> SkyView {
     let settings = SkySettings {
-        turbidity: 4.0,
         albedo: DVec3::splat(0.25),
         metres_per_unit: 2.0,
         exaggeration: 4.0,
-        sea_level: 0.0,
         haze: 0.5,
-        has_disc: true,
-        i_ground: None,
+        ..SkySettings::of_turbidity(4.0)
     };
     let toward = DVec3::new(0.62, 0.03, -0.78).normalize().as_vec3().as_dvec3();
     let view =
@@ -218,11 +215,7 @@ fn show(
         exposure: film.exposure as f32,
         size: SIZE,
         corner: CORNER,
-        tone_map: match film.tone_map {
-            ToneMap::Neutral => 0,
-            ToneMap::Clip => 1,
-            ToneMap::Filmic => 2,
-        },
+        tone_map: film.tone_map as u32,
         compare,
     };
     let [a, b] = &pictures;

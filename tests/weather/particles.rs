@@ -288,7 +288,7 @@ fn a_layout_for_two_steps_serves_all_moments_between() {
 fn an_interval_goes_from_one_step_to_the_next() {
     let (a, b) = (step("supercell.nc", 0), step("supercell.nc", 1));
     let layout = Layout::new(&a.grid, &[&a.extinction, &b.extinction], 20_000, 4);
-    let interval = Interval::laid_out(&layout, &clouds(&a), Some(&clouds(&b)));
+    let interval = Interval::laid_out(&layout, &clouds(&a), Some(&clouds(&b)), Detail::NONE);
     let at = |weight: f64| {
         (0..20_000).map(|i| interval.blob(i, weight).expect("a blob")).collect::<Vec<_>>()
     };
@@ -305,7 +305,7 @@ fn an_interval_goes_from_one_step_to_the_next() {
         assert!((ends.0[i].position - ends.1[i].position).length() < 500.0);
     }
     let layout = Layout::new(&a.grid, &[&a.extinction], 20_000, 4);
-    let alone = Interval::laid_out(&layout, &clouds(&a), None);
+    let alone = Interval::laid_out(&layout, &clouds(&a), None, Detail::NONE);
     assert_eq!(alone.blob(7, 0.9), Some(blobs_of(&a, 20_000, 4).1[7]));
     assert!(alone.blob(19_999, 0.0).is_some() && alone.blob(20_000, 0.0).is_none());
 }

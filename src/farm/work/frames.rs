@@ -3,7 +3,6 @@
 use std::fs;
 use std::ops::Range;
 use std::path::Path;
-use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -11,14 +10,12 @@ use serde_json::{Value, json};
 use super::task::{Merge, Merged, ShardResult, Task, Work};
 use crate::error::{Error, Result};
 use crate::farm::transient::io_error;
-use crate::frame::{GpuContext, Player};
+use crate::frame::{FrameDrawer, GpuContext};
 use crate::io::atomic;
 use crate::io::image::{ImageKind, encoded};
 use crate::io::result_folder::ResultFolder;
 use crate::io::scene_file::LoadedScene;
-use crate::model::backdrop::Backdrop;
-use crate::model::film::Film;
-use crate::model::scene::{Impostors, Scene};
+use crate::model::scene::Impostors;
 use crate::timing::machine::{Device, device_record};
 
 /// The pictures of frames `first` to `first + n − 1`.
@@ -80,33 +77,15 @@ impl Work for Frames {
         let device = device_record(gpu.device.info());
         task.workplace.resume(&device)?;
         let loaded = task.loaded;
-        let mut playing: Option<(Arc<Scene>, Player)> = None;
+        let mut drawer = FrameDrawer::new(&gpu, true);
         task.make_files(
             |i_frame| self.format.frame_name(i_frame),
             |i_frame| {
-                let (scene, player) = match playing.take() {
-                    // A scene without phases is the same in all frames.
-                    Some((scene, player))
-                        if loaded.phases.is_empty() || *scene == loaded.exact_at_frame(i_frame) =>
-                    {
-                        playing.insert((scene, player))
-                    }
-                    previous => {
-                        // Frees the device's memory before the next phase allocates.
-                        drop(previous);
-                        let scene = Arc::new(loaded.exact_at_frame(i_frame));
-                        playing.insert((scene.clone(), gpu.player(scene, true)?))
-                    }
-                };
-                let packet = player.game.step(i_frame)?;
-                player.renderer.step(packet)?;
-                let rgba = player.renderer.image()?;
-                let backdrop = Backdrop::of(scene, scene.time.at(i_frame));
-                let Film { width, height, .. } = scene.film;
-                encoded(self.format, &backdrop, width, height, &rgba)
+                let (rgba, shown) = drawer.draw(loaded.exact_at_frame(i_frame), i_frame)?;
+                encoded(self.format, &shown, shown.film.width, shown.film.height, &rgba)
             },
         )?;
-        drop(playing);
+        drop(drawer);
         // Closing reports the validation layers' messages. Later attempts must not take over
         // pictures that such a message may be about.
         gpu.close().inspect_err(|_| task.workplace.disown())?;

@@ -3,14 +3,17 @@
 use super::key::{Keys, keys, read_table};
 use super::materials::{PLANE, plane_named};
 use super::spec::{choice, flag, number, vector};
+use super::weather::EXAGGERATION;
 use crate::error::Result;
-use crate::io::bounds::{Bounds, COORDINATE, DIVISOR};
+use crate::io::bounds::{Bounds, COORDINATE};
 use crate::io::document::section::Section;
 use crate::model::material::Material;
 use crate::model::sky::{SkyModel, SkySettings};
 
 /// Range of turbidities that the model has fits for.
 const TURBIDITY: Bounds = Bounds::Within(1.0, 10.0);
+/// Range of the length of a unit: lengths of a scene have numbers in metres, too.
+const METRES: Bounds = Bounds::Within(1e-6, 1e6);
 const UNIT: Bounds = Bounds::Within(0.0, 1.0);
 /// Range of the factor of the air's depth.
 const HAZE: Bounds = Bounds::Within(0.0, 100.0);
@@ -27,9 +30,9 @@ keys! { SKY: fn sky(s, i_ground: Option<usize>) -> SkySettings { SkySettings;
     /// Albedo of the ground that the sky reflects, linear RGB.
     albedo: vector([0.1; 3], UNIT);
     /// Length of a scene unit.
-    metres_per_unit: number(1.0, DIVISOR), "m";
+    metres_per_unit: number(1.0, METRES), "m";
     /// Factor of the heights in the scene: that of its weather.
-    exaggeration: number(1.0, DIVISOR);
+    exaggeration: number(1.0, EXAGGERATION);
     /// Height of the sea level, from which the air thins out.
     sea_level: number(0.0, COORDINATE), "unit";
     /// Factor of the air's depth before clouds and ground; 0 leaves the air out.

@@ -17,6 +17,8 @@ use crate::model::weather::detail::Detail;
 
 /// Most blobs of a file; a blob takes some 48 bytes.
 const MOST_PARTICLES: u32 = 20_000_000;
+/// Range of factors of heights.
+pub const EXAGGERATION: Bounds = Bounds::Within(0.01, 100.0);
 /// Range of winds, faster than any on earth.
 const WIND: Bounds = Bounds::Within(-1000.0, 1000.0);
 /// Greatest speed of weather: a day in a second.
@@ -39,7 +41,7 @@ keys! { WEATHER: pub fn settings(s, last: u32, detail: Detail) -> Settings { Set
     /// Blobs that stand for the file's clouds.
     n_particles ["particles"]: integer(20_000, 1, MOST_PARTICLES);
     /// Factor on heights.
-    exaggeration: number(1.0, Bounds::Within(0.01, 100.0));
+    exaggeration: number(1.0, EXAGGERATION);
     /// Seconds of the file in a second of the scene; 0: the step stands still.
     speed: number(0.0, Bounds::Within(-GREATEST_SPEED, GREATEST_SPEED));
 }}

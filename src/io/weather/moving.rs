@@ -58,7 +58,7 @@ fn moving_by(
     let layout =
         is_small.then(|| Layout::new(&read[0].grid, &all, settings.n_particles as usize, seed));
     let bounds = Bounds::of(&read, settings.exaggeration);
-    let slots = (settings.n_particles as usize, seed);
+    let slots = (settings.n_particles as usize, seed, settings.detail);
     let spans = Spans::new(file, times_s.clone(), slots, layout, settings.speed < 0.0);
     let steps = Steps { spans, settings, times_s, bounds };
     let first = steps.at(0.0)?;
@@ -130,8 +130,8 @@ impl Animation for Steps {
         let is_before = file_s < self.times_s.first().copied().unwrap_or(file_s);
         let ends = if is_before { (i, i) } else { self.spans.ends_from(i) };
         let span = self.spans.get(ends)?;
-        let Settings { n_particles, detail, exaggeration, speed, .. } = self.settings;
-        let blobs = span.blobs(n_particles as usize, weight, &detail, speed * time_s);
+        let Settings { n_particles, exaggeration, speed, .. } = self.settings;
+        let blobs = span.blobs(n_particles as usize, weight, speed * time_s);
         let of = |blob: &Option<WeatherBlob>| match blob {
             Some(blob) => self.kept_to(particle(blob, exaggeration)),
             None => self.nothing(),
@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn layouts_of_a_file_of_many_steps_fade_into_each_other() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/weather/supercell.nc");
-        let detail = Detail { strength: 0.0, wind: DVec3::ZERO, seed: 0 };
+        let detail = Detail::NONE;
         let settings =
             Settings { i_step: 0, n_particles: 2001, exaggeration: 2.0, speed: 60.0, detail };
         let of = |most_together| {

@@ -44,13 +44,7 @@ pub struct Span {
 impl Span {
     /// Returns the blobs in `n` slots at `weight` of the way to the second step, with the detail
     /// that they have at a time; `None` in slots that the layout does not use.
-    pub fn blobs(
-        &self,
-        n: usize,
-        weight: f64,
-        detail: &Detail,
-        time_s: f64,
-    ) -> Vec<Option<WeatherBlob>> {
+    pub fn blobs(&self, n: usize, weight: f64, time_s: f64) -> Vec<Option<WeatherBlob>> {
         let mut all = vec![None; n];
         let (first, second) = all.split_at_mut(self.n_first.min(n));
         for (half, slots) in self.halves.iter().zip([first, second]) {
@@ -60,7 +54,7 @@ impl Span {
                 Fade::Out => 1.0 - weight,
                 Fade::In => weight,
             };
-            let blobs = interval.blobs(weight, detail, time_s);
+            let blobs = interval.blobs(weight, time_s);
             for (slot, blob) in slots.iter_mut().zip(blobs) {
                 *slot = Some(WeatherBlob { kappa: share * blob.kappa, ..blob });
             }
@@ -89,6 +83,7 @@ struct State {
 struct Source {
     file: WeatherFile,
     times_s: Vec<f64>,
+    detail: Detail,
     seed: u32,
     /// Layout of all steps, in a file of few.
     layout: Option<Layout>,
@@ -106,12 +101,13 @@ impl Spans {
     pub fn new(
         file: WeatherFile,
         times_s: Vec<f64>,
-        (n, seed): (usize, u32),
+        (n, seed, detail): (usize, u32, Detail),
         layout: Option<Layout>,
         is_backward: bool,
     ) -> Spans {
         let n_slots = if layout.is_some() { [n, 0] } else { [n - n / 2, n / 2] };
-        let source = Source { file, times_s, seed, layout, n_slots, held: Mutex::new(vec![]) };
+        let held = Mutex::new(vec![]);
+        let source = Source { file, times_s, detail, seed, layout, n_slots, held };
         Spans { source: Arc::new(source), is_backward, state: Mutex::new(State::default()) }
     }
 
@@ -185,7 +181,8 @@ impl Source {
     fn make(&self, (i, j): Ends) -> Result<Span> {
         let first = self.step(i)?;
         let second = if i == j { None } else { Some(self.step(j)?) };
-        let laid_out = |layout: &Layout| Interval::laid_out(layout, &first, second.as_deref());
+        let laid_out =
+            |layout: &Layout| Interval::laid_out(layout, &first, second.as_deref(), self.detail);
         let mut halves = [None, None];
         match &self.layout {
             Some(layout) => halves[0] = Some((laid_out(layout), Fade::Always)),

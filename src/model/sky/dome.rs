@@ -63,9 +63,9 @@ impl Dome {
 mod tests {
     use super::*;
 
-    /// Elevation of the sun, turbidity, albedo, angle from the zenith and azimuth from the sun
-    /// (degrees), and the radiance in W m⁻² sr⁻¹ that the authors' program
-    /// (ArHosekSkyModel.c 1.4a, `arhosek_tristim_skymodel_radiance`) returns.
+    /// Elevation of the sun, turbidity, albedo, [angle from the zenith, azimuth from the sun],
+    /// radiance. Angles are in degrees, the radiance in W m⁻² sr⁻¹. The radiance is that of the
+    /// authors' program (ArHosekSkyModel.c 1.4a, `arhosek_tristim_skymodel_radiance`).
     type Published = (f64, f64, f64, [f64; 2], [f64; 3]);
 
     const PUBLISHED: [Published; 30] = [

@@ -50,7 +50,7 @@ pub fn sunlit_exposure(lights: &[Light]) -> f64 {
     if all > 0.0 { SHOWN * PI / all } else { 1.0 }
 }
 
-/// What a scene says of its sky.
+/// The settings of a scene's sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SkySettings {
     /// Optical depth of all air over that of its molecules: 1 to 10.
@@ -69,6 +69,23 @@ pub struct SkySettings {
     pub has_disc: bool,
     /// Material of the plane at sea level.
     pub i_ground: Option<usize>,
+}
+
+impl SkySettings {
+    /// Returns the sky of a turbidity over dark ground, in a scene of metres: all of the air, the
+    /// sun's disc, and no plane at sea level.
+    pub fn of_turbidity(turbidity: f64) -> SkySettings {
+        SkySettings {
+            turbidity,
+            albedo: DVec3::splat(0.1),
+            metres_per_unit: 1.0,
+            exaggeration: 1.0,
+            sea_level: 0.0,
+            haze: 1.0,
+            has_disc: true,
+            i_ground: None,
+        }
+    }
 }
 
 /// A clear sky.

@@ -1,16 +1,7 @@
 use super::*;
 
 fn settings() -> SkySettings {
-    SkySettings {
-        turbidity: 3.0,
-        albedo: DVec3::splat(0.1),
-        metres_per_unit: 1.0,
-        exaggeration: 1.0,
-        sea_level: 0.0,
-        haze: 1.0,
-        has_disc: true,
-        i_ground: None,
-    }
+    SkySettings::of_turbidity(3.0)
 }
 
 fn toward(elevation: f64) -> DVec3 {
@@ -39,12 +30,12 @@ fn a_clear_sky_gives_the_light_that_is_measured() {
 
 #[test]
 fn a_far_thing_takes_the_colour_of_the_sky_behind_it() {
-    let view = view(30.0, SkySettings { ..settings() }, DVec3::new(0.0, 2000.0, 0.0));
+    let view = view(30.0, settings(), DVec3::new(0.0, 2000.0, 0.0));
     for direction in [DVec3::new(0.3, 0.05, 0.9), DVec3::new(-1.0, 0.4, 0.1), DVec3::X] {
         let direction = direction.normalize();
         let far = view.before(direction * 1e7);
         let behind = view.behind(direction);
-        // What comes through of the far thing is what comes through from space.
+        // As much light comes from the far thing as from space.
         let through = (-view.sky.air.toward_space(2000.0, direction.y)).map(f64::exp);
         assert!((far.through - through).abs().max_element() < 1e-6, "{far:?} {through}");
         assert!((far.added - behind).abs().max_element() < 1e-6, "{far:?} {behind}");

@@ -1,5 +1,5 @@
-//! Detail of clouds below the cells of a weather file (model.md §15): a turbulent modulation of the
-//! blobs' masses that leaves every cell's mass as it is, and a turbulent displacement. It is
+//! Detail of clouds below the cells of a weather file (model.md §15). A turbulent noise modulates
+//! the masses of a cell's blobs, which keep the cell's mass, and displaces blobs. The detail is
 //! invented; only its spectrum is that of turbulence.
 
 use glam::DVec3;
@@ -19,14 +19,15 @@ const LACUNARITY: f64 = 1.93;
 const DEVIATION: f64 = 0.1909;
 /// Strength of the modulation with `detail` = 1, over the mean extinction.
 const STRENGTH: f64 = 1.6;
-/// What is taken off the noise where the extinction is half of the cell's mean, and elsewhere in
-/// proportion to 1/extinction − 1: clouds fray at their edges.
+/// Decrease of the noise where the extinction is half of the cell's mean. Elsewhere it is in
+/// proportion to 1/extinction − 1, so that clouds fray at their edges.
 const FRAY: f64 = 0.35;
 /// Least extinction over the mean that counts there.
 const THINNEST: f64 = 0.25;
 /// Standard deviation of the displacement with `detail` = 1, cells.
 const SHIFT: f64 = 0.5;
-/// Most cells in height of one unit of the modulation, so that flat cells do not make pancakes.
+/// Most cells in height of one unit of the modulation, so that the detail of flat cells is not
+/// flat, too.
 const FLATTEST: f64 = 4.0;
 /// "deta": a Philox stream of its own.
 const STREAM: u32 = 0x6465_7461;
@@ -73,6 +74,9 @@ fn displaced(
 }
 
 impl Detail {
+    /// No detail.
+    pub const NONE: Detail = Detail { strength: 0.0, wind: DVec3::ZERO, seed: 0 };
+
     /// Returns the effect on the blobs of a layout at a time. Without a wind it is the same at all
     /// times. It depends on the ground, but not on the heights of `grid`.
     pub fn effects(&self, layout: &Layout, grid: &Grid, time_s: f64) -> Vec<Effect> {
@@ -112,7 +116,7 @@ impl Detail {
     }
 }
 
-/// What detail does to a blob.
+/// The change of a blob by its detail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
     /// Share of its cell's mass over that of a blob of the same mass without detail.
@@ -123,7 +127,10 @@ pub struct Effect {
 
 /// Gives the blobs of a layout their detail: none without effects. Every cell keeps its mass.
 pub fn apply(effects: &[Effect], blobs: &mut [WeatherBlob], layout: &Layout) {
-    let Some(n_cells) = layout.places().iter().map(|p| p.i_cell as usize + 1).max() else { return };
+    if effects.is_empty() {
+        return;
+    }
+    let n_cells = layout.places().iter().map(|p| p.i_cell as usize + 1).max().unwrap_or(0);
     let mut sums = vec![[0.0; 2]; n_cells];
     let both = || effects.iter().zip(layout.places());
     for (blob, (effect, place)) in blobs.iter().zip(both()) {
@@ -263,7 +270,9 @@ mod tests {
         };
         // From 0.12 to 0.48 units: within the octaves.
         let slope = (structure(24) / structure(6)).ln() / 4f64.ln();
-        assert!((0.45..0.95).contains(&slope), "{slope}");
+        // Measured: 0.79. Endless octaves would have 2/3; the shortest of four is smooth within
+        // itself, where the slope tends to 2. White noise would have 0.
+        assert!((slope - 0.79).abs() < 0.1, "{slope}");
     }
 
     /// Cells of 100 x 100 x 50 m: 8 thick ones in a row, and clear ones around them.

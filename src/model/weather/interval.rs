@@ -1,8 +1,6 @@
 //! The blobs between two steps, or of one step alone. They are laid out once; any moment is then
 //! one interpolation a blob.
 
-use std::sync::OnceLock;
-
 use glam::DVec3;
 
 use super::detail::{self, Detail, Effect};
@@ -24,8 +22,9 @@ pub struct Interval {
     from: Vec<WeatherBlob>,
     layout: Layout,
     grid: Grid,
-    /// The effects of the first detail that was asked for and has no wind.
-    still: OnceLock<(Detail, Vec<Effect>)>,
+    detail: Detail,
+    /// The effects of the detail, where no wind changes them.
+    still: Option<Vec<Effect>>,
     /// `None` for a single step.
     to: Option<Vec<WeatherBlob>>,
 }
@@ -33,24 +32,33 @@ pub struct Interval {
 impl Interval {
     /// Places the blobs of `layout` for a step and the next one on a grid of the same shape, or for
     /// a step alone.
-    pub fn laid_out(layout: &Layout, a: &StepClouds, b: Option<&StepClouds>) -> Self {
+    pub fn laid_out(
+        layout: &Layout,
+        a: &StepClouds,
+        b: Option<&StepClouds>,
+        detail: Detail,
+    ) -> Self {
         let blobs = |step: &StepClouds| layout.blobs(&step.grid, &step.extinction);
-        let (layout, grid) = (layout.clone(), a.grid.clone());
-        Interval { from: blobs(a), to: b.map(blobs), layout, grid, still: OnceLock::new() }
+        let is_still = detail.wind == DVec3::ZERO;
+        Interval {
+            from: blobs(a),
+            to: b.map(blobs),
+            still: is_still.then(|| detail.effects(layout, &a.grid, 0.0)),
+            layout: layout.clone(),
+            grid: a.grid.clone(),
+            detail,
+        }
     }
 
     /// Returns all blobs at `weight` of the way, with the detail that they have at a time.
-    pub fn blobs(&self, weight: f64, detail: &Detail, time_s: f64) -> Vec<WeatherBlob> {
+    pub fn blobs(&self, weight: f64, time_s: f64) -> Vec<WeatherBlob> {
         let mut all: Vec<WeatherBlob> =
             (0..self.from.len()).filter_map(|i| self.blob(i, weight)).collect();
-        let effects = || detail.effects(&self.layout, &self.grid, time_s);
-        if detail.wind != DVec3::ZERO {
-            detail::apply(&effects(), &mut all, &self.layout);
-            return all;
+        let Interval { layout, grid, detail, still, .. } = self;
+        match still {
+            Some(effects) => detail::apply(effects, &mut all, layout),
+            None => detail::apply(&detail.effects(layout, grid, time_s), &mut all, layout),
         }
-        let (of, kept) = self.still.get_or_init(|| (*detail, effects()));
-        let made = if of == detail { None } else { Some(effects()) };
-        detail::apply(made.as_ref().unwrap_or(kept), &mut all, &self.layout);
         all
     }
 

@@ -16,6 +16,8 @@
 
 // 1: the clouds' transmittance is also stored by itself.
 layout(constant_id = 0) const uint APART = 0;
+// 1: ground may hide a light from its own points.
+layout(constant_id = 1) const uint RELIEF = 0;
 
 #ifndef DEPTHS
 #define DEPTHS 0
@@ -37,6 +39,9 @@ layout(push_constant) uniform Push {
     uint max_steps;
     // The first so many facets receive the sky through the clouds.
     uint n_under_sky;
+    // Facets of the ground's points.
+    uint i_first_ground;
+    uint n_ground;
 } push;
 READS(0, Facet, facets)
 READS(1, Light, lights)
@@ -46,6 +51,8 @@ FLOATS(3, density)
 // [facet][light]
 WRITES(4, float, transmittance)
 WRITES(5, float, through)
+// [point of the ground][light] 1: ground hides the light.
+READS(6, uint, hidden)
 
 #include "sum.glsl"
 // Sums in double sample in double.
@@ -89,13 +96,22 @@ float arriving(float depth) {
 #endif
 }
 
+// Whether ground hides a light from facet j.
+bool is_behind_ground(uint j, uint i_light) {
+    uint i_point = j - push.i_first_ground;
+    return RELIEF != 0 && j >= push.i_first_ground && i_point < push.n_ground
+           && hidden[i_point * push.n_lights + i_light] != 0u;
+}
+
 void main() {
     FOR_EACH(k, push.n_facets * push.n_lights) {
-        Facet facet = facets[k / push.n_lights];
-        Light light = lights[k % push.n_lights];
+        uint j = k / push.n_lights, i_light = k % push.n_lights;
+        Facet facet = facets[j];
+        Light light = lights[i_light];
         // A light without energy is multiplied by 0 later.
         bool is_on = any(notEqual(light.energy, vec3(0.0)))
-                     && (light.kind != LIGHT_SKY || k / push.n_lights < push.n_under_sky);
+                     && (light.kind != LIGHT_SKY || j < push.n_under_sky)
+                     && !is_behind_ground(j, i_light);
         bool is_center_clear =
             is_on && is_clear(facet.position, light, facet.i_region, push.n_surfaces);
         // Part of a surface's facet may be lit though its centre is hidden.

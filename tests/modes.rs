@@ -271,7 +271,7 @@ fn a_still_scene_skips_and_a_moving_one_does_not() {
         .map(|p| p.name())
         .filter(|p| {
             let others = ["live", "contract", "texture", "terrain", "impostors", "sprites"];
-            let unused = ["upsample", "diffusion", "scatter", "harmonics", "lod", "haze"];
+            let unused = ["upsample", "diffusion", "scatter", "harmonics", "lod", "haze", "relief"];
             !others.contains(p) && !unused.contains(p)
         })
         .collect();

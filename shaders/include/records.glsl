@@ -190,6 +190,12 @@ struct Pairing {
 struct Node {
     uint n_nodes;
 };
+struct ReliefNode {
+    vec3 low;
+    uint end;
+    vec3 high;
+    uint i_cell;
+};
 struct Light {
     vec3 toward;
     uint kind;

@@ -1,8 +1,8 @@
 //! The buffers that passes share.
 
 use super::features::{
-    colored_runs, has_bounces, has_diffusion, has_haze, has_second, has_slopes, is_grouped, is_lit,
-    is_medium,
+    colored_runs, has_bounces, has_diffusion, has_haze, has_relief, has_second, has_slopes,
+    is_grouped, is_lit, is_medium,
 };
 use super::packet::Packet;
 use super::staging::StagedBuffer;
@@ -18,11 +18,13 @@ use crate::layout::particle::{
     BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, Shapes,
     TexturedRecord,
 };
+use crate::layout::relief::ReliefNodeRecord;
 use crate::layout::sky::SkyRecord;
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{Cloud, CloudSource};
 use crate::model::grid::{self, DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use crate::model::material::Material;
+use crate::model::relief;
 use crate::model::scene::Scene;
 use crate::passes::blobs::BlobBuffers;
 use crate::passes::diffusion::Room;
@@ -55,6 +57,13 @@ buffers! {
         i_facet: Buffer => u32, n_if(is_grouped(scene), scene.n_particles()), "facets.i_facet";
         /// Points of all terrains, relative to their origins.
         ground: Buffer => FacetRecord, n_ground_facets(scene), "terrain.ground";
+        /// Boxes over the cells of all terrains.
+        relief: Buffer => ReliefNodeRecord, n_if(has_relief(scene), n_relief_nodes(scene)),
+            "relief.nodes";
+        /// 1 where ground hides a light, by point of the ground and light.
+        hidden: Buffer => u32,
+            n_if(has_relief(scene), n_ground_facets(scene) * scene.lights.len() as u64),
+            "relief.hidden";
         lights: StagedBuffer => LightRecord, scene.lights.len() as u64, "transmit.lights";
         /// By facet and light.
         transmittance: Buffer => f32, n_pairs(scene), "transmit.transmittance";
@@ -175,6 +184,10 @@ fn n_modes(scene: &Scene) -> u64 {
 
 fn n_ground_facets(scene: &Scene) -> u64 {
     scene.n_solid_facets() - scene.n_surface_facets()
+}
+
+fn n_relief_nodes(scene: &Scene) -> u64 {
+    scene.terrains.iter().map(relief::n_nodes).sum()
 }
 
 fn n_pairs(scene: &Scene) -> u64 {

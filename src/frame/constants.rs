@@ -8,6 +8,7 @@ use crate::model::edge::Edge;
 use crate::model::medium;
 use crate::model::scene::{Octaves, Overlap, Scene};
 use crate::passes::blobs::BlobView;
+use crate::passes::relief::ReliefParams;
 use crate::passes::transmit::MarchParams;
 
 /// Counts of records, and parameters of the passes.
@@ -71,6 +72,8 @@ impl FrameConstants {
                     true => scene.n_solid_facets() as u32,
                     false => scene.n_facets() as u32,
                 },
+                i_first_ground: scene.n_surface_facets() as u32,
+                n_ground: (scene.n_solid_facets() - scene.n_surface_facets()) as u32,
             },
             n_solids: scene.n_solids() as u32,
             forward: scene.lighting.forward,
@@ -90,6 +93,18 @@ impl FrameConstants {
             saturated: saturation_bound(scene.film.format),
             format: target_format(scene.film.format),
             size: [scene.film.width, scene.film.height],
+        }
+    }
+
+    /// Returns the points and lights of the ground.
+    pub fn relief(&self) -> ReliefParams {
+        let MarchParams { n_lights, n_surfaces, i_first_ground, n_ground, .. } = self.march;
+        ReliefParams {
+            n_points: n_ground,
+            n_lights,
+            n_grounds: self.n_solids - n_surfaces,
+            i_first_region: n_surfaces,
+            i_first_ground,
         }
     }
 

@@ -5,7 +5,9 @@ use crate::gpu::TargetFormat;
 use crate::model::cloud::{Cloud, CloudSource, Group, SQRT_TAU};
 use crate::model::disc::Disc;
 use crate::model::film::FilmFormat;
+use crate::model::light::Light;
 use crate::model::lod::RUN;
+use crate::model::relief;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{
     Cull, DrawPath, Gather, Impostors, LightingMode, Overlap, Scene, Simulate,
@@ -47,6 +49,10 @@ pub struct SceneFeatures {
     pub n_surfaces: u32,
     /// Number of terrains.
     pub n_terrains: u32,
+    /// Ground may hide lights from its own points.
+    pub has_relief: bool,
+    /// Some light is at a point, not a sun or a sky.
+    pub has_lamps: bool,
     /// Some region has a specular lobe or a phase function, so that its radiance depends on the
     /// eye.
     pub is_glossy: bool,
@@ -100,6 +106,8 @@ impl SceneFeatures {
             has_haze: has_haze(scene),
             n_surfaces: scene.surfaces.len() as u32,
             n_terrains: scene.terrains.len() as u32,
+            has_relief: has_relief(scene),
+            has_lamps: scene.lights.iter().any(Light::is_lamp),
             is_glossy: has_glossy(scene) || is_medium(scene),
             tensors,
             has_impostors: has_impostors(scene),
@@ -151,6 +159,11 @@ pub fn has_slopes(scene: &Scene) -> bool {
 /// Returns whether air lies before lit facets.
 pub fn has_haze(scene: &Scene) -> bool {
     is_lit(scene) && scene.has_haze()
+}
+
+/// Returns whether ground may hide lights from its own points.
+pub fn has_relief(scene: &Scene) -> bool {
+    is_lit(scene) && relief::may_hide(&scene.terrains, &scene.lights)
 }
 
 /// Returns whether lit facets stand for several particles.

@@ -4,8 +4,8 @@ use super::buffers::{SceneBuffers, diffusion_room, grid_room};
 use super::constants::FrameConstants;
 use super::culling::Culling;
 use super::features::{
-    SceneFeatures, colored_runs, has_bounces, has_diffusion, has_haze, has_second, has_slopes,
-    is_grouped, is_medium,
+    SceneFeatures, colored_runs, has_bounces, has_diffusion, has_haze, has_relief, has_second,
+    has_slopes, is_grouped, is_medium,
 };
 use super::gather::IndirectGather;
 use super::live::{LiveParticles, PlacedUploads, unmoved};
@@ -26,6 +26,7 @@ use crate::passes::grid::Grid;
 use crate::passes::harmonics::{Colored, Harmonics};
 use crate::passes::haze::HazePass;
 use crate::passes::place::Place;
+use crate::passes::relief::Relief;
 use crate::passes::scatter::{Scatter, ScatterVariant};
 use crate::passes::sort::Sort;
 use crate::passes::texture::Texture;
@@ -45,6 +46,7 @@ pub(super) struct FramePasses {
     pub grid: Grid,
     pub runs: Option<FacetRuns>,
     pub facets: Facets,
+    pub relief: Option<Relief>,
     pub transmit: Transmit,
     pub first: First,
     pub diffusion: Option<Diffusion>,
@@ -109,7 +111,8 @@ impl FramePasses {
             grid: Grid::new(device, compiler, grid_room(scene), scene.shapes())?,
             runs,
             facets: Facets::new(device, compiler, scene.shapes(), is_medium(scene))?,
-            transmit: Transmit::new(device, compiler, arriving(scene), &sums)?,
+            relief: has_relief(scene).then(|| Relief::new(device, compiler)).transpose()?,
+            transmit: Transmit::new(device, compiler, arriving(scene), &sums, has_relief(scene))?,
             first: First::new(device, compiler)?,
             diffusion: diffusion_room(scene)
                 .map(|room| Diffusion::new(device, compiler, room))

@@ -1,13 +1,14 @@
 //! Records that never change during a run, and their upload.
 
 use super::buffers::SceneBuffers;
-use super::features::{colored_runs, is_lit};
+use super::features::{colored_runs, has_relief, is_lit};
 use super::staging::{per_upload, upload, upload_parts};
 use crate::error::Result;
 use crate::gpu::{Commands, Device};
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::harmonics::{n_texels, push_texels};
 use crate::layout::particle::{BoxRecord, ParticleRecord, TexturedRecord};
+use crate::layout::relief::ReliefNodeRecord;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::particle_list::ParticleList;
 use crate::model::scene::Scene;
@@ -25,6 +26,9 @@ pub(super) fn fill(
     let i_region = repeated(scene.surfaces.iter().map(|s| s.n_facets()));
     upload(device, commands, &i_region, &b.i_region)?;
     upload(device, commands, &ground_records(scene), &b.ground)?;
+    if has_relief(scene) {
+        upload(device, commands, &ReliefNodeRecord::of(&scene.terrains), &b.relief)?;
+    }
     upload(device, commands, &i_group, &b.i_group)?;
     upload_groups(device, commands, scene, groups, b)?;
     commands.run(|rec| {

@@ -9,6 +9,7 @@ pub mod frame;
 pub mod harmonics;
 pub mod medium;
 pub mod particle;
+pub mod relief;
 pub mod roof;
 pub mod second;
 pub mod sky;

@@ -109,6 +109,11 @@ impl Light {
         }
     }
 
+    /// Returns whether the light comes from a point.
+    pub fn is_lamp(&self) -> bool {
+        matches!(self, Light::Point { .. } | Light::Spot { .. })
+    }
+
     /// Returns whether the light is a sky, which has no direction that a lobe could reflect.
     pub fn is_sky(&self) -> bool {
         matches!(self, Light::Sky { .. })

@@ -39,6 +39,7 @@ mod particle;
 pub mod particle_list;
 pub mod phase;
 pub mod philox;
+pub mod relief;
 pub mod resolution;
 pub mod scene;
 pub mod shade;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 /// Points in rows: u runs along a row, v from row to row, and u × v points up.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Terrain {
     /// Position of the origin in the scene.
     pub origin: DVec3,
@@ -80,6 +80,12 @@ impl Terrain {
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let (low, high) = self.extent();
         (self.origin + low, self.origin + high)
+    }
+
+    /// Returns the greatest distance of its points from the origin along an axis.
+    pub fn greatest_extent(&self) -> f64 {
+        let (low, high) = self.extent();
+        low.abs().max(high.abs()).max_element()
     }
 
     /// Returns the low and high corner of its bounding box, relative to the origin.

@@ -40,6 +40,7 @@ pub mod lod;
 pub mod morton;
 pub mod place;
 pub mod present;
+pub mod relief;
 pub mod scatter;
 pub mod second;
 pub mod sort;
@@ -171,6 +172,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "place.comp",
     "present.frag",
     "present.vert",
+    "relief.comp",
     "roof_arithmetic.comp",
     "roof_atomics.comp",
     "roof_memory.comp",

@@ -1,9 +1,9 @@
 //! transmit: computes how much of each light arrives at each facet.
 //!
-//! In: facets, lights, regions (rectangles), density grid. Out: transmittance by facet and light,
-//! and on request that of the clouds alone. Law: [no surface hides the light] e^{−(1−g)τ}, τ by the
-//! midpoint rule along the grid. Source: model.md §8, passes.md. Error: against the same
-//! march in f64, (1−g)τ times the samples' relative rounding, plus the sum's ("sums") and 3 + 2|x|
+//! In: facets, lights, regions (rectangles), density grid, what ground hides. Out: transmittance by
+//! facet and light, and on request that of the clouds alone. Law: [nothing hides the light]
+//! e^{−(1−g)τ}, τ by the midpoint rule along the grid. Source: model.md §8, passes.md. Error:
+//! against the same march in f64, (1−g)τ times the samples' relative rounding, plus the sum's ("sums") and 3 + 2|x|
 //! ulp of exp; against the closed form, the grid's. A ray within a few ulp of an edge may count as
 //! hidden or not.
 
@@ -32,6 +32,10 @@ record! {
         max_steps: u32,
         /// The first so many facets receive the sky through the clouds.
         n_under_sky: u32,
+        /// Facet of the ground's first point.
+        i_first_ground: u32,
+        /// Number of the ground's points.
+        n_ground: u32,
     }
 }
 
@@ -55,6 +59,9 @@ bindings! {
         /// Output, `f32` by facet and light: e^{−(1−g)τ} whether or not a surface hides the light;
         /// empty unless requested.
         through,
+        /// `u32` by point of the ground and light: 1 where ground hides the light; empty where it
+        /// hides none.
+        hidden,
     }
 }
 
@@ -73,6 +80,10 @@ pub struct MarchParams {
     pub forward: f64,
     /// The first so many facets receive the sky through the clouds.
     pub n_under_sky: u32,
+    /// Facet of the ground's first point.
+    pub i_first_ground: u32,
+    /// Number of the ground's points.
+    pub n_ground: u32,
 }
 
 /// Optical depth of a way that a surface bars, and to a light without energy.
@@ -95,7 +106,8 @@ pub struct Transmit {
 }
 
 impl Transmit {
-    /// Creates the pipeline; `sums` says how τ is summed.
+    /// Creates the pipeline; `sums` says how τ is summed, `has_relief` whether ground may hide
+    /// lights.
     ///
     /// # Errors
     /// Fails if the shader does not compile or the pipeline cannot be created.
@@ -104,8 +116,10 @@ impl Transmit {
         compiler: &Compiler,
         arriving: Arriving,
         sums: &SumMacros,
+        has_relief: bool,
     ) -> Result<Transmit> {
-        let constants = [(0, u32::from(arriving == Arriving::ShareAndClouds))];
+        let is_apart = arriving == Arriving::ShareAndClouds;
+        let constants = [(0, u32::from(is_apart)), (1, u32::from(has_relief))];
         let depths = [("DEPTHS", u32::from(arriving == Arriving::Depth))];
         let macros = [sums.list(), &depths].concat();
         let fields = Push::FIELDS;
@@ -125,8 +139,8 @@ impl Transmit {
         grid: &GridRecord,
         march: &MarchParams,
     ) -> Result<()> {
-        let MarchParams { n_facets, n_lights, n_surfaces, step_cells, forward, n_under_sky } =
-            *march;
+        let MarchParams { n_facets, n_lights, n_surfaces, step_cells, forward, .. } = *march;
+        let MarchParams { n_under_sky, i_first_ground, n_ground, .. } = *march;
         let push = Push {
             grid: *grid,
             n_facets,
@@ -136,6 +150,8 @@ impl Transmit {
             backward: (1.0 - forward) as f32,
             max_steps: MAX_STEPS,
             n_under_sky,
+            i_first_ground,
+            n_ground,
         };
         rec.dispatch(&self.kernel, &buffers.by_binding(), &push, n_facets * n_lights)
     }

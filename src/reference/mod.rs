@@ -34,6 +34,7 @@ pub mod occlude;
 pub mod picture;
 pub mod place;
 pub mod present;
+pub mod relief;
 pub mod rounding;
 pub mod scatter;
 mod shade;

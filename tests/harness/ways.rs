@@ -144,8 +144,9 @@ impl Case {
         sums: Sums,
     ) -> [Vec<f64>; 2] {
         let compiler = compiler.unwrap_or(&gpu.compiler);
-        let pass = Transmit::new(&gpu.device, compiler, Arriving::ShareAndClouds, &sums.into())
-            .expect("transmit");
+        let pass =
+            Transmit::new(&gpu.device, compiler, Arriving::ShareAndClouds, &sums.into(), false)
+                .expect("transmit");
         let n_total = self.facets.len() * self.lights.len();
         let through = gpu.buffer::<f32>(n_total);
         let transmittance = self.dispatch(gpu, &pass, &through, [step, forward]);
@@ -168,6 +169,7 @@ impl Case {
         let n = [self.facets.len(), self.lights.len(), self.surfaces.len()].map(|n| n as u32);
         let n_total = self.facets.len() * self.lights.len();
         let out = gpu.buffer::<f32>(n_total);
+        let hidden = gpu.buffer::<u32>(0);
         let grid = GridRecord::from(&self.spec);
         let buffers = TransmitBuffers {
             facets: &facets,
@@ -176,6 +178,7 @@ impl Case {
             density: &density,
             transmittance: &out,
             through,
+            hidden: &hidden,
         };
         let [n_facets, n_lights, n_surfaces] = n;
         let march = MarchParams {
@@ -185,6 +188,8 @@ impl Case {
             step_cells: step,
             forward,
             n_under_sky: n_facets,
+            i_first_ground: n_facets,
+            n_ground: 0,
         };
         gpu.run(|rec| pass.record(rec, &buffers, &grid, &march));
         gpu.download::<f32>(&out, n_total).into_iter().map(f64::from).collect()

@@ -11,13 +11,14 @@ use nimbus::layout::medium::MediumRecord;
 use nimbus::layout::particle::{
     BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, TexturedRecord,
 };
+use nimbus::layout::relief::ReliefNodeRecord;
 use nimbus::layout::roof;
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
 use nimbus::layout::sky::SkyRecord;
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 use nimbus::passes::{
     blobs, chunks, contract, cull, diffusion, facets, first, generate, grid, harmonics, haze,
-    impostors, live, lod, morton, place, present, scatter, second, sort, sprites, surfaces,
+    impostors, live, lod, morton, place, present, relief, scatter, second, sort, sprites, surfaces,
     terrain, texture, tiles, transmit, upsample,
 };
 
@@ -25,7 +26,7 @@ use nimbus::passes::{
 pub type Record = (&'static str, &'static [Field], usize);
 
 /// All records of the host.
-pub const RECORDS: [Record; 28] = [
+pub const RECORDS: [Record; 29] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Disc", DiscRecord::FIELDS, size_of::<DiscRecord>()),
@@ -44,6 +45,7 @@ pub const RECORDS: [Record; 28] = [
     ("Node", NodeRecord::FIELDS, size_of::<NodeRecord>()),
     ("Block", BlockRecord::FIELDS, size_of::<BlockRecord>()),
     ("Pairing", PairingRecord::FIELDS, size_of::<PairingRecord>()),
+    ("ReliefNode", ReliefNodeRecord::FIELDS, size_of::<ReliefNodeRecord>()),
     ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
     ("Medium", MediumRecord::FIELDS, size_of::<MediumRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
@@ -109,6 +111,7 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("place.comp", place::Push::FIELDS, "T 4 Group Mode S"),
     ("present.frag", present::Push::FIELDS, "T T Sky"),
     ("present.vert", &[], ""),
+    ("relief.comp", relief::Push::FIELDS, "Facet Light T ReliefNode 4"),
     ("scatter.comp", scatter::Push::FIELDS, "Facet Light 4 T F Lit Medium"),
     (
         "second_gather.comp",
@@ -150,6 +153,6 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
         tiles::SplatPush::FIELDS,
         "8 T T T 4 4 Drawn Textured S 8 4 4 S Kept S Slope S",
     ),
-    ("transmit.comp", transmit::Push::FIELDS, "Facet Light T F 4 4"),
+    ("transmit.comp", transmit::Push::FIELDS, "Facet Light T F 4 4 4"),
     ("upsample.comp", upsample::Push::FIELDS, "T 4"),
 ];

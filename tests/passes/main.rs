@@ -15,6 +15,8 @@ mod functions;
 mod gathers;
 mod generate;
 mod grid;
+#[path = "../harness/grounds.rs"]
+mod grounds;
 mod harmonics;
 #[path = "../harness/mod.rs"]
 mod harness;
@@ -37,7 +39,6 @@ mod occlusion;
 mod picture;
 mod place;
 mod present;
-#[path = "../harness/relief.rs"]
 mod relief;
 #[path = "../harness/rooms.rs"]
 mod rooms;

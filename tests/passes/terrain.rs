@@ -3,9 +3,9 @@
 //! must show one of those around.
 
 use crate::bounded::greatest_ratio;
+use crate::grounds::{Candidate, Relief};
 use crate::harness::Gpu;
 use crate::picture::Picture;
-use crate::relief::{Candidate, Relief};
 use glam::DVec3;
 use nimbus::gpu::{Buffer, Compiler, Image, LoadOp, MemoryUsage, Target};
 use nimbus::gpu::{TargetFormat, has_depth24};

@@ -91,7 +91,7 @@ fn rectangles_hide_and_marches_begin_and_end_where_the_way_does() {
 fn by_itself_the_transmittance_is_the_same() {
     let mut gpu = Gpu::new();
     let case = room();
-    let pass = Transmit::new(&gpu.device, &gpu.compiler, Arriving::Share, &PLAIN.into())
+    let pass = Transmit::new(&gpu.device, &gpu.compiler, Arriving::Share, &PLAIN.into(), false)
         .expect("transmit");
     let none = gpu.buffer::<f32>(0);
     let alone = case.dispatch(&mut gpu, &pass, &none, [1.0, 0.5]);

@@ -102,6 +102,10 @@ passes! {
     Facets "facets", Facets,
         needs unlit,
         unless |same| same.facets => "nothing moved, or all as one";
+    /// Finds the lights that ground hides from its points.
+    Relief "relief", Facets,
+        needs |f, _| unless(f.has_relief, "no ground hides a light"),
+        unless |same| same.relief => "ground and lights are the same";
     /// Computes the transmittance toward the lights.
     Transmit "transmit", Facets,
         needs unlit,

@@ -48,6 +48,8 @@ pub(super) struct Unchanged {
     geometry: bool,
     /// Facets.
     pub facets: bool,
+    /// Ways from the ground's points to lights.
+    pub relief: bool,
     /// Rays from facets to lights, and what hides them.
     pub rays: bool,
     /// Position of the eye, as far as light depends on it.
@@ -135,6 +137,7 @@ impl Unchanged {
             morton,
             geometry,
             facets,
+            relief: same(&|a, b| shines_alike_on_ground(features, a, b)),
             rays: facets && same(&has_same_rays),
             eye,
             response,
@@ -169,6 +172,17 @@ fn has_same_rays(a: &Packet, b: &Packet) -> bool {
     let rectangle = |r: &RegionRecord| (r.kind, r.center, r.u, r.v, r.normal, r.n_u, r.n_v);
     a.lights.iter().map(ray).eq(b.lights.iter().map(ray))
         && a.regions.iter().map(rectangle).eq(b.regions.iter().map(rectangle))
+}
+
+/// Returns whether the ways from the ground's points to lights are the same. Where the lighting
+/// origin is matters to lamps and to other grounds.
+fn shines_alike_on_ground(features: &SceneFeatures, a: &Packet, b: &Packet) -> bool {
+    let is_placed = features.has_lamps || features.n_terrains > 1;
+    let ray =
+        |l: &LightRecord| (l.toward, is_placed.then_some(l.position), l.kind, l.energy != [0.0; 3]);
+    let center = |r: &RegionRecord| (r.kind, is_placed.then_some(r.center));
+    a.lights.iter().map(ray).eq(b.lights.iter().map(ray))
+        && a.regions.iter().map(center).eq(b.regions.iter().map(center))
 }
 
 /// Returns whether `next` reaches facets as `last` did except for the lights' energies. A light

@@ -13,6 +13,7 @@ use crate::gpu::Recorder;
 use crate::passes::contract::ContractBuffers;
 use crate::passes::diffusion::{DiffusionBuffers, DiffusionWork, SolidsWork};
 use crate::passes::first::{self, FirstBuffers};
+use crate::passes::relief::ReliefBuffers;
 use crate::passes::scatter::{ScatterBuffers, ScatterParams};
 use crate::passes::second::{MergePush, SourcesPush};
 use crate::passes::sort::Count;
@@ -26,7 +27,7 @@ impl FramePasses {
         packet: &Packet,
         plan: &Plan,
     ) -> Result<()> {
-        let FramePasses { transmit, first, tensors, constants: c, .. } = self;
+        let FramePasses { relief, transmit, first, tensors, constants: c, .. } = self;
         let SceneBuffers {
             facets,
             lights,
@@ -34,13 +35,28 @@ impl FramePasses {
             density,
             transmittance,
             through,
+            ground,
+            relief: nodes,
+            hidden,
             table,
             lit,
             ..
         } = &self.buffers;
+        pass(rec, plan, Pass::Relief, |rec| {
+            let Some(relief) = relief else { return Ok(()) };
+            let buffers = ReliefBuffers { ground, lights, regions, nodes, hidden };
+            relief.record(rec, &buffers, &c.relief())
+        })?;
         pass(rec, plan, Pass::Transmit, |rec| {
-            let buffers =
-                TransmitBuffers { facets, lights, regions, density, transmittance, through };
+            let buffers = TransmitBuffers {
+                facets,
+                lights,
+                regions,
+                density,
+                transmittance,
+                through,
+                hidden,
+            };
             transmit.record(rec, &buffers, &packet.grid, &c.march)
         })?;
         pass(rec, plan, Pass::First, |rec| {

@@ -110,8 +110,9 @@ pub fn floor(pass: Pass, of: &Amounts) -> Option<Work> {
         Pass::Sort => work(of.kept * (VECTOR + NUMBER), 5.0 * of.kept),
         // Writes the pool. The transforms that fill it do not count.
         Pass::Texture => work(of.texels * TEXEL, 0.0),
-        // The pixels that solids cover are known to the device alone.
-        Pass::Surfaces | Pass::Terrain | Pass::Impostors => None,
+        // The pixels that solids cover are known to the device alone, and so are the triangles that
+        // ways pass.
+        Pass::Surfaces | Pass::Terrain | Pass::Impostors | Pass::Relief => None,
         Pass::Sprites | Pass::Tiles => of.blobs.map(|blobs| Work {
             // Reads index, position, σ, κ and radiance of each blob, writes the pixels. Over solids
             // sprites write those alone that blobs cover.

@@ -15,6 +15,7 @@ use crate::model::surface::Surface;
 use crate::reference::Blob;
 use crate::reference::brdf::reflectance;
 use crate::reference::occlude::{Rectangle, Source, source_of};
+use crate::reference::relief::Ground;
 
 /// A diffuse facet of a cloud or of the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +59,8 @@ pub struct AreaScene<'a> {
     pub(super) regions: Vec<Vec<LitRegion>>,
     /// L1 of the discs, the same in every direction.
     pub(super) disc_radiance: Vec<DVec3>,
+    /// Ground that hides lights from the first discs, its points, and their number.
+    ground: Option<(&'a Ground, usize)>,
 }
 
 /// A point that reflects: on a surface, or a cloud's facet.
@@ -99,11 +102,26 @@ impl<'a> AreaScene<'a> {
             brdfs: brdfs.to_vec(),
             regions: Vec::new(),
             disc_radiance: Vec::new(),
+            ground: None,
         };
         scene.regions = scene.rectangles.iter().map(|r| scene.lit_regions(r)).collect();
-        scene.disc_radiance =
-            parallel_map(discs.len(), |i| scene.first(&scene.on_disc(i), discs[i].normal));
+        scene.disc_radiance = scene.lit_discs(discs.len());
         scene
+    }
+
+    /// Returns the scene with ground that hides lights from its points, the first `n_points` discs.
+    pub fn behind_ground(mut self, ground: Option<&'a Ground>, n_points: usize) -> Self {
+        let n = n_points.min(self.discs.len());
+        if let Some(ground) = ground.filter(|_| n > 0) {
+            self.ground = Some((ground, n));
+            let lit = self.lit_discs(n);
+            self.disc_radiance[..n].copy_from_slice(&lit);
+        }
+        self
+    }
+
+    fn lit_discs(&self, n: usize) -> Vec<DVec3> {
+        parallel_map(n, |i| self.first(&self.on_disc(i), self.discs[i].normal))
     }
 
     /// Returns L1 of every disc.
@@ -171,6 +189,14 @@ impl<'a> AreaScene<'a> {
         }
     }
 
+    /// Returns V of `light` at a receiver.
+    fn arriving(&self, at: &Receiver, light: &Light) -> f64 {
+        let is_hidden = |(ground, n_points): (&Ground, usize)| {
+            at.i_disc.is_some_and(|i| i < n_points) && ground.hides(at.position, light, 0.0)
+        };
+        if self.ground.is_some_and(is_hidden) { 0.0 } else { self.visibility(at.position, light) }
+    }
+
     pub(super) fn transmittance(&self, p: DVec3, source: Source) -> f64 {
         visibility::transmittance(self.blobs, self.forward, p, source)
     }
@@ -178,7 +204,7 @@ impl<'a> AreaScene<'a> {
     /// Returns L1 toward the unit vector `toward`, W m⁻² sr⁻¹; from behind only its diffuse part.
     pub fn first(&self, at: &Receiver, toward: DVec3) -> DVec3 {
         let radiance = |light: &Light| {
-            let v = self.visibility(at.position, light);
+            let v = self.arriving(at, light);
             reflected(&at.brdf, at.normal, at.position, light, v, toward).0
         };
         self.lights.iter().map(radiance).sum()
@@ -187,7 +213,7 @@ impl<'a> AreaScene<'a> {
     /// Returns I_d, W m⁻².
     pub fn irradiance(&self, at: &Receiver) -> DVec3 {
         let of = |light: &Light| {
-            let v = self.visibility(at.position, light);
+            let v = self.arriving(at, light);
             light.energy() * light.share(at.normal, &light.arrival(at.position), v)
         };
         self.lights.iter().map(of).sum()

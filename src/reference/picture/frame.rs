@@ -208,7 +208,8 @@ impl FrameReference {
             }
             None => (obstacles, local.lights.clone()),
         };
-        let transmittance = direct.transmittance(&receivers, &lights);
+        let mut transmittance = direct.transmittance(&receivers, &lights);
+        local.hide_by_ground(&mut transmittance, &lights);
         self.irradiance =
             reference::first::irradiance(&positions, &normals, &transmittance, &lights);
         let more = diffuse.as_ref().map_or(&[][..], |light| &light.on_solids);
@@ -329,7 +330,8 @@ impl FrameReference {
             &self.blobs,
             forward,
             &discs,
-        );
+        )
+        .behind_ground(local.relief.as_ref(), local.ground.len());
         let flat: Vec<Facet> = local.surface_facets().collect();
         let eye = self.state.pose.position - self.state.light_origin;
         let on_surfaces = flat.iter().map(|f| area_scene.on_surface(f.region as usize, f.position));

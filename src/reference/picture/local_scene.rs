@@ -4,10 +4,13 @@ use glam::DVec3;
 
 use crate::model::light::Light;
 use crate::model::material::Brdf;
+use crate::model::parallel::parallel_map;
+use crate::model::relief::may_hide;
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
 use crate::reference::area::DiscFacet;
 use crate::reference::facets::Facet;
+use crate::reference::relief::Ground;
 use crate::reference::terrain;
 
 /// Surfaces, ground, lights and materials at one time; positions relative to the lighting origin.
@@ -25,6 +28,8 @@ pub(super) struct LocalScene {
     n_solids: usize,
     /// Facets of the ground, one a point.
     pub ground: Vec<Facet>,
+    /// Ground that hides lights from its own points; `None` where it hides none.
+    pub relief: Option<Ground>,
 }
 
 impl LocalScene {
@@ -39,6 +44,21 @@ impl LocalScene {
             brdfs: (0..scene.n_regions()).map(brdf).collect(),
             n_solids: scene.n_solids(),
             ground: terrains.flat_map(|(t, region)| terrain::facets(t, origin, region)).collect(),
+            relief: may_hide(&scene.terrains, &scene.lights)
+                .then(|| Ground::new(&scene.terrains, origin)),
+        }
+    }
+
+    /// Takes away the lights that ground hides from its own points: `passed` [point][light] is what
+    /// else lets through.
+    pub fn hide_by_ground(&self, passed: &mut [f64], lights: &[Light]) {
+        let Some(relief) = self.relief.as_ref().filter(|_| !lights.is_empty()) else { return };
+        let hidden = parallel_map(self.ground.len(), |i| {
+            let p = self.ground[i].position;
+            lights.iter().map(|light| relief.hides(p, light, 0.0)).collect::<Vec<_>>()
+        });
+        for (passed, is_hidden) in passed.iter_mut().zip(hidden.concat()) {
+            *passed = if is_hidden { 0.0 } else { *passed };
         }
     }
 

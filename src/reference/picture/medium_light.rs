@@ -43,7 +43,9 @@ impl MediumLight {
             facets.iter().map(|f| Receiver { position: f.position, i_region: f.region }).collect();
         let (positions, normals): (Vec<DVec3>, Vec<DVec3>) =
             facets.iter().map(|f| (f.position, f.normal)).unzip();
-        let passed = obstacles.transmittance(&receivers, lights);
+        let mut passed = obstacles.transmittance(&receivers, lights);
+        let n_before = facets.len() - local.ground.len();
+        local.hide_by_ground(&mut passed[n_before * lights.len()..], lights);
         let arriving = first::irradiance(&positions, &normals, &passed, lights);
         let kd = local.kd();
         let radiosity: Vec<DVec3> =

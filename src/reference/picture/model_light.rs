@@ -81,7 +81,8 @@ impl<'a> ModelLight<'a> {
             &frame.blobs,
             scene.lighting.forward,
             &model.discs,
-        );
+        )
+        .behind_ground(model.local.relief.as_ref(), model.local.ground.len());
         ModelLight { area_scene, eye: model.eye, n_reflections }
     }
 

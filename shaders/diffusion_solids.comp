@@ -37,6 +37,6 @@ void main() {
         }
         solids[3u * j] = vec4(facet.position, facet.area);
         solids[3u * j + 1u] = vec4(facet.normal, 0.0);
-        solids[3u * j + 2u] = vec4(region_at(facet.i_region).kd * irradiance, 0.0);
+        solids[3u * j + 2u] = vec4(region_at(facet.i_region).kd * facet.color * irradiance, 0.0);
     }
 }

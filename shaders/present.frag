@@ -9,6 +9,8 @@
 #include "records.glsl"
 #include "camera.glsl"
 #include "clear_sky.glsl"
+#include "sea.glsl"
+#include "behind.glsl"
 
 // 0: bytes, 1: half floats, 2: floats.
 layout(constant_id = 0) const uint FORMAT = 1;

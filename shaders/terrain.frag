@@ -32,6 +32,10 @@ layout(location = 0) out vec4 out_color;
 const float LEAST = 1e-30;
 
 void main() {
+    // Edge-on, or a back that cannot be seen.
+    if (in_plane.w == 0.0) {
+        discard;
+    }
     vec3 ray = ray_through(push.camera, gl_FragCoord.xy, push.pixel);
     // z ray = C + s u + t v by Cramer's rule.
     float d = dot(ray, in_plane.xyz);

@@ -53,6 +53,9 @@ void main() {
     u = along_camera(push.camera, u / length_u);
     v = along_camera(push.camera, v / length_v);
     RayPlane plane = ray_plane(c, u, v, length_u, length_v);
+    // Seen from above all of the ground, a back shows only where the rasteriser rounds a ridge.
+    bool is_above = push.camera.eye.y > region.center.y + region.u.y;
+    plane.normal.w = is_above ? max(plane.normal.w, 0.0) : plane.normal.w;
     out_plane = plane.normal;
     out_s = plane.s;
     out_t = plane.t;

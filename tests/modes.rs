@@ -270,8 +270,9 @@ fn a_still_scene_skips_and_a_moving_one_does_not() {
         .iter()
         .map(|p| p.name())
         .filter(|p| {
-            let others = ["live", "contract", "texture", "terrain", "impostors", "sprites"];
-            let unused = ["upsample", "diffusion", "scatter", "harmonics", "lod", "haze", "relief"];
+            let others =
+                ["live", "contract", "texture", "terrain", "impostors", "sprites", "relief"];
+            let unused = ["upsample", "diffusion", "scatter", "harmonics", "lod", "haze"];
             !others.contains(p) && !unused.contains(p)
         })
         .collect();

@@ -8,6 +8,10 @@ mod weather_files;
 
 use std::fs;
 
+use glam::DVec3;
+use nimbus::io::scene_file::load;
+use nimbus::reference::area::AreaScene;
+use nimbus::reference::picture::FrameReference;
 use program::{differ, path, run};
 use tempfile::TempDir;
 use weather_files::Made;
@@ -296,5 +300,58 @@ fn errors_of_the_ground_are_reported() {
         let output = run(&["weather", &path(&dir, "w.nc")]);
         let report = String::from_utf8_lossy(&output.stdout).into_owned();
         assert!(output.status.success() && report.contains(expected), "{report}");
+    }
+}
+
+/// Width of a column of [`file`].
+const COLUMN_M: f64 = 1000.0;
+
+/// Shadows of clouds on the ground, as the march sees them and as they are drawn between points,
+/// against f64 rays through the blobs themselves.
+#[test]
+fn edges_of_the_clouds_shadows_lie_within_half_a_column() {
+    let level = file().with_floats("HGT", |h| h.fill(0.0));
+    for (sun, points) in [("[0.4,-1.0,0.1]", 1), ("[0.4,-1.0,0.1]", 4), ("[1,-0.6,0.3]", 4)] {
+        let dir = scene_of(&level, "ground = \"rock\"\nmaterial = \"cloud\"");
+        let set = [
+            format!("light.0.direction={sun}"),
+            format!("cloud.0.ground_points={points}"),
+            "cloud.0.particles=2000".to_owned(),
+            "lighting.forward=0".to_owned(),
+            "light.1.irradiance=[0,0,0]".to_owned(),
+        ];
+        let scene = load(&dir.path().join("scene.toml"), &set, None).expect("a scene").scene;
+        let frame = FrameReference::new(&scene, 0.0).expect("a frame");
+        let light = scene.lights[0];
+        let [n_u, n_v] = scene.terrains[0].n.map(|n| n as usize);
+        let cosine = light.arrival(DVec3::ZERO).toward.y;
+        let drawn = |i: usize| {
+            let share = frame.irradiance[i].x / (light.energy().x * cosine);
+            (share, frame.facets[i].position)
+        };
+        let rays = AreaScene::new(&[], &[], &scene.lights[..1], &frame.blobs, 0.0, &[]);
+        let (mut n_edges, mut worst) = (0, 0.0f64);
+        for row in 0..n_v {
+            let of_row: Vec<(f64, DVec3)> = (0..n_u).map(|k| drawn(row * n_u + k)).collect();
+            for pair in of_row.windows(2) {
+                let [(a, from), (b, to)] = [pair[0], pair[1]];
+                if (a < 0.5) == (b < 0.5) {
+                    continue;
+                }
+                let at = from.lerp(to, (0.5 - a) / (b - a));
+                // The nearest true edge along the row.
+                let true_edge = (-100 * points..100 * points)
+                    .map(|k| 0.01 * f64::from(k) * (to - from))
+                    .filter(|off| {
+                        let v = |by: f64| rays.visibility(at + *off + by * (to - from), &light);
+                        (v(0.0) < 0.5) != (v(0.01) < 0.5)
+                    })
+                    .map(|off| off.length() / COLUMN_M)
+                    .fold(f64::INFINITY, f64::min);
+                (n_edges, worst) = (n_edges + 1, worst.max(true_edge));
+            }
+        }
+        println!("{sun}, {points} a column: {n_edges} edges, off by {worst:.3} at most");
+        assert!(n_edges >= 4 && worst <= 0.5, "{n_edges} edges, {worst}");
     }
 }

@@ -93,18 +93,3 @@ float share_of_disc(Sky sky, vec3 direction) {
     float off = length(cross(direction, sky.toward_sun)) * sky.inv_sun;
     return dot(direction, sky.toward_sun) < 0.0 ? 0.0 : clamp((1.05 - off) * 10.0, 0.0, 1.0);
 }
-
-// Returns the radiance behind everything, in a unit direction.
-vec3 sky_behind(Sky sky, vec3 direction) {
-    if (direction.y >= 0.0) {
-        vec3 depth = depth_to_space(sky, sky.height, direction.y);
-        return taken_by(depth) * radiance_of_air(sky, direction)
-               + sky.disc * share_of_disc(sky, direction);
-    }
-    if (sky.has_ground == 0u || !(sky.height > 0.0)) {
-        return radiance_of_air(sky, direction);
-    }
-    float height = sky.height / (sky.unit * sky.flatness);
-    Haze haze = haze_before(sky, direction, height / -direction.y);
-    return haze.through * sky.ground + haze.added;
-}

@@ -269,6 +269,8 @@ struct Sky {
     vec3 aerosol;
     float unused_e;
     vec3 ground;
+    float slopes;
+    vec3 sun;
     float unused_f;
 };
 

@@ -1,8 +1,8 @@
 //! The buffers that passes share.
 
 use super::features::{
-    colored_runs, has_bounces, has_diffusion, has_haze, has_relief, has_second, has_slopes,
-    is_grouped, is_lit, is_medium,
+    colored_runs, has_bounces, has_diffusion, has_haze, has_relief, has_sea, has_second,
+    has_slopes, is_grouped, is_lit, is_medium,
 };
 use super::packet::Packet;
 use super::staging::StagedBuffer;
@@ -87,6 +87,8 @@ buffers! {
         lit: Buffer => LitRecord, scene.n_facets(), "first.lit";
         /// The sky as the eye sees it.
         sky: StagedBuffer => SkyRecord, n_if(scene.sky.is_some(), 1), "haze.sky";
+        /// Mean square of the slopes of each region's sea.
+        seas: Buffer => f32, n_if(has_sea(scene), scene.n_solids() as u64), "haze.seas";
         /// Light of facets behind the air.
         hazed: Buffer => LitRecord, n_if(has_haze(scene), scene.n_facets()), "haze.lit";
         hazed_slopes: Buffer => SlopeRecord,

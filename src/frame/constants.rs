@@ -8,6 +8,7 @@ use crate::model::edge::Edge;
 use crate::model::medium;
 use crate::model::scene::{Octaves, Overlap, Scene};
 use crate::passes::blobs::BlobView;
+use crate::passes::haze::HazeParams;
 use crate::passes::relief::ReliefParams;
 use crate::passes::transmit::MarchParams;
 
@@ -27,6 +28,8 @@ pub(super) struct FrameConstants {
     pub terms: Octaves,
     /// The light changes inside of blobs.
     pub has_slopes: bool,
+    /// Number of the first sun; 0 without.
+    pub i_sun: u32,
     /// Longest edge of a facet of surfaces and terrains, where light diffuses.
     pub longest_facet_edge: f64,
     /// Cycles of the diffusion solver.
@@ -79,6 +82,7 @@ impl FrameConstants {
             forward: scene.lighting.forward,
             terms: medium::terms(&scene.lighting),
             has_slopes: scene.lighting.has_slopes(),
+            i_sun: scene.i_sun().unwrap_or(0) as u32,
             longest_facet_edge: match has_diffusion(scene) {
                 true => scene.longest_facet_edge(),
                 false => 0.0,
@@ -93,6 +97,23 @@ impl FrameConstants {
             saturated: saturation_bound(scene.film.format),
             format: target_format(scene.film.format),
             size: [scene.film.width, scene.film.height],
+        }
+    }
+
+    /// Returns the share of the depth that weakens light on its way to surfaces and ground, where
+    /// clouds are a medium.
+    pub fn backward(&self, packet: &Packet) -> f64 {
+        packet.diffusion.as_ref().map_or(1.0 - self.forward, |of| of.mean_weakened())
+    }
+
+    /// Returns the facets and lights behind the air.
+    pub fn haze(&self, packet: &Packet) -> HazeParams {
+        HazeParams {
+            n_facets: self.march.n_facets,
+            n_lights: self.march.n_lights,
+            i_sun: self.i_sun,
+            n_solids: self.n_solids,
+            backward: self.backward(packet),
         }
     }
 

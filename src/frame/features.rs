@@ -161,6 +161,11 @@ pub fn has_haze(scene: &Scene) -> bool {
     is_lit(scene) && scene.has_haze()
 }
 
+/// Returns whether some lit ground is a sea that mirrors a sky.
+pub fn has_sea(scene: &Scene) -> bool {
+    is_lit(scene) && scene.has_sea()
+}
+
 /// Returns whether ground may hide lights from its own points.
 pub fn has_relief(scene: &Scene) -> bool {
     is_lit(scene) && relief::may_hide(&scene.terrains, &scene.lights)

@@ -4,8 +4,8 @@ use super::buffers::{SceneBuffers, diffusion_room, grid_room};
 use super::constants::FrameConstants;
 use super::culling::Culling;
 use super::features::{
-    SceneFeatures, colored_runs, has_bounces, has_diffusion, has_haze, has_relief, has_second,
-    has_slopes, is_grouped, is_medium,
+    SceneFeatures, colored_runs, has_bounces, has_diffusion, has_haze, has_relief, has_sea,
+    has_second, has_slopes, is_grouped, is_medium,
 };
 use super::gather::IndirectGather;
 use super::live::{LiveParticles, PlacedUploads, unmoved};
@@ -24,7 +24,7 @@ use crate::passes::first::First;
 use crate::passes::generate::Generate;
 use crate::passes::grid::Grid;
 use crate::passes::harmonics::{Colored, Harmonics};
-use crate::passes::haze::HazePass;
+use crate::passes::haze::{HazePass, HazeVariant};
 use crate::passes::place::Place;
 use crate::passes::relief::Relief;
 use crate::passes::scatter::{Scatter, ScatterVariant};
@@ -130,7 +130,14 @@ impl FramePasses {
             gather,
             tensors,
             haze: has_haze(scene)
-                .then(|| HazePass::new(device, compiler, has_slopes(scene)))
+                .then(|| {
+                    let variant = HazeVariant {
+                        has_slopes: has_slopes(scene),
+                        has_sea: has_sea(scene),
+                        has_depths: is_medium(scene),
+                    };
+                    HazePass::new(device, compiler, variant)
+                })
                 .transpose()?,
             culling: Culling::new(device, compiler, scene)?,
             sort: Sort::new(device, compiler, n_particles)?,

@@ -1,7 +1,9 @@
 //! Records that never change during a run, and their upload.
 
+use glam::DVec3;
+
 use super::buffers::SceneBuffers;
-use super::features::{colored_runs, has_relief, is_lit};
+use super::features::{colored_runs, has_relief, has_sea, is_lit};
 use super::staging::{per_upload, upload, upload_parts};
 use crate::error::Result;
 use crate::gpu::{Commands, Device};
@@ -12,6 +14,7 @@ use crate::layout::relief::ReliefNodeRecord;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::particle_list::ParticleList;
 use crate::model::scene::Scene;
+use crate::model::terrain::Terrain;
 
 /// Fills the buffers whose content never changes: boxes, each particle's group, listed particles,
 /// regions of facets, terrain, textures, and the light of unlit scenes.
@@ -26,6 +29,9 @@ pub(super) fn fill(
     let i_region = repeated(scene.surfaces.iter().map(|s| s.n_facets()));
     upload(device, commands, &i_region, &b.i_region)?;
     upload(device, commands, &ground_records(scene), &b.ground)?;
+    if has_sea(scene) {
+        upload(device, commands, &sea_records(scene), &b.seas)?;
+    }
     if has_relief(scene) {
         upload(device, commands, &ReliefNodeRecord::of(&scene.terrains), &b.relief)?;
     }
@@ -80,13 +86,25 @@ fn repeated(counts: impl Iterator<Item = u64>) -> Vec<u32> {
 /// Returns the light of an unlit scene: surfaces and terrain show the K_d of their materials, as
 /// particles show their colors.
 fn unlit_records(scene: &Scene) -> Vec<LitRecord> {
-    let of_surfaces = scene.surfaces.iter().map(|s| (s.i_material, s.n_facets()));
-    let of_terrains = scene.terrains.iter().map(|t| (t.i_material, t.n_facets()));
-    let light = |(i_material, n_facets): (usize, u64)| {
-        let first = scene.materials[i_material].at(scene.time.start_s).kd.as_vec3().to_array();
-        std::iter::repeat_n(LitRecord { first, ..LitRecord::default() }, n_facets as usize)
+    let kd = |i_material: usize| scene.materials[i_material].at(scene.time.start_s).kd;
+    let record = |radiance: DVec3| LitRecord {
+        first: radiance.as_vec3().to_array(),
+        ..LitRecord::default()
     };
-    of_surfaces.chain(of_terrains).flat_map(light).collect()
+    let of_surfaces = scene
+        .surfaces
+        .iter()
+        .flat_map(|s| std::iter::repeat_n(kd(s.i_material), s.n_facets() as usize));
+    let of_terrain = |t: &'_ Terrain| -> Vec<DVec3> {
+        (0..t.points.len()).map(|i| kd(t.i_material) * t.color(i)).collect()
+    };
+    of_surfaces.chain(scene.terrains.iter().flat_map(of_terrain)).map(record).collect()
+}
+
+/// Returns the mean square of the slopes of every region's sea: 0 of surfaces and dry ground.
+fn sea_records(scene: &Scene) -> Vec<f32> {
+    let of_ground = scene.seas().map(|sea| sea.map_or(0.0, |sea| sea.slopes as f32));
+    scene.surfaces.iter().map(|_| 0.0).chain(of_ground).collect()
 }
 
 /// Returns the facets of all terrains.

@@ -48,7 +48,7 @@ impl FramePasses {
         self.record_particles(rec, slot, packet, plan)?;
         self.record_facets(rec, packet, plan)?;
         self.record_light(rec, packet, plan)?;
-        self.record_haze(rec, plan)?;
+        self.record_haze(rec, packet, plan)?;
         self.record_picture(rec, packet, plan)?;
         if let Some(culling) = &self.culling {
             rec.copy(&self.buffers.kept, &culling.counts.counts.0[slot]);
@@ -171,12 +171,13 @@ impl FramePasses {
     }
 
     /// Puts the air before the facets.
-    fn record_haze(&self, rec: &mut Recorder<'_>, plan: &Plan) -> Result<()> {
+    fn record_haze(&self, rec: &mut Recorder<'_>, packet: &Packet, plan: &Plan) -> Result<()> {
         let FramePasses { haze, buffers, constants, .. } = self;
         let SceneBuffers { facets, lit, slopes, sky, hazed, hazed_slopes, .. } = buffers;
-        let all = HazeBuffers { facets, lit, slopes, sky, hazed, hazed_slopes };
+        let SceneBuffers { transmittance: arriving, seas, .. } = buffers;
+        let all = HazeBuffers { facets, lit, slopes, sky, hazed, hazed_slopes, arriving, seas };
         pass(rec, plan, Pass::Haze, |rec| {
-            haze.iter().try_for_each(|haze| haze.record(rec, &all, constants.march.n_facets))
+            haze.iter().try_for_each(|haze| haze.record(rec, &all, &constants.haze(packet)))
         })
     }
 

@@ -19,10 +19,12 @@ pub fn basis_of(scene: &Scene) -> Option<Basis> {
     (has_glossy(scene) && is_lit(scene)).then(|| Basis::new(l.exponents, l.bases, l.sampling))
 }
 
-/// Returns whether materials of facets that reflect are edited, so that tensors are of use.
+/// Returns whether materials of facets that reflect are edited, so that tensors are of use. Tensors
+/// have no colours of ground.
 pub fn is_edited(scene: &Scene) -> bool {
     let reflects = is_lit(scene) && !is_medium(scene);
-    reflects && (0..scene.n_regions()).any(|i| scene.region_material(i).is_edited())
+    let is_plain = scene.terrains.iter().all(|t| t.colors.is_empty());
+    reflects && is_plain && (0..scene.n_regions()).any(|i| scene.region_material(i).is_edited())
 }
 
 /// Returns the region's kind in its record.

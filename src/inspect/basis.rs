@@ -195,6 +195,7 @@ impl NodeTable {
 mod tests {
     use super::*;
     use crate::model::basis::Sampling;
+    use crate::model::cover::Cover;
     use crate::model::material::Brdf;
     use crate::model::phase::Scattering;
 
@@ -207,6 +208,7 @@ mod tests {
             name: "m".into(),
             keys: keys.iter().map(key).collect(),
             scattering: Scattering::default(),
+            cover: Cover::Plain,
         }
     }
 

@@ -34,7 +34,7 @@ impl FacetRecord {
             area: facet.area as f32,
             normal: facet.normal.as_vec3().to_array(),
             i_region,
-            color: [1.0; 3],
+            color: facet.color.as_vec3().to_array(),
             sigma: 0.0,
         }
     }

@@ -68,6 +68,10 @@ record! {
         unused_e: f32,
         /// Radiance of the plane at sea level.
         ground: [f32; 3],
+        /// Mean square of the slopes of the sea that it is; 0 of none.
+        slopes: f32,
+        /// Irradiance of the suns across their light.
+        sun: [f32; 3],
         /// Padding.
         unused_f: f32,
     }
@@ -106,6 +110,8 @@ impl SkyRecord {
             molecules,
             aerosol,
             ground: rgb(view.ground.unwrap_or_default()),
+            slopes: view.sea.map_or(0.0, |sea| sea.slopes as f32),
+            sun: rgb(view.sun),
             ..SkyRecord::default()
         }
     }

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::cover::Cover;
 use super::phase::Scattering;
 
 /// A material that may change over time: keys in rising time, linear between them, constant before
@@ -14,6 +15,8 @@ pub struct Material {
     pub keys: Vec<MaterialKey>,
     /// How a cloud of the material scatters light, for the reference "transport".
     pub scattering: Scattering,
+    /// What covers ground of the material.
+    pub cover: Cover,
 }
 
 /// Material at one time.
@@ -101,7 +104,7 @@ mod tests {
         let key = |time_s, brdf| MaterialKey { time_s, brdf };
         let keys = vec![key(1.0, brdf(0.5, 0.0, 8.0)), key(3.0, brdf(0.7, 0.2, 16.0))];
         let scattering = Scattering::default();
-        let material = Material { name: "m".into(), keys, scattering };
+        let material = Material { name: "m".into(), keys, scattering, cover: Cover::Plain };
         assert_eq!(
             (material.at(0.0), material.at(9.0)),
             (brdf(0.5, 0.0, 8.0), brdf(0.7, 0.2, 16.0))

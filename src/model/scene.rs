@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3};
 use super::air::Air;
 use super::camera::Camera;
 use super::cloud::{Cloud, CloudSource, Group, MIN_ASPECT, Shapes, runs};
+use super::cover::Sea;
 pub use super::draw::{Chunks, Cull, Draw, DrawPath, Impostors, MAX_CHUNKS};
 use super::film::Film;
 use super::grid::GridSpec;
@@ -220,9 +221,25 @@ impl Scene {
         self.lighting.has_bounces() && self.draw.overlap == Overlap::Slices && !self.has_haze()
     }
 
-    /// Returns whether air lies between the eye and the scene.
+    /// Returns whether what the eye sees of facets is more than their light: air lies between, or a
+    /// sea mirrors the sky.
     pub fn has_haze(&self) -> bool {
-        self.sky.is_some_and(|sky| sky.settings().haze > 0.0)
+        self.sky.is_some_and(|sky| sky.settings().haze > 0.0) || self.has_sea()
+    }
+
+    /// Returns whether some ground is a sea that mirrors a sky.
+    pub fn has_sea(&self) -> bool {
+        self.sky.is_some() && self.seas().any(|sea| sea.is_some())
+    }
+
+    /// Returns the seas of the grounds, `None` of what is none.
+    pub fn seas(&self) -> impl Iterator<Item = Option<Sea>> + '_ {
+        self.terrains.iter().map(|t| self.materials[t.i_material].cover.sea())
+    }
+
+    /// Returns the number of the first light that is a sun.
+    pub fn i_sun(&self) -> Option<usize> {
+        self.lights.iter().position(|light| matches!(light, Light::Directional { .. }))
     }
 
     /// Returns the sky as it is seen from `eye`; `None` without.

@@ -5,6 +5,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::cover::Cover;
+use super::material::Material;
+
 /// Points in rows: u runs along a row, v from row to row, and u × v points up.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Terrain {
@@ -16,6 +19,8 @@ pub struct Terrain {
     pub n: [u32; 2],
     /// Index into the scene's materials.
     pub i_material: usize,
+    /// Factor on the material's K_d by point; empty where it is 1 everywhere.
+    pub colors: Arc<Vec<DVec3>>,
 }
 
 /// A point's facet in the light.
@@ -27,6 +32,8 @@ pub struct TerrainFacet {
     pub normal: DVec3,
     /// Area.
     pub area: f64,
+    /// Factor on the material's K_d.
+    pub color: DVec3,
 }
 
 /// Corners of the two triangles of a cell (0: low u, low v; 1: high u; 2: high v; 3: both). Each
@@ -68,7 +75,44 @@ impl Terrain {
             position: at(column, row),
             normal: across.normalize_or(DVec3::Y),
             area: across.length(),
+            color: self.color(i as usize),
         }
+    }
+
+    /// Returns the factor on the material's K_d at point `i`.
+    pub fn color(&self, i: usize) -> DVec3 {
+        self.colors.get(i).copied().unwrap_or(DVec3::ONE)
+    }
+
+    /// Returns the ground with the colours of its material's cover.
+    pub fn covered(self, materials: &[Material]) -> Terrain {
+        let material = &materials[self.i_material];
+        let Cover::Land(land) = material.cover else { return self };
+        // Colours are those of the start; K_d that is edited keeps them.
+        let kd = material.keys[0].brdf.kd;
+        let color = |p: &DVec3| land.color_at(self.origin + *p, kd);
+        let colors = Arc::new(self.points.iter().map(color).collect());
+        Terrain { colors, ..self }
+    }
+
+    /// Returns the ground with `n` cells along each side of one, linear between its points.
+    pub fn refined(self, n: u32) -> Terrain {
+        if n <= 1 || self.n_cells() == 0 {
+            return self;
+        }
+        let [n_u, n_v] = self.n;
+        let new = [n_u, n_v].map(|k| (k - 1) * n + 1);
+        let split = |i: u32, k: u32| {
+            let low = (i / n).min(k - 2);
+            (low, f64::from(i - low * n) / f64::from(n))
+        };
+        let at = |column: u32, row: u32| self.points[(row * n_u + column) as usize];
+        let place = |i: u32| {
+            let ((column, s), (row, t)) = (split(i % new[0], n_u), split(i / new[0], n_v));
+            let of_row = |row: u32| at(column, row).lerp(at(column + 1, row), s);
+            of_row(row).lerp(of_row(row + 1), t)
+        };
+        Terrain { points: Arc::new((0..new[0] * new[1]).map(place).collect()), n: new, ..self }
     }
 
     /// Returns all facets.
@@ -107,7 +151,7 @@ mod tests {
             origin: DVec3::new(10.0, 0.0, 0.0),
             points: Arc::new(points),
             n: [3, 4],
-            i_material: 0,
+            ..Terrain::default()
         }
     }
 
@@ -149,6 +193,23 @@ mod tests {
                 assert!((p[b] - p[a]).cross(p[c] - p[a]).y > 0.0);
             }
         }
+    }
+
+    #[test]
+    fn finer_points_lie_between_the_columns() {
+        let coarse = terrain(|x, north| x * north);
+        let fine = coarse.clone().refined(3);
+        assert_eq!(fine.n, [7, 10]);
+        for row in 0..4 {
+            for column in 0..3 {
+                let (k, fine_k) = (row * 3 + column, 3 * row * 7 + 3 * column);
+                assert!((fine.points[fine_k] - coarse.points[k]).length() < 1e-12);
+            }
+        }
+        // A third of a cell east, and a third north, which is 2/3: height 2/9.
+        let p = fine.points[1 + 7];
+        assert!((p - DVec3::new(1.0 / 3.0, 2.0 / 9.0, -2.0 / 3.0)).length() < 1e-12, "{p}");
+        assert_eq!(coarse.clone().refined(1), coarse);
     }
 
     #[test]

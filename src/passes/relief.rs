@@ -2,8 +2,8 @@
 //!
 //! In: points, lights, regions, boxes over the cells. Out: 1 by point and light where ground lies
 //! between. Law: the way meets a triangle, or dives below one whose corner the point is. Source:
-//! model.md §16. Error: a way that passes a triangle's side within 2e-6 of the ground's extent may count as
-//! meeting it.
+//! model.md §16. Error: a way that passes a triangle's side within 2e-6 of the ground's extent may
+//! count as meeting it.
 
 use crate::error::Result;
 use crate::gpu::{Compiler, Device, Kernel, Recorder};

@@ -3,9 +3,9 @@
 //! In: facets, lights, regions (rectangles), density grid, what ground hides. Out: transmittance by
 //! facet and light, and on request that of the clouds alone. Law: [nothing hides the light]
 //! e^{−(1−g)τ}, τ by the midpoint rule along the grid. Source: model.md §8, passes.md. Error:
-//! against the same march in f64, (1−g)τ times the samples' relative rounding, plus the sum's ("sums") and 3 + 2|x|
-//! ulp of exp; against the closed form, the grid's. A ray within a few ulp of an edge may count as
-//! hidden or not.
+//! against the same march in f64, (1−g)τ times the samples' relative rounding, plus the sum's
+//! ("sums") and 3 + 2|x| ulp of exp; against the closed form, the grid's. A ray within a few ulp of
+//! an edge may count as hidden or not.
 
 use crate::error::Result;
 use crate::gpu::{Compiler, Device, Kernel, Recorder};

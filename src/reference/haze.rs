@@ -6,13 +6,22 @@
 
 use glam::DVec3;
 
-use crate::model::sky::SkyView;
+use crate::model::cover::Sea;
+use crate::model::sky::{Haze, SkyView};
 
 /// Returns the radiance of a facet at `offset` from the eye as it is seen, and the factor of its
-/// relative change.
-pub fn seen(view: &SkyView, offset: DVec3, radiance: DVec3) -> (DVec3, f64) {
+/// relative change. `sea`: the sea that it is part of, and what arrives of the sun.
+pub fn seen(
+    view: &SkyView,
+    offset: DVec3,
+    radiance: DVec3,
+    sea: Option<(Sea, f64)>,
+) -> (DVec3, f64) {
     let haze = view.before(offset);
-    let (through, all) = (haze.through * radiance, haze.over(radiance));
+    let direction = offset.try_normalize().unwrap_or(DVec3::Y);
+    let mirrored = sea.map(|(sea, sunlit)| view.in_sea(&sea, direction, sunlit));
+    let sent = radiance + mirrored.unwrap_or_default();
+    let (through, all) = (haze.through * sent, haze.over(sent));
     let sum = all.element_sum();
     (all, if sum > 0.0 { through.element_sum() / sum } else { 1.0 })
 }
@@ -43,10 +52,40 @@ pub fn magnitude(view: &SkyView, direction: DVec3) -> DVec3 {
 }
 
 /// Returns the bound of the rounding of a device's [`seen`].
-pub fn rounding(view: &SkyView, offset: DVec3, radiance: DVec3) -> DVec3 {
-    let air = magnitude(view, offset.normalize_or_zero());
-    let taken = 1.0 - view.before(offset).through;
-    ROUNDING * (radiance + (taken + ROUNDING) * air)
+pub fn rounding(view: &SkyView, offset: DVec3, radiance: DVec3, sea: Option<(Sea, f64)>) -> DVec3 {
+    let direction = offset.normalize_or_zero();
+    let air = magnitude(view, direction);
+    let Haze { through, .. } = view.before(offset);
+    let of_sea = sea.map(|(sea, sunlit)| sea_rounding(view, &sea, direction, sunlit));
+    let mirrored = sea.map(|(sea, sunlit)| view.in_sea(&sea, direction, sunlit));
+    let sent = radiance + mirrored.unwrap_or_default();
+    ROUNDING * (sent + (1.0 - through + ROUNDING) * air) + through * of_sea.unwrap_or_default()
+}
+
+/// Returns the bound of the rounding of what a sea mirrors.
+///
+/// The dome's takes its own; the mirrored direction is off by some 1e-6, which moves it up by as
+/// much of the way to the horizon. In the glitter, the sum of two unit vectors has an error of
+/// 2.4e-7, so that the slope between is off by that over the sum's height; its exponent by 5e-7 of
+/// itself more, and all factors by 1e-5.
+pub fn sea_rounding(view: &SkyView, sea: &Sea, direction: DVec3, sunlit: f64) -> DVec3 {
+    let toward_eye = -direction;
+    if toward_eye.y <= 0.0 {
+        return DVec3::ZERO;
+    }
+    let (mirrored, share) = sea.mirror(toward_eye);
+    let turned = |by: f64| {
+        let up = DVec3::new(mirrored.x, (mirrored.y + by).max(0.0), mirrored.z).normalize();
+        view.sky_radiance(up)
+    };
+    let moved = (turned(1e-4) - turned(-1e-4)).abs() * (2e-6 / 2e-4);
+    let of_sky = share * (2.0 * ROUNDING * magnitude(view, mirrored) + moved);
+    let half = view.toward_sun() + toward_eye;
+    let normal = half.normalize();
+    let (slope, off) = ((1.0 / normal.y.powi(2) - 1.0).max(0.0).sqrt(), 2.4e-7 / half.y);
+    let of_exponent = 2.0 * (2.0 * slope * off + off * off) / sea.slopes;
+    let relative = 2.0 * ROUNDING + 5e-7 * sea.exponent(normal) + of_exponent;
+    of_sky + sunlit * sea.glitter(view.toward_sun(), toward_eye) * relative.exp_m1() * view.sun
 }
 
 #[cfg(test)]
@@ -63,10 +102,10 @@ mod tests {
     #[test]
     fn near_light_is_as_it_is_and_far_light_is_lost() {
         let light = DVec3::new(1.0, 2.0, 3.0);
-        assert_eq!(seen(&view(0.0), DVec3::X * 1e6, light), (light, 1.0));
-        let (near, share) = seen(&view(1.0), DVec3::X, light);
+        assert_eq!(seen(&view(0.0), DVec3::X * 1e6, light, None), (light, 1.0));
+        let (near, share) = seen(&view(1.0), DVec3::X, light, None);
         assert!((near - light).length() < 1e-3 && share > 0.999);
-        let (far, share) = seen(&view(1.0), DVec3::X * 1e7, light);
+        let (far, share) = seen(&view(1.0), DVec3::X * 1e7, light, None);
         assert!(share < 1e-9 && (far - view(1.0).behind(DVec3::X)).length() < 1e-9);
     }
 

@@ -147,6 +147,11 @@ pub fn triangles(terrain: &Terrain) -> impl Iterator<Item = [DVec3; 3]> + '_ {
     halves(terrain).map(|numbers| numbers.map(|k| terrain.origin + terrain.points[k]))
 }
 
+/// Returns the mean factor on K_d of each triangle.
+pub fn colors(terrain: &Terrain) -> impl Iterator<Item = DVec3> + '_ {
+    halves(terrain).map(|numbers| numbers.iter().map(|k| terrain.color(*k)).sum::<DVec3>() / 3.0)
+}
+
 /// Shares of the radiance at corner, end of u and end of v in that at `hit`.
 fn shares(hit: &Hit) -> [f64; 3] {
     [1.0 - hit.s - hit.t, hit.s, hit.t]
@@ -275,7 +280,7 @@ mod tests {
             origin: DVec3::ZERO,
             points: Arc::new((0..9).map(at).collect()),
             n: [3, 3],
-            i_material: 0,
+            ..Terrain::default()
         }
     }
 

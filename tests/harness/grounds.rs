@@ -64,7 +64,7 @@ impl Relief {
             double(DVec3::new(x, height(x, north), -north).as_vec3().to_array())
         };
         let points = Arc::new((0..n[0] * n[1]).map(place).collect());
-        let terrain = Terrain { origin, points, n, i_material: 0 };
+        let terrain = Terrain { origin, points, n, ..Terrain::default() };
         let brdf = Brdf { kd: DVec3::ONE, ks: DVec3::ZERO, ns: 1.0 };
         let (i_region, i_first) = (self.regions.len() as u32, self.lit.len() as u32);
         self.regions.push(RegionRecord::terrain(&terrain, DVec3::ZERO, &brdf, NO_LOBE, i_first));

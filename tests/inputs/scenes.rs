@@ -266,8 +266,10 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
                 { "kind": "sky", "irradiance": [0.8, 0.87, 1.0], "constant": 0.55 },
             ],
             "material": [{ "name": "cloud", "kd": [0.9, 0.9, 0.9], "ks": [0.0, 0.0, 0.0],
-            "ns": 8.0, "albedo": "derived", "phase": "derived", "droplet_um": 10.0 }],
+            "ns": 8.0, "albedo": "derived", "phase": "derived", "droplet_um": 10.0,
+            "cover": "plain", "contrast": 0.25, "patch_length": 1.0, "sea_wind": 5.0 }],
             "surface": [],
+            "ground": [],
             "air": { "temperature_c": 20.0, "humidity": 0.6, "pressure_hpa": 1013.25,
             "saturation": "bolton", "ice": false, "metres_per_unit": 250.0, "ground": 0.0 },
             "cloud": [{

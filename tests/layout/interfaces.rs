@@ -99,7 +99,7 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, "8 4"),
     ("grid_spread.comp", grid::SpreadPush::FIELDS, "8 4"),
     ("harmonics.comp", harmonics::Push::FIELDS, "T T S"),
-    ("haze.comp", haze::Push::FIELDS, "Facet Lit Slope Sky Lit Slope"),
+    ("haze.comp", haze::Push::FIELDS, "Facet Lit Slope Sky Lit Slope 4 4"),
     ("impostors.frag", impostors::Push::FIELDS, "T"),
     ("impostors.vert", impostors::Push::FIELDS, ""),
     ("impostors_part.comp", impostors::PartPush::FIELDS, "8 4 8 8 T"),

@@ -6,11 +6,18 @@ use nimbus::gpu::Compiler;
 use nimbus::layout::facet::{FacetRecord, LitRecord, SlopeRecord};
 use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::sky::SkyRecord;
+use nimbus::model::cover::Sea;
+use nimbus::model::light::Light;
 use nimbus::model::philox::philox4x32_10;
 use nimbus::model::sky::{Sky, SkySettings, SkyView};
-use nimbus::passes::haze::{HazeBuffers, HazePass};
+use nimbus::passes::haze::{HazeBuffers, HazeParams, HazePass, HazeVariant};
 use nimbus::reference::haze::{rounding, seen};
 
+const VARIANTS: [HazeVariant; 3] = [
+    HazeVariant { has_slopes: true, has_sea: false, has_depths: false },
+    HazeVariant { has_slopes: true, has_sea: true, has_depths: false },
+    HazeVariant { has_slopes: true, has_sea: true, has_depths: true },
+];
 const N: usize = 3000;
 const EYE: [f32; 3] = [250.0, -40.5, 1e3];
 
@@ -35,7 +42,8 @@ fn views() -> [SkyView; 2] {
         let toward = toward.normalize().as_vec3().as_dvec3();
         let sky = Sky::new(settings, toward).expect("a sky");
         let eye = DVec3::Y * (settings.sea_level + height);
-        SkyView::new(&sky, eye, &[], &[], 0.0)
+        let sun = Light::Directional { direction: -toward, irradiance: DVec3::new(3.0, 2.5, 2.0) };
+        SkyView::new(&sky, eye, &[sun], &[], 0.0)
     };
     [view(low, DVec3::new(0.8, 0.05, -0.6), 2.0), view(high, DVec3::new(-0.3, 0.9, 0.2), 4096.0)]
 }
@@ -51,7 +59,11 @@ fn facet(i: u32) -> FacetRecord {
         3 => [7e3, 0.0, -2e3],
         _ => [x, y, z].map(|v| far * v),
     };
-    FacetRecord { position: [0, 1, 2].map(|k| EYE[k] + offset[k]), ..Default::default() }
+    FacetRecord {
+        position: [0, 1, 2].map(|k| EYE[k] + offset[k]),
+        i_region: i % 5,
+        ..Default::default()
+    }
 }
 
 fn lit(i: u32) -> LitRecord {
@@ -72,15 +84,54 @@ fn slope(i: u32) -> SlopeRecord {
     SlopeRecord { relative: [x, y, z], position: facet(i).position, ..Default::default() }
 }
 
+/// Regions: a plate, land, two seas, and a cloud that a sea's number must not reach.
+const SEAS: [f32; 5] = [0.0, 0.0, 0.003, 0.06, 0.06];
+const N_SOLIDS: u32 = 4;
+const I_SUN: usize = 1;
+const N_LIGHTS: usize = 3;
+const BACKWARD: f64 = 0.25;
+
+/// What arrives of the lights at a facet: shares, or depths, some of which are barred.
+fn arriving(i: u32, has_depths: bool) -> [f32; N_LIGHTS] {
+    let [a, b, c, _] = some(i, 5).map(|v| 0.5 + 0.5 * v);
+    match has_depths {
+        false => [a, b, c],
+        true if i.is_multiple_of(5) => [a, 1e30, c],
+        true => [a, 4.0 * b, c],
+    }
+}
+
+/// The sea of a facet and what arrives of the sun.
+fn sea(i: u32, has_depths: bool) -> Option<(Sea, f64)> {
+    let slopes = SEAS.get(facet(i).i_region as usize).filter(|_| facet(i).i_region < N_SOLIDS)?;
+    let v = f64::from(arriving(i, has_depths)[I_SUN]);
+    let sunlit = match has_depths {
+        true if v > 1e29 => 0.0,
+        true => (-BACKWARD * v).exp(),
+        false => v,
+    };
+    (*slopes > 0.0).then_some((Sea { slopes: f64::from(*slopes) }, sunlit))
+}
+
 /// Returns light and slopes after the pass.
 fn run(
     gpu: &mut Gpu,
     compiler: Option<&Compiler>,
     view: &SkyView,
-    has_slopes: bool,
+    variant: HazeVariant,
 ) -> (Vec<LitRecord>, Vec<SlopeRecord>) {
-    let pass = HazePass::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), has_slopes)
-        .expect("the pass");
+    let pass =
+        HazePass::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), variant).expect("the pass");
+    let seas = gpu.upload(&SEAS);
+    let of_lights: Vec<f32> = (0..N as u32).flat_map(|i| arriving(i, variant.has_depths)).collect();
+    let of_lights = gpu.upload(&of_lights);
+    let params = HazeParams {
+        n_facets: N as u32,
+        n_lights: N_LIGHTS as u32,
+        i_sun: I_SUN as u32,
+        n_solids: N_SOLIDS,
+        backward: BACKWARD,
+    };
     let all = || 0..N as u32;
     let facets = gpu.upload(&all().map(facet).collect::<Vec<_>>());
     let light = gpu.upload(&all().map(lit).collect::<Vec<_>>());
@@ -96,8 +147,10 @@ fn run(
         sky: &sky,
         hazed: &hazed,
         hazed_slopes: &hazed_slopes,
+        arriving: &of_lights,
+        seas: &seas,
     };
-    gpu.run(|rec| pass.record(rec, &buffers, N as u32));
+    gpu.run(|rec| pass.record(rec, &buffers, &params));
     (gpu.download(&hazed, N), gpu.download(&hazed_slopes, N))
 }
 
@@ -106,13 +159,14 @@ fn vector(v: [f32; 3]) -> DVec3 {
 }
 
 /// Returns radiances and slopes in f64, and their bounds.
-fn truth(view: &SkyView) -> [Vec<f64>; 4] {
+fn truth(view: &SkyView, variant: HazeVariant) -> [Vec<f64>; 4] {
     let mut all = [vec![], vec![], vec![], vec![]];
     for i in 0..N as u32 {
         let offset = vector(facet(i).position) - vector(EYE);
         let light = vector(lit(i).first) + vector(lit(i).second);
-        let (color, share) = seen(view, offset, light);
-        let bound = rounding(view, offset, light);
+        let sea = sea(i, variant.has_depths).filter(|_| variant.has_sea);
+        let (color, share) = seen(view, offset, light, sea);
+        let bound = rounding(view, offset, light, sea);
         all[0].extend(color.to_array());
         all[1].extend(bound.to_array());
         let relative = vector(slope(i).relative);
@@ -131,9 +185,12 @@ fn radiances(of: &[LitRecord]) -> Vec<f64> {
 #[test]
 fn light_behind_air_equals_the_reference() {
     let mut gpu = Gpu::new();
-    for (view, name) in views().iter().zip(["low", "high"]) {
-        let [colors, bounds, relative, of_relative] = truth(view);
-        let (found, slopes) = run(&mut gpu, None, view, true);
+    let names = ["low", "high"];
+    let all = views().into_iter().zip(names).flat_map(|of| VARIANTS.map(|variant| (of, variant)));
+    for ((view, name), variant) in all {
+        let view = &view;
+        let [colors, bounds, relative, of_relative] = truth(view, variant);
+        let (found, slopes) = run(&mut gpu, None, view, variant);
         assert_within_and_say(name, &radiances(&found), &colors, &bounds);
         let found_slopes: Vec<f64> =
             slopes.iter().flat_map(|s| s.relative.map(f64::from)).collect();
@@ -143,7 +200,8 @@ fn light_behind_air_equals_the_reference() {
             assert_eq!(s.position, facet(i).position, "{i}");
         }
         // Without slopes they are left as they are.
-        let (same, untouched) = run(&mut gpu, None, view, false);
+        let even = HazeVariant { has_slopes: false, ..variant };
+        let (same, untouched) = run(&mut gpu, None, view, even);
         assert!(same == found && untouched.iter().all(|s| *s == SlopeRecord::default()));
     }
 }
@@ -163,7 +221,12 @@ fn no_scene_is_too_large_for_its_air() {
         };
         let sky = Sky::new(settings, DVec3::Y).expect("a sky");
         let view = SkyView::new(&sky, DVec3::Y * height, &[], &[], 0.0);
-        let pass = HazePass::new(&gpu.device, &gpu.compiler, false).expect("the pass");
+        let variant = HazeVariant { has_slopes: false, has_sea: true, has_depths: false };
+        let pass = HazePass::new(&gpu.device, &gpu.compiler, variant).expect("the pass");
+        let seas = gpu.upload(&[0.003f32]);
+        let arriving = gpu.upload(&[1.0f32; 125]);
+        let params =
+            HazeParams { n_facets: 125, n_lights: 1, i_sun: 0, n_solids: 1, backward: 1.0 };
         let ends = [-1e15f32, -1.0, 0.0, 1.0, 1e15];
         let at = |k: usize| [ends[k % 5], ends[k / 5 % 5], ends[k / 25]];
         let facet = |k| FacetRecord { position: at(k), ..Default::default() };
@@ -179,8 +242,10 @@ fn no_scene_is_too_large_for_its_air() {
             sky: &sky,
             hazed: &hazed,
             hazed_slopes: &none,
+            arriving: &arriving,
+            seas: &seas,
         };
-        gpu.run(|rec| pass.record(rec, &buffers, 125));
+        gpu.run(|rec| pass.record(rec, &buffers, &params));
         for (k, l) in gpu.download::<LitRecord>(&hazed, 125).iter().enumerate() {
             let is_light = l.first.iter().all(|v| v.is_finite() && *v >= 0.0);
             assert!(is_light, "{unit} {height} {:?}: {:?}", at(k), l.first);
@@ -191,10 +256,12 @@ fn no_scene_is_too_large_for_its_air() {
 #[test]
 fn wrong_shaders_are_noticed() {
     let mut gpu = Gpu::new();
-    let views = views();
-    let truths = views.map(|view| truth(&view));
+    let views: Vec<(SkyView, HazeVariant)> =
+        views().into_iter().flat_map(|view| VARIANTS.map(|variant| (view, variant))).collect();
+    let truths: Vec<[Vec<f64>; 4]> =
+        views.iter().map(|(view, variant)| truth(view, *variant)).collect();
     for (file, from, to) in [
-        ("haze.comp", "(light.first + light.second)", "light.first"),
+        ("haze.comp", "sent = light.first + light.second", "sent = light.first"),
         ("haze.comp", "through + haze.added", "through"),
         ("haze.comp", "offset / far : ", "offset : "),
         ("haze.comp", "sum(through) / all", "1.0"),
@@ -215,10 +282,22 @@ fn wrong_shaders_are_noticed() {
         ("include/clear_sky.glsl", "taken * radiance_of_air", "radiance_of_air"),
         ("include/clear_sky.glsl", "? 1.0 - x * (0.5", "? 1.0 - x * (0.4"),
         ("include/clear_sky.glsl", "x < 1e-2 ?", "x < 1.0 ?"),
+        ("haze.comp", "i_region < push.n_solids ?", "true ?"),
+        ("haze.comp", "v < 1e29 ? sunlit : 0.0", "sunlit + 1e-3"),
+        ("haze.comp", "i * push.n_lights + push.i_sun", "i * push.n_lights"),
+        ("haze.comp", "exp(-push.backward * v)", "exp(-v)"),
+        ("include/sea.glsl", "(square * square * away)", "(square * square)"),
+        ("include/sea.glsl", "1.0 - density * tail", "1.0"),
+        ("include/sea.glsl", "float tilt = deviation * deviation", "float tilt = deviation"),
+        ("include/sea.glsl", "(waves_at(deviation, sun).seen / sun_up - 1.0)", "0.0"),
+        ("include/sea.glsl", "(4.0 * square * square * shadowed)", "(4.0 * square * shadowed)"),
+        ("include/sea.glsl", "* normal.x + deviation * across * normal.y", "* normal.x"),
+        ("include/sea.glsl", "2.0 * cosine * normal - toward_eye", "normal"),
     ] {
         let compiler = Gpu::wrong_compiler(file, from, to);
-        let is_noticed = views.iter().zip(&truths).any(|(view, [colors, bounds, slopes, off])| {
-            let (found, found_slopes) = run(&mut gpu, Some(&compiler), view, true);
+        let is_noticed = views.iter().zip(&truths).any(|((view, variant), truth)| {
+            let [colors, bounds, slopes, off] = truth;
+            let (found, found_slopes) = run(&mut gpu, Some(&compiler), view, *variant);
             let of_slopes: Vec<f64> =
                 found_slopes.iter().flat_map(|s| s.relative.map(f64::from)).collect();
             check_within("wrong", &radiances(&found), colors, bounds).is_err()

@@ -11,10 +11,11 @@ use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::sky::SkyRecord;
 use nimbus::model::backdrop::Backdrop;
 use nimbus::model::camera::Pose;
+use nimbus::model::cover::Sea;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
 use nimbus::model::sky::{SUN_RADIUS, Sky, SkySettings, SkyView};
 use nimbus::passes::present::{Compare, Present, Shown};
-use nimbus::reference::haze::{ROUNDING, magnitude};
+use nimbus::reference::haze::{ROUNDING, magnitude, sea_rounding};
 use nimbus::reference::present::{Compared, compared_values};
 
 const SIZE: [u32; 2] = [71, 49];
@@ -66,6 +67,19 @@ fn sky() -> SkyView {
     }
 }
 
+/// The same sky without air before a sea.
+fn over_sea() -> SkyView {
+    let view = sky();
+    let settings = SkySettings { haze: 0.0, ..*view.sky.settings() };
+    let clear = Sky::new(settings, view.toward_sun()).expect("a sky");
+    SkyView {
+        sky: clear,
+        sea: Some(Sea { slopes: 0.03125 }),
+        sun: DVec3::new(2.0, 1.5, 0.5),
+        ..view
+    }
+}
+
 impl Set {
     fn plain(film: Film) -> Set {
         Set { film, sky: None }
@@ -93,7 +107,13 @@ impl Set {
         // In level directions the way to the ground has the error of 1/y, 1e-6/y of it. It shows by
         // 1/e at most, and from 1e-3 down the air is opaque before the ground is reached.
         let level = 1.0 + 1e-6 / direction.y.abs().max(1e-3) / ROUNDING;
-        (found, ROUNDING * level * (magnitude(&view, direction) + found) + rim)
+        // The direction's own error as much again.
+        let mirrored = view.sea.map(|sea| 3.0 * sea_rounding(&view, &sea, direction, 1.0));
+        let of_sea = mirrored.unwrap_or_default();
+        // Without air a sea ends at the horizon at once, and rounding decides in level directions.
+        let is_level = view.sea.is_some() && direction.y.abs() < 1e-6;
+        let of_sea = if is_level { DVec3::ONE } else { of_sea };
+        (found, ROUNDING * level * (magnitude(&view, direction) + found) + rim + of_sea)
     }
 }
 
@@ -364,15 +384,27 @@ fn wrong_skies_are_noticed() {
         ("present.frag", "vec2(p) + 0.5", "vec2(p)"),
         ("present.frag", "ray.y * camera.up", "ray.y * camera.right"),
         (
-            "include/clear_sky.glsl",
+            "include/behind.glsl",
             "taken_by(depth) * radiance_of_air(sky, direction)\n               +",
             "",
         ),
         ("include/clear_sky.glsl", "(1.05 - off)", "(1.3 - off)"),
-        ("include/clear_sky.glsl", "* share_of_disc", "* 0.0 * share_of_disc"),
-        ("include/clear_sky.glsl", "haze.through * sky.ground", "sky.ground"),
-        ("include/clear_sky.glsl", "sky.unit * sky.flatness", "sky.unit"),
-        ("include/clear_sky.glsl", "depth_to_space(sky, sky.height,", "depth_to_space(sky, 0.0,"),
+        ("include/behind.glsl", "* share_of_disc", "* 0.0 * share_of_disc"),
+        ("include/behind.glsl", "haze.through * (sky.ground", "(sky.ground"),
+        ("include/behind.glsl", "sky.unit * sky.flatness", "sky.unit"),
+        ("include/behind.glsl", "depth_to_space(sky, sky.height,", "depth_to_space(sky, 0.0,"),
+    ] {
+        let wrong = Gpu::wrong_compiler(file, from, to);
+        assert!(!is_right(&show(&mut gpu, Some(&wrong), formats, &set, None)), "{to} was missed");
+    }
+    let set = Set { sky: Some(over_sea()), ..set };
+    let is_right = |codes: &[u8]| first_wrong(&set, formats.0, None, codes).is_none();
+    let codes = show(&mut gpu, None, formats, &set, None);
+    assert_eq!(first_wrong(&set, formats.0, None, &codes), None);
+    for (file, from, to) in [
+        ("include/behind.glsl", "-direction, 1.0)", "-direction, 0.0)"),
+        ("include/behind.glsl", "sky.slopes > 0.0", "sky.slopes > 1.0"),
+        ("include/sea.glsl", "(4.0 * square * square * shadowed)", "(2.0 * square * shadowed)"),
     ] {
         let wrong = Gpu::wrong_compiler(file, from, to);
         assert!(!is_right(&show(&mut gpu, Some(&wrong), formats, &set, None)), "{to} was missed");

@@ -33,7 +33,7 @@ fn hills(n: [u32; 2], step: f64, origin: DVec3, height: impl Fn(f64, f64) -> f64
         DVec3::new(x, height(x, north), -north).as_vec3().as_dvec3()
     };
     let points = Arc::new((0..n[0] * n[1]).map(place).collect());
-    Terrain { origin, points, n, i_material: 0 }
+    Terrain { origin, points, n, ..Terrain::default() }
 }
 
 /// Returns a number from 0 to 1.

@@ -132,7 +132,7 @@ passes! {
             _ if f.is_medium => Some(Reason::Of("clouds are a medium")),
             Tensors::Kept => unlit(f, same),
             Tensors::Needless => {
-                Some(Reason::Of("no material is edited: light is gathered at once"))
+                Some(Reason::Of("no edits that tensors could follow: light is gathered at once"))
             }
             Tensors::TooLarge { bytes, most } => Some(Reason::TooLarge { bytes, most }),
         },

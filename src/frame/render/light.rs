@@ -145,10 +145,7 @@ impl FramePasses {
                 n_facets: c.march.n_facets,
                 n_lights: c.march.n_lights,
                 n_solids: c.n_solids,
-                backward: match &packet.diffusion {
-                    Some(of) => of.mean_weakened(),
-                    None => 1.0 - c.forward,
-                },
+                backward: c.backward(packet),
                 n_terms: c.terms.n,
                 term: [c.terms.light, c.terms.depth, c.terms.phase],
                 scattered: packet.diffusion.map_or([1.0; 3], |of| of.scattered()),

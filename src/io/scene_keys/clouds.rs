@@ -10,7 +10,9 @@ use super::device_range::{out_of_range, out_of_range_when_grown};
 use super::disc::{DISC_KEYS, read_disc};
 use super::files::{Files, ListText};
 use super::key::{Keys, keys, names};
-use super::materials::{GROUND, MATERIAL_NAME, ground_named, material_named};
+use super::materials::{
+    GROUND, GROUND_POINTS, MATERIAL_NAME, ground_named, ground_points, material_named,
+};
 use super::motion::{
     GROWTH, GUST, POSITION, TEXTURE, read_growth, read_gust, read_position, read_texture,
 };
@@ -104,7 +106,7 @@ const KINDS: &[(&str, CloudKind)] = &[
     (
         "weather",
         CloudKind {
-            lists: &[FILE, WEATHER, DETAIL, GROUND, BASE, GROWTH],
+            lists: &[FILE, WEATHER, DETAIL, GROUND, GROUND_POINTS, BASE, GROWTH],
             read: read_weather,
             default_facing: "up",
         },
@@ -303,9 +305,10 @@ fn read_weather(s: &mut Section, reading: &mut Reading) -> Result<CloudSource> {
         reading.found.notes.push(format!("cloud {}: {note}", reading.i_cloud));
     }
     let found = &mut *reading.found;
+    let n_points = ground_points(s)?;
     if let Some(i_material) = ground_named(s, around.materials)? {
         let origin = read_position(s)?;
-        let terrain = ground_of(s, &file, &settings, origin, i_material)?;
+        let terrain = ground_of(s, &file, &settings, origin, (i_material, n_points))?;
         found.contents.push(blobs::digest_of_ground(&terrain).into());
         found.terrains.push(terrain);
     }

@@ -3,11 +3,12 @@
 use glam::DVec3;
 
 use super::key::{Keys, keys, names, read_path, read_tables};
-use super::spec::{Spec, described, number, one_of, required_text, text, vector};
+use super::spec::{Spec, choice, described, integer, number, one_of, required_text, text, vector};
 use crate::error::Result;
-use crate::io::bounds::{AMOUNT, Bounds, COORDINATE, GREATEST_EXPONENT, SHARE};
+use crate::io::bounds::{AMOUNT, Bounds, COORDINATE, DIVISOR, GREATEST_EXPONENT, SHARE};
 use crate::io::document::section::Section;
 use crate::io::document::suggest::{list_given, shown, suggestion};
+use crate::model::cover::{Cover, Land, Sea};
 use crate::model::material::{Brdf, Material, MaterialKey};
 use crate::model::phase::{Phase, RADII_UM, Scattering};
 
@@ -27,6 +28,7 @@ keys! { MATERIAL: fn material(s) -> Material { Material;
     /// left out is that of the entry before.
     keys ["path"]: described("array of { time_s, kd, ks, ns }") => |_| read_keys(s);
     scattering => scattering(s)?;
+    cover => read_cover(s)?;
 }}
 
 keys! { SCATTERING: fn scattering(s) -> Scattering { Scattering;
@@ -43,6 +45,44 @@ keys! {
     /// Radius of the droplets where `phase` is "mie".
     DROPLET: fn droplet(s) -> f64 =
         "droplet_um": number(10.0, Bounds::Within(RADII_UM[0], RADII_UM[1])), "um";
+}
+
+/// A cover as a scene names it.
+#[derive(Debug, Clone, Copy)]
+enum CoverName {
+    Plain,
+    Land,
+    Sea,
+}
+
+const COVERS: &[(&str, CoverName)] =
+    &[("plain", CoverName::Plain), ("land", CoverName::Land), ("sea", CoverName::Sea)];
+
+keys! {
+    /// What covers ground of the material: "land" has patches of other brightness and hue, and
+    /// "sea" mirrors the sun and the sky of [sky].
+    COVER: fn cover_name(s) -> CoverName = "cover": choice("plain", COVERS);
+}
+
+keys! { LAND: fn land(s) -> Land { Land;
+    /// Standard deviation of the brightness of patches over its mean, of the cover "land".
+    contrast: number(0.25, SHARE);
+    /// Mean distance of patches, of the cover "land".
+    length ["patch_length"]: number(1.0, DIVISOR), "unit";
+}}
+
+keys! {
+    /// Wind whose waves the cover "sea" has.
+    SEA_WIND: fn sea_wind(s) -> f64 = "sea_wind": number(5.0, Bounds::Within(0.0, 30.0)), "m/s";
+}
+
+fn read_cover(s: &mut Section) -> Result<Cover> {
+    let (name, land, wind) = (cover_name(s)?, land(s)?, sea_wind(s)?);
+    Ok(match name {
+        CoverName::Plain => Cover::Plain,
+        CoverName::Land => Cover::Land(land),
+        CoverName::Sea => Cover::Sea(Sea::of_wind(wind)),
+    })
 }
 
 /// Range of a phase function's mean cosine.
@@ -105,6 +145,11 @@ keys! {
 }
 
 keys! {
+    /// Points of the ground a column, along each side: light between them is linear.
+    GROUND_POINTS: pub fn ground_points(s) -> u32 = "ground_points": integer(1, 1, 16);
+}
+
+keys! {
     /// Name of the material of an endless plane at sea level, or "none" for no plane.
     PLANE: pub fn plane_named(s, materials: &[Material]) -> Option<usize> =
         "ground": text("none") => |name| match name.take(s, "ground")?.as_str() {
@@ -114,7 +159,7 @@ keys! {
 }
 
 /// Keys of `[[material]]`.
-pub const KEYS: [Keys; 4] = [MATERIAL, SCATTERING, DROPLET, BRDF];
+pub const KEYS: [Keys; 7] = [MATERIAL, SCATTERING, DROPLET, COVER, LAND, SEA_WIND, BRDF];
 /// Keys of the entries of a material's path.
 pub const PATH_KEYS: [Keys; 2] = [MATERIAL_KEY, BRDF];
 

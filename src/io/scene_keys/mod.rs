@@ -7,6 +7,7 @@ mod device_range;
 mod disc;
 mod draw;
 mod files;
+mod grounds;
 mod key;
 mod lighting;
 mod lights;
@@ -86,9 +87,9 @@ keys! {
 }
 
 /// Names of a scene's tables.
-const TABLES: [&str; 13] = [
-    "film", "camera", "time", "lighting", "draw", "threads", "light", "material", "surface", "air",
-    "sky", "cloud", "phase",
+const TABLES: [&str; 14] = [
+    "film", "camera", "time", "lighting", "draw", "threads", "light", "material", "surface",
+    "ground", "air", "sky", "cloud", "phase",
 ];
 
 /// Lists the tables of a scene file and their keys.
@@ -110,6 +111,7 @@ pub fn tables() -> Vec<Table> {
     tables.push(table("[[material]]", &materials::KEYS));
     tables.push(table("[[material]] path", &materials::PATH_KEYS));
     tables.push(table("[[surface]]", &surfaces::KEYS));
+    tables.push(table("[[ground]]", &grounds::KEYS));
     tables.push(table("[[cloud]]", &clouds::KEYS));
     for (kind, lists) in clouds::kinds() {
         tables.push(table(&format!("[[cloud]] from = \"{kind}\""), lists));
@@ -216,6 +218,7 @@ pub(super) fn read_scene(
     let exponents: Vec<f64> = glossy.map(|k| k.brdf.ns).collect();
     let lighting = lighting::read_lighting(s, &exponents)?;
     let surfaces = surfaces::read_surfaces(s, &materials)?;
+    let mut terrains = grounds::read_grounds(s, &materials)?;
     let air = air::read_air(s)?;
     let mut found = Found::default();
     let around = Surroundings {
@@ -238,8 +241,10 @@ pub(super) fn read_scene(
             },
         )?;
     }
-    let Found { contents, notes, terrains, .. } = found;
+    let Found { contents, notes, terrains: of_files, .. } = found;
     warnings.extend(notes);
+    terrains.extend(of_files);
+    let terrains = terrains.into_iter().map(|t| t.covered(&materials)).collect();
     let scene = Scene {
         title,
         film,

@@ -70,13 +70,13 @@ pub fn read_settings(
 }
 
 /// Returns the ground of a step (HGT) under a cloud at `origin`, with heights exaggerated like the
-/// cloud's.
+/// cloud's and `n_points` points a column along each side.
 pub fn ground_of(
     s: &Section,
     file: &WeatherFile,
     settings: &Settings,
     origin: DVec3,
-    i_material: usize,
+    (i_material, n_points): (usize, u32),
 ) -> Result<Terrain> {
     let (columns, rows) = (file.shape.nx, file.shape.ny);
     if columns < 2 || rows < 2 {
@@ -95,5 +95,6 @@ pub fn ground_of(
         place.clamp(DVec3::splat(-GREATEST), DVec3::splat(GREATEST))
     };
     let points = Arc::new(heights.iter().enumerate().map(place).collect());
-    Ok(Terrain { origin, points, n: [columns as u32, rows as u32], i_material })
+    let n = [columns as u32, rows as u32];
+    Ok(Terrain { origin, points, n, i_material, ..Terrain::default() }.refined(n_points))
 }

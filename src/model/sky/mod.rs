@@ -6,6 +6,7 @@
 
 mod air;
 mod dome;
+mod sea;
 mod sunlight;
 mod units;
 
@@ -21,6 +22,7 @@ use sunlight::sunlight;
 use units::balanced;
 pub use units::{UNIT_LX, luminance};
 
+use super::cover::Sea;
 use super::light::{Light, UP};
 use super::material::Material;
 use super::named::named;
@@ -187,8 +189,12 @@ pub struct SkyView {
     pub height_m: f64,
     /// Radiance of the sun's disc; 0 without.
     pub disc: DVec3,
+    /// Irradiance of the suns across their light.
+    pub sun: DVec3,
     /// Radiance of the plane at sea level; `None` without.
     pub ground: Option<DVec3>,
+    /// Sea that the plane is.
+    pub sea: Option<Sea>,
 }
 
 impl SkyView {
@@ -214,8 +220,27 @@ impl SkyView {
             sky: *sky,
             height_m: (eye.y - sea_level) * metres_per_unit / exaggeration,
             disc: if sky.settings.has_disc { dimmed } else { DVec3::ZERO },
+            sun,
             ground: sky.settings.i_ground.map(ground),
+            sea: sky.settings.i_ground.and_then(|i| materials[i].cover.sea()),
         }
+    }
+
+    /// Returns the radiance that a level sea mirrors to the eye, which sees it in a unit
+    /// direction: the sky, and `sunlit` of the sun. 0 from below.
+    pub fn in_sea(&self, sea: &Sea, direction: DVec3, sunlit: f64) -> DVec3 {
+        let toward_eye = -direction;
+        if toward_eye.y <= 0.0 {
+            return DVec3::ZERO;
+        }
+        let (mirrored, share) = sea.mirror(toward_eye);
+        let of_sun = sunlit * sea.glitter(self.toward_sun(), toward_eye);
+        share * self.sky_radiance(mirrored) + of_sun * self.sun
+    }
+
+    /// Returns the radiance of the sky from a unit direction, as it is seen from sea level.
+    pub fn sky_radiance(&self, direction: DVec3) -> DVec3 {
+        self.sky.dome.radiance(direction)
     }
 
     /// Returns the dome's coefficients by channel.
@@ -267,7 +292,8 @@ impl SkyView {
         let Some(ground) = self.ground.filter(|_| self.height_m > 0.0) else { return of_air };
         let SkySettings { metres_per_unit, exaggeration, .. } = self.sky.settings;
         let height = self.height_m * exaggeration / metres_per_unit;
-        self.before(direction * (height / -direction.y)).over(ground)
+        let mirrored = self.sea.map(|sea| self.in_sea(&sea, direction, 1.0)).unwrap_or_default();
+        self.before(direction * (height / -direction.y)).over(ground + mirrored)
     }
 
     /// Returns the share of the sun's disc that a direction sees. Its rim is a tenth of its radius

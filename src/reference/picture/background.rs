@@ -68,9 +68,12 @@ pub(super) fn solid_radiance(
     }
     let kd = |i_material: usize| scene.materials[i_material].at(scene.time.start_s).kd;
     let of_surfaces = placed.iter().map(|s| (s.i_material, s.n_facets()));
-    let of_ground = scene.terrains.iter().map(|t| (t.i_material, t.n_facets()));
-    let all = |(i_material, n): (usize, u64)| std::iter::repeat_n(kd(i_material), n as usize);
-    of_surfaces.chain(of_ground).flat_map(all).collect()
+    let even = |(i_material, n): (usize, u64)| std::iter::repeat_n(kd(i_material), n as usize);
+    let of_ground = scene
+        .terrains
+        .iter()
+        .flat_map(|t| (0..t.points.len()).map(|i| kd(t.i_material) * t.color(i)));
+    of_surfaces.flat_map(even).chain(of_ground).collect()
 }
 
 /// Draws the scene's ground over `picture` where it is nearer. `radiance` by the points of all

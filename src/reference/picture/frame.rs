@@ -1,13 +1,12 @@
 //! Every stage of one frame in f64, from the scene alone.
 
-use std::f64::consts::PI;
-
 use glam::DVec3;
 
 use super::local_scene::LocalScene;
 use super::medium_light::{BlobLight, CloudCells, MediumLight};
 use crate::error::Result;
 use crate::model::cloud::{Cloud, CloudSource, Group};
+use crate::model::cover::Sea;
 use crate::model::frame_state::FrameState;
 use crate::model::light::Light;
 use crate::model::medium::{MeanMedium, Medium, ScatterLaw};
@@ -15,8 +14,7 @@ use crate::model::parallel::parallel_map;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::shade::FacetSlope;
 use crate::model::sky::SkyView;
-use crate::reference::area::adaptive::{Accuracy, Estimate};
-use crate::reference::area::{AreaScene, DiscFacet, Receiver};
+use crate::reference::area::adaptive::Estimate;
 use crate::reference::facets::{Facet, FacetPlace, FacetSources};
 use crate::reference::generate::Generated;
 use crate::reference::occlude::Rectangle;
@@ -61,6 +59,9 @@ pub struct FrameReference {
     pub second: Vec<DVec3>,
     /// The sky whose air lies before the facets; `None` without.
     pub sky: Option<SkyView>,
+    /// Share of the sun that arrives at each facet of a sea, with the sea; `None` of others. Empty
+    /// without a sea.
+    pub seas: Vec<Option<(Sea, f64)>>,
     /// Estimated error of `second`, greatest channel.
     pub second_error: Vec<f64>,
     /// Greatest of three channels of Σ A |L1 − L1'| / Σ A L1 over facets of ground and clouds, L1
@@ -148,6 +149,7 @@ impl FrameReference {
         let blobs = reference::place::blobs(&generated, &placed);
         Ok(FrameReference {
             sky: scene.sky_view(state.pose.position, time_s).filter(|_| scene.has_haze()),
+            seas: vec![],
             colors: colors(scene, &blobs, state.pose.position - state.light_origin),
             state,
             groups,
@@ -176,7 +178,7 @@ impl FrameReference {
         let local = LocalScene::new(scene, origin, self.state.time_s);
         let cells = reference::deposit::deposit(&grid, &self.blobs);
         (self.facets, self.facet_colors) = self.cloud_facets(scene, &cells);
-        self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, local.ground.len()));
+        self.facet_colors.splice(0..0, local.ground_colors.iter().copied());
         self.facets.splice(0..0, local.ground.iter().copied());
         let rectangles: Vec<Rectangle> =
             scene.surfaces.iter().map(|s| Rectangle::new(s, origin)).collect();
@@ -210,6 +212,7 @@ impl FrameReference {
         };
         let mut transmittance = direct.transmittance(&receivers, &lights);
         local.hide_by_ground(&mut transmittance, &lights);
+        self.seas = seas(scene, &lights, &transmittance);
         self.irradiance =
             reference::first::irradiance(&positions, &normals, &transmittance, &lights);
         let more = diffuse.as_ref().map_or(&[][..], |light| &light.on_solids);
@@ -303,80 +306,7 @@ impl FrameReference {
         };
         take(&sources, &reference::place::cloud_centers(&scene.clouds, time_s, light_origin))
     }
-
-    /// Puts the surfaces' facets before all others, lit by the area reference, with `more`
-    /// irradiance by diffuse light. `lights` reach them through a share of the depth, 1 less the
-    /// number beside them.
-    fn light_surfaces<T>(
-        &mut self,
-        scene: &Scene,
-        local: &LocalScene,
-        (lights, forward): (&[Light], f64),
-        more: &[DVec3],
-        take: impl FnOnce(&FrameReference, &SecondOf<'_>) -> T,
-    ) -> T {
-        let disc = |(f, c): (&Facet, &DVec3)| local.disc(f, *c);
-        let discs: Vec<DiscFacet> = match scene.lighting.mode {
-            LightingMode::TwoReflection => {
-                self.facets.iter().zip(&self.facet_colors).map(disc).collect()
-            }
-            // They reflect onto nothing.
-            _ => vec![],
-        };
-        let area_scene = AreaScene::new(
-            &local.surfaces,
-            local.surface_brdfs(),
-            lights,
-            &self.blobs,
-            forward,
-            &discs,
-        )
-        .behind_ground(local.relief.as_ref(), local.ground.len());
-        let flat: Vec<Facet> = local.surface_facets().collect();
-        let eye = self.state.pose.position - self.state.light_origin;
-        let on_surfaces = flat.iter().map(|f| area_scene.on_surface(f.region as usize, f.position));
-        let receivers: Vec<(Receiver, DVec3)> = on_surfaces
-            .chain((0..discs.len()).map(|i| area_scene.on_disc(i)))
-            .map(|r| (r, (eye - r.position).normalize_or(r.normal)))
-            .collect();
-        let of_surfaces = &receivers[..flat.len()];
-        let n = of_surfaces.len();
-        let of_more = |i: usize| more.get(i).copied().unwrap_or(DVec3::ZERO);
-        let first = parallel_map(n, |i| {
-            let (at, toward) = &of_surfaces[i];
-            area_scene.first(at, *toward) + at.brdf.kd * of_more(i) / PI
-        });
-        let irradiance = parallel_map(n, |i| area_scene.irradiance(&of_surfaces[i].0) + of_more(i));
-        self.radiance.splice(0..0, first);
-        if !self.slopes.is_empty() {
-            let even = |f: &Facet| FacetSlope { relative: DVec3::ZERO, position: f.position };
-            self.slopes.splice(0..0, flat.iter().map(even));
-        }
-        if let Some(of) = &mut self.cells {
-            of.means.splice(0..0, flat.iter().map(|_| 0.0));
-        }
-        self.irradiance.splice(0..0, irradiance);
-        self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, flat.len()));
-        self.facets.splice(0..0, flat);
-        self.grid_error = self.error_of_grid(area_scene.disc_radiance());
-        let accuracy = Accuracy::relative(SECOND_ACCURACY);
-        take(self, &|i| area_scene.second(&receivers[i].0, receivers[i].1, &accuracy))
-    }
-
-    /// Returns [`FrameReference::grid_error`]. `closed` is L1 of the last facets, in closed form.
-    fn error_of_grid(&self, closed: &[DVec3]) -> f64 {
-        let n_before = self.facets.len() - closed.len();
-        let facets = self.facets[n_before..].iter().zip(&self.radiance[n_before..]).zip(closed);
-        let (off, all) = facets.fold((DVec3::ZERO, DVec3::ZERO), |(off, all), ((f, grid), l)| {
-            (off + f.area * (*l - *grid).abs(), all + f.area * *l)
-        });
-        let shares = [0, 1, 2].map(|k| if all[k] > 0.0 { off[k] / all[k] } else { 0.0 });
-        shares.into_iter().fold(0.0, f64::max)
-    }
 }
-
-/// Relative accuracy of the second reflection: a hundredth of the 1 % that devices are held to.
-const SECOND_ACCURACY: f64 = 1e-4;
 
 /// Returns every particle's own colour, linear RGB: toward `eye` where it changes with the
 /// direction of view and no light decides what it shows.
@@ -398,4 +328,21 @@ fn colors(scene: &Scene, blobs: &[Blob], eye: DVec3) -> Vec<DVec3> {
         }
     }
     all
+}
+
+/// Returns the sea of every facet of surfaces and ground, and what arrives of the sun. `passed`
+/// [point][light]: of the ground's points first.
+fn seas(scene: &Scene, lights: &[Light], passed: &[f64]) -> Vec<Option<(Sea, f64)>> {
+    let is_sun = |light: &Light| matches!(light, Light::Directional { .. });
+    let Some(i_sun) = lights.iter().position(is_sun).filter(|_| scene.has_sea()) else {
+        return vec![];
+    };
+    let of_ground = scene
+        .terrains
+        .iter()
+        .zip(scene.seas())
+        .flat_map(|(t, sea)| std::iter::repeat_n(sea, t.n_facets() as usize))
+        .enumerate()
+        .map(|(i, sea)| sea.map(|sea| (sea, passed[i * lights.len() + i_sun])));
+    std::iter::repeat_n(None, scene.n_surface_facets() as usize).chain(of_ground).collect()
 }

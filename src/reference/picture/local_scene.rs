@@ -8,6 +8,7 @@ use crate::model::parallel::parallel_map;
 use crate::model::relief::may_hide;
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
+use crate::model::terrain::Terrain;
 use crate::reference::area::DiscFacet;
 use crate::reference::facets::Facet;
 use crate::reference::relief::Ground;
@@ -28,6 +29,8 @@ pub(super) struct LocalScene {
     n_solids: usize,
     /// Facets of the ground, one a point.
     pub ground: Vec<Facet>,
+    /// Factor on K_d of these facets.
+    pub ground_colors: Vec<DVec3>,
     /// Ground that hides lights from its own points; `None` where it hides none.
     pub relief: Option<Ground>,
 }
@@ -44,6 +47,7 @@ impl LocalScene {
             brdfs: (0..scene.n_regions()).map(brdf).collect(),
             n_solids: scene.n_solids(),
             ground: terrains.flat_map(|(t, region)| terrain::facets(t, origin, region)).collect(),
+            ground_colors: scene.terrains.iter().flat_map(colors).collect(),
             relief: may_hide(&scene.terrains, &scene.lights)
                 .then(|| Ground::new(&scene.terrains, origin)),
         }
@@ -82,6 +86,12 @@ impl LocalScene {
         self.surface_facets().chain(self.ground.iter().copied()).collect()
     }
 
+    /// Factor on K_d of the facets of the surfaces, and then of the ground.
+    pub fn solid_colors(&self) -> Vec<DVec3> {
+        let n = self.surfaces.iter().map(Surface::n_facets).sum::<u64>() as usize;
+        std::iter::repeat_n(DVec3::ONE, n).chain(self.ground_colors.iter().copied()).collect()
+    }
+
     /// K_d of every region.
     pub fn kd(&self) -> Vec<DVec3> {
         self.brdfs.iter().map(|brdf| brdf.kd).collect()
@@ -96,6 +106,10 @@ impl LocalScene {
             kd: self.brdfs[facet.region as usize].kd * color,
         }
     }
+}
+
+fn colors(terrain: &Terrain) -> Vec<DVec3> {
+    (0..terrain.points.len()).map(|i| terrain.color(i)).collect()
 }
 
 /// Returns the scene's surfaces relative to `origin`.

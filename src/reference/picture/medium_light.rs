@@ -48,8 +48,9 @@ impl MediumLight {
         local.hide_by_ground(&mut passed[n_before * lights.len()..], lights);
         let arriving = first::irradiance(&positions, &normals, &passed, lights);
         let kd = local.kd();
+        let radiosity = facets.iter().zip(&arriving).map(|(f, e)| kd[f.region as usize] * *e);
         let radiosity: Vec<DVec3> =
-            facets.iter().zip(&arriving).map(|(f, e)| kd[f.region as usize] * *e).collect();
+            radiosity.zip(local.solid_colors()).map(|(sent, color)| sent * color).collect();
         let lift = scene.longest_facet_edge();
         let of_solids =
             (!facets.is_empty()).then(|| FaceLight::new(grid, &facets, &radiosity, lights, lift));

@@ -28,6 +28,7 @@ mod samples;
 mod scene_light;
 mod shares;
 mod sprites;
+mod surface_light;
 mod transport;
 mod transport_layers;
 

@@ -52,7 +52,8 @@ impl ModelScene {
         let of_particles = of_particles
             .zip(&frame.colors)
             .map(|(f, color)| local.disc(&Facet { region: f.region + n_solids, ..f }, *color));
-        let of_ground = local.ground.iter().map(|f| local.disc(f, DVec3::ONE));
+        let of_ground = local.ground.iter().zip(&local.ground_colors);
+        let of_ground = of_ground.map(|(f, color)| local.disc(f, *color));
         let discs = of_ground.chain(of_particles).collect();
         ModelScene { discs, eye: frame.state.pose.position - origin, local }
     }

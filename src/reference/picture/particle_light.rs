@@ -24,7 +24,8 @@ impl FrameReference {
     fn behind_air(&self, i: usize) -> Option<(DVec3, f64)> {
         let eye = self.state.pose.position - self.state.light_origin;
         let offset = || self.facets[i].position - eye;
-        self.sky.map(|view| reference::haze::seen(&view, offset(), self.radiance_of(i)))
+        let sea = self.seas.get(i).copied().flatten();
+        self.sky.map(|view| reference::haze::seen(&view, offset(), self.radiance_of(i), sea))
     }
 
     /// Returns the radiance that every particle is drawn with: that of its facet, or its own

@@ -63,7 +63,8 @@ impl TransportParts {
     fn of_frame(scene: &Scene, frame: &FrameReference) -> TransportParts {
         let local = LocalScene::new(scene, frame.state.light_origin, frame.state.time_s);
         let (i_scatterer, scatterers) = scatterers(scene, frame);
-        let [rectangles, triangles] = flats(scene, &local);
+        let mut brdfs = local.solid_brdfs().to_vec();
+        let [rectangles, triangles] = flats(scene, &local, &mut brdfs);
         TransportParts {
             view: view(scene, frame),
             blobs: frame.blobs.clone(),
@@ -71,7 +72,7 @@ impl TransportParts {
             scatterers,
             rectangles,
             triangles,
-            brdfs: local.solid_brdfs().to_vec(),
+            brdfs,
             lights: local.lights,
             sun_radius: scene.lighting.sun_radius,
         }
@@ -155,16 +156,24 @@ fn scatterers(scene: &Scene, frame: &FrameReference) -> (Vec<u32>, Vec<Scatterer
 /// A corner and two sides, and the index of a material.
 type Flat = ([DVec3; 3], u32);
 
-/// Returns the rectangles, and the ground's triangles.
-fn flats(scene: &Scene, local: &LocalScene) -> [Vec<Flat>; 2] {
+/// Returns the rectangles, and the ground's triangles. Those of coloured ground have materials of
+/// their own, which are added to `brdfs`: with the mean colour of their corners.
+fn flats(scene: &Scene, local: &LocalScene, brdfs: &mut Vec<Brdf>) -> [Vec<Flat>; 2] {
     let rectangle = |(s, i): (&Surface, u32)| ([s.center - s.u - s.v, 2.0 * s.u, 2.0 * s.v], i);
     let rectangles = local.surfaces.iter().zip(0u32..).map(rectangle).collect();
     let of_ground = scene.terrains.iter().zip(scene.surfaces.len() as u32..);
-    let triangles = of_ground.flat_map(|(terrain, i)| {
-        terrain::triangles(terrain).map(move |points| {
+    let mut triangles = Vec::new();
+    for (terrain, i) in of_ground {
+        for (points, color) in terrain::triangles(terrain).zip(terrain::colors(terrain)) {
             let [corner, u, v] = points.map(|p| p - local.origin);
-            ([corner, u - corner, v - corner], i)
-        })
-    });
-    [rectangles, triangles.collect()]
+            let mut i_brdf = i;
+            if !terrain.colors.is_empty() {
+                let plain = brdfs[i as usize];
+                i_brdf = brdfs.len() as u32;
+                brdfs.push(Brdf { kd: plain.kd * color, ..plain });
+            }
+            triangles.push(([corner, u - corner, v - corner], i_brdf));
+        }
+    }
+    [rectangles, triangles]
 }

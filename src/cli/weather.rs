@@ -5,9 +5,11 @@ use serde_json::{Value, json};
 use super::args::WeatherArgs;
 use super::output::{self, header, or_dash};
 use super::progress::progress;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io::weather::container::Variable;
-use crate::io::weather::wrf::{self, Clouds, WeatherFile};
+use crate::io::weather::wrf::{self, Clouds, Step, WeatherFile};
+use crate::model::weather::agreement::Agreement;
+use crate::model::weather::diagnosed;
 use crate::model::weather::extinction::InvalidCounts;
 use crate::model::weather::statistics::{self, CloudStatistics};
 use crate::model::weather::{steps, sun};
@@ -18,6 +20,11 @@ use crate::model::weather::{steps, sun};
 /// Fails if the file is no output of WRF or has no such step.
 pub fn run(args: &WeatherArgs) -> Result<()> {
     let file = wrf::open(&args.file)?;
+    if args.diagnosed && (file.clouds == Clouds::Diagnosed || !file.has_vapour()) {
+        let what = "--diagnosed: expected a file with clouds (QCLOUD, QICE or QSNOW) and QVAPOR, to \
+                    compare them";
+        return Err(Error::usage(format!("{}: {what}", args.file.display())));
+    }
     let wanted = match args.step {
         Some(i_step) => {
             if i_step >= file.n_steps {
@@ -31,7 +38,7 @@ pub fn run(args: &WeatherArgs) -> Result<()> {
     let bar = progress(wanted.len() as u64, "reading steps", args.quiet);
     let mut steps = Vec::with_capacity(wanted.len());
     for i_step in wanted {
-        steps.push(StepSummary::read(&file, i_step)?);
+        steps.push(StepSummary::read(&file, i_step, args.diagnosed)?);
         bar.advance();
     }
     drop(bar);
@@ -54,6 +61,8 @@ struct StepSummary {
     /// east.
     sun_deg: Option<(f64, f64)>,
     clouds: CloudStatistics,
+    /// Clouds diagnosed from humidity, compared with these.
+    diagnosed: Option<Diagnosed>,
     /// Least and greatest height of the ground; none if the file has no valid heights.
     ground_m: Option<[f64; 2]>,
     /// The fault of its heights.
@@ -62,8 +71,36 @@ struct StepSummary {
     oddities: InvalidCounts,
 }
 
+/// Clouds diagnosed from humidity.
+struct Diagnosed {
+    /// Cells of these and of the given clouds.
+    cells: Agreement,
+    mean_opacity: f64,
+}
+
+impl Diagnosed {
+    fn of(step: &Step) -> Diagnosed {
+        let found = diagnosed::extinction(&step.grid, &step.air);
+        Diagnosed {
+            cells: Agreement::of(&step.extinction, &found),
+            mean_opacity: statistics::of(&step.grid, &found).mean_opacity,
+        }
+    }
+
+    fn to_json(&self) -> Value {
+        let Agreement { n_hits, n_missed, n_false, n_clear } = self.cells;
+        json!({
+            "hits": n_hits, "missed": n_missed, "false_alarms": n_false, "clear": n_clear,
+            "bias": self.cells.bias(), "hit_rate": self.cells.hit_rate(),
+            "false_alarm_rate": self.cells.false_alarm_rate(),
+            "false_alarm_ratio": self.cells.false_alarm_ratio(),
+            "mean_opacity": self.mean_opacity,
+        })
+    }
+}
+
 impl StepSummary {
-    fn read(file: &WeatherFile, i_step: usize) -> Result<StepSummary> {
+    fn read(file: &WeatherFile, i_step: usize, is_compared: bool) -> Result<StepSummary> {
         let step = file.step(i_step)?;
         let (ground_m, ground_fault) = match file.terrain(i_step) {
             Ok(found) => (found.map(|(_, heights_m)| extent(&heights_m)), None),
@@ -79,6 +116,7 @@ impl StepSummary {
             middle_deg: step.middle.map(|(north, east)| (north.to_degrees(), east.to_degrees())),
             sun_deg: toward.map(|d| (d.y.asin().to_degrees(), azimuth(d.x, d.z))),
             clouds: statistics::of(&step.grid, &step.extinction),
+            diagnosed: is_compared.then(|| Diagnosed::of(&step)),
             ground_m,
             ground_fault,
             oddities: step.oddities,
@@ -101,6 +139,7 @@ impl StepSummary {
                 "top_m": c.base_and_top_m.map(|(_, top)| top),
                 "columns_to_the_top": c.n_columns_to_the_top,
             },
+            "diagnosed": self.diagnosed.as_ref().map(Diagnosed::to_json),
             "ground_m": self.ground_m,
             "negative": self.oddities.n_negative, "missing": self.oddities.n_missing,
         })
@@ -195,7 +234,32 @@ fn describe(name: &str, file: &WeatherFile, notes: &[String], steps: &[StepSumma
         out += &format!("note: {note}\n");
     }
     let (variables, clouds) = (variables(&container.variables), clouds(steps, cells));
-    out + &format!("\n{}\n{}", output::table(&variables), output::table(&clouds))
+    out += &format!("\n{}\n{}", output::table(&variables), output::table(&clouds));
+    if steps.iter().any(|s| s.diagnosed.is_some()) {
+        out += &format!(
+            "\nclouds diagnosed from humidity, by cells:\n{}",
+            output::table(&agreements(steps))
+        );
+    }
+    out
+}
+
+fn agreements(steps: &[StepSummary]) -> Vec<Vec<String>> {
+    let mut table =
+        header(["step", "bias", "hit rate", "false alarms", "of these clouds", "opacity"]);
+    let rate = |rate: Option<f64>| or_dash(rate, |rate| format!("{rate:.3}"));
+    for s in steps {
+        let Some(Diagnosed { cells, mean_opacity }) = &s.diagnosed else { continue };
+        table.push(vec![
+            s.i_step.to_string(),
+            rate(cells.bias()),
+            rate(cells.hit_rate()),
+            rate(cells.false_alarm_rate()),
+            rate(cells.false_alarm_ratio()),
+            format!("{mean_opacity:.4}"),
+        ]);
+    }
+    table
 }
 
 fn variables(variables: &[Variable]) -> Vec<Vec<String>> {

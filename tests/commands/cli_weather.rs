@@ -120,6 +120,28 @@ fn diagnosed_clouds_and_clear_steps_are_marked() {
 }
 
 #[test]
+fn diagnosed_clouds_are_compared_with_the_files_own() {
+    let katrina = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/weather/katrina.nc");
+    let (code, out, _) = said(&["weather", katrina, "--step", "0", "--diagnosed", "--json"]);
+    assert_eq!(code, Some(0));
+    let json: serde_json::Value = serde_json::from_str(&out).expect("JSON");
+    let of = &json["steps"][0]["diagnosed"];
+    let number = |key: &str| of[key].as_f64().unwrap_or(f64::NAN);
+    let cells = number("hits") + number("missed") + number("false_alarms") + number("clear");
+    assert_eq!(cells, 48.0 * 48.0 * 14.0);
+    assert!(number("hit_rate") > 0.99 && number("bias") < 5.0, "{of}");
+    let (_, out, _) = said(&["weather", katrina, "--step", "0", "--diagnosed"]);
+    assert!(out.contains("hit rate") && out.contains("false alarms"), "{out}");
+    let (_, out, _) = said(&["weather", katrina, "--step", "0"]);
+    assert!(!out.contains("hit rate"), "{out}");
+    // Nothing to compare with.
+    let dir = tempfile::tempdir().expect("a folder");
+    fs::write(path(&dir, "dry.nc"), Made::wrf(1, 1).without("QCLOUD").bytes()).expect("written");
+    let (code, _, error) = said(&["weather", &path(&dir, "dry.nc"), "--diagnosed"]);
+    assert!(code == Some(2) && error.contains("to compare them"), "{error}");
+}
+
+#[test]
 fn bad_files_exit_with_2_and_one_message() {
     let dir = tempfile::tempdir().expect("a folder");
     let bad = path(&dir, "bad.nc");

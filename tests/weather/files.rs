@@ -9,7 +9,7 @@ use crate::weather_files;
 use crate::weather_files::{Made, NX, NY, NZ};
 use nimbus::io::weather::netcdf;
 use nimbus::io::weather::wrf::{self, Clouds, Step, WeatherFile};
-use nimbus::model::weather::air::{relative_humidity, saturation_pa, saturation_ratio};
+use nimbus::model::weather::air::{saturation_pa, saturation_ratio};
 use nimbus::model::weather::statistics;
 use nimbus::model::weather::steps::parse;
 
@@ -54,7 +54,7 @@ fn pressure_temperature_humidity_and_height_are_those_of_wrf_python() {
             let at = file.shape.cell(k, j * file.shape.nx + i);
             let (p_here, t_here) = (step.air.pressure_pa[at], step.air.temperature_k[at]);
             let humidity_here =
-                100.0 * relative_humidity(step.air.vapour[at], p_here, t_here).min(1.0);
+                100.0 * (step.air.vapour[at] / saturation_ratio(p_here, t_here)).min(1.0);
             let off =
                 [p_here - p, t_here - t, humidity_here - humidity, step.grid.middle_m(at) - z];
             // 1 Pa, 0.01 K, 0.05 % and 0.5 m are asked for; what is printed ends far before.

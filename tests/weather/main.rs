@@ -3,6 +3,7 @@
 #[path = "../harness/columns.rs"]
 mod columns;
 mod damaged;
+mod diagnosed;
 mod files;
 mod input;
 mod particles;

@@ -18,6 +18,9 @@ pub struct WeatherArgs {
     /// Read the clouds of this step only, counted from 0
     #[arg(long, value_name = "N")]
     pub step: Option<usize>,
+    /// Compare the file's clouds with those that would be diagnosed from humidity without them
+    #[arg(long)]
+    pub diagnosed: bool,
     /// Print JSON instead of the tables
     #[arg(long)]
     pub json: bool,

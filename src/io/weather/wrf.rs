@@ -184,6 +184,11 @@ fn spacing(file: &NetCdf, name: &str) -> Checked<f64> {
 }
 
 impl WeatherFile {
+    /// Returns whether the file has water vapour.
+    pub fn has_vapour(&self) -> bool {
+        self.fields.vapour.is_some()
+    }
+
     /// Returns the text of a global attribute.
     pub fn text(&self, name: &str) -> Option<&str> {
         text(&self.container.attributes, name)

@@ -37,14 +37,19 @@ pub fn saturation_pa(t_k: f64) -> f64 {
 /// Returns the mixing ratio of saturated air, kg/kg: ε E/(p − (1 − ε) E). Infinite where water
 /// boils. It is wrf-python's formula; its 1 − ε makes q/q_s the quotient of specific humidities.
 pub fn saturation_ratio(p_pa: f64, t_k: f64) -> f64 {
-    let e = saturation_pa(t_k);
+    ratio(p_pa, saturation_pa(t_k))
+}
+
+/// Returns the mixing ratio of air at a vapour pressure E.
+fn ratio(p_pa: f64, e: f64) -> f64 {
     let dry = p_pa - (1.0 - EPSILON) * e;
     if dry > 0.0 { EPSILON * e / dry } else { f64::INFINITY }
 }
 
-/// Returns q_v over [`saturation_ratio`]: above 1 in supersaturated air, which wrf-python clamps.
-pub fn relative_humidity(q_vapour: f64, p_pa: f64, t_k: f64) -> f64 {
-    q_vapour / saturation_ratio(p_pa, t_k)
+/// Returns q_v over [`saturation_ratio`], or over that of ice below 273.15 K: above 1 in
+/// supersaturated air.
+pub fn humidity_over_ice(q_vapour: f64, p_pa: f64, t_k: f64) -> f64 {
+    q_vapour / ratio(p_pa, Vapour { ice: true, ..WATER }.saturation(t_k))
 }
 
 /// Returns the density of the air's dry part, kg/m³, which mixing ratios refer to: p/(R_d T (1 +
@@ -80,8 +85,11 @@ mod tests {
         assert!((dry_density(1e5, 273.15, 0.01) - 1.275607 / 1.0160772).abs() < 1e-5);
         // 0.622 · 23.37/(1000 − 0.378 · 23.37) = 0.014666.
         assert!((saturation_ratio(1e5, 293.15) - 0.014666).abs() < 2e-5);
-        assert_eq!(relative_humidity(saturation_ratio(9e4, 280.0), 9e4, 280.0), 1.0);
-        assert_eq!(relative_humidity(0.01, 100.0, 300.0), 0.0);
+        assert_eq!(humidity_over_ice(saturation_ratio(9e4, 280.0), 9e4, 280.0), 1.0);
+        assert_eq!(humidity_over_ice(0.01, 100.0, 300.0), 0.0);
+        // At −20 °C ice has 1.032 hPa and water 1.254.
+        let cold = humidity_over_ice(saturation_ratio(5e4, 253.15), 5e4, 253.15);
+        assert!((cold - 1.254 / 1.032).abs() < 5e-3, "{cold}");
         assert!((height(9810.0) - 1000.0).abs() < 1e-9);
     }
 }

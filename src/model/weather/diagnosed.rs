@@ -2,14 +2,19 @@
 //! model.md §15. Outputs label them "diagnosed".
 
 use super::air::{
-    EPSILON, GRAVITY, HEAT_CAPACITY, R_DRY, dry_density, relative_humidity, saturation_ratio,
+    EPSILON, GRAVITY, HEAT_CAPACITY, R_DRY, dry_density, humidity_over_ice, saturation_ratio,
 };
 use super::extinction::single_moment_phase;
 use super::grid::Grid;
 
-/// Relative humidity above which a cell has clouds, between Sundqvist's 0.75 over land and 0.85
-/// over sea.
-const CRITICAL_HUMIDITY: f64 = 0.8;
+/// Relative humidity above which a cell of [`COARSE_M`] has clouds: at the ground, and high above
+/// it.
+const CRITICAL_AT_GROUND: f64 = 0.99;
+const CRITICAL_ABOVE: f64 = 0.6;
+/// Power with which pressure leads from one to the other.
+const CRITICAL_POWER: i32 = 4;
+/// Width of the cells that these numbers were found for: T42.
+const COARSE_M: f64 = 300e3;
 /// Liquid water of a cloud as a share of the adiabatic one; mixing removes the rest. A choice:
 /// stratocumulus has 0.6 to 0.9, cumulus half and less.
 const ADIABATIC_SHARE: f64 = 0.5;
@@ -18,13 +23,22 @@ const MAX_WATER_RATIO: f64 = 0.5e-3;
 /// Latent heat of evaporation, J/kg, at 0 °C.
 const LATENT_HEAT: f64 = 2.501e6;
 
-/// Returns the share of a cell that clouds cover: 1 − √((1 − f)/(1 − f_c)). *Source*: Sundqvist,
-/// Berge and Kristjánsson 1989.
-pub fn fraction(humidity: f64) -> f64 {
-    if humidity.is_nan() || humidity <= CRITICAL_HUMIDITY {
+/// Returns the relative humidity above which a cell has clouds, at a pressure over that of the
+/// ground, in cells `width_m` wide. *Source*: the model ECHAM4, Lohmann and Roeckner 1996, for cells
+/// of 300 km. In smaller ones humidity varies less: by Δx^{1/3} in a spectrum of k^{−5/3}.
+pub fn critical_humidity(pressure: f64, width_m: f64) -> f64 {
+    let high = 1.0 - pressure.powi(-CRITICAL_POWER);
+    let coarse = CRITICAL_ABOVE + (CRITICAL_AT_GROUND - CRITICAL_ABOVE) * high.exp();
+    1.0 - (1.0 - coarse) * (width_m / COARSE_M).cbrt().min(1.0)
+}
+
+/// Returns the share of a cell that clouds cover, with clouds above the humidity `critical`: 1 −
+/// √((1 − f)/(1 − f_c)). *Source*: Sundqvist, Berge and Kristjánsson 1989.
+pub fn fraction(humidity: f64, critical: f64) -> f64 {
+    if humidity.is_nan() || humidity <= critical {
         return 0.0;
     }
-    1.0 - ((1.0 - humidity.min(1.0)) / (1.0 - CRITICAL_HUMIDITY)).sqrt()
+    1.0 - ((1.0 - humidity.min(1.0)) / (1.0 - critical)).sqrt()
 }
 
 /// Returns the water that rising saturated air condenses, kg/kg per metre: (c_p/L)(Γ_d − Γ_s).
@@ -56,16 +70,18 @@ impl Air {
 }
 
 /// Returns the extinction of every cell, m⁻¹: [`fraction`] times water that grows adiabatically
-/// from the lowest humid cell of the layer. Water below 273.15 K is ice.
+/// from the lowest humid cell of the layer. Water below 273.15 K is ice, and humidity is over ice.
 pub fn extinction(grid: &Grid, air: &Air) -> Vec<f64> {
     let shape = grid.shape();
     let mut extinction = vec![0.0; shape.n_cells()];
     for i_column in 0..shape.n_columns() {
+        let width_m = grid.ground.area_m2(i_column).sqrt();
         let mut below = 0.0;
         for k in 0..shape.nz {
             let i = shape.cell(k, i_column);
             let (p, t) = (air.pressure_pa[i], air.temperature_k[i]);
-            let covered = fraction(relative_humidity(air.vapour[i], p, t));
+            let critical = critical_humidity(p / air.pressure_pa[i_column], width_m);
+            let covered = fraction(humidity_over_ice(air.vapour[i], p, t), critical);
             // A dry cell ends the layer.
             if covered == 0.0 {
                 below = 0.0;
@@ -87,13 +103,21 @@ mod tests {
 
     #[test]
     fn fraction_by_hand() {
-        assert_eq!(
-            (fraction(0.0), fraction(0.8), fraction(1.0), fraction(1.3)),
-            (0.0, 0.0, 1.0, 1.0)
-        );
+        assert_eq!([0.0, 0.8, 1.0, 1.3].map(|f| fraction(f, 0.8)), [0.0, 0.0, 1.0, 1.0]);
         // 1 − √(0.05/0.2) = 0.5.
-        assert!((fraction(0.95) - 0.5).abs() < 1e-12);
-        assert_eq!(fraction(f64::NAN), 0.0);
+        assert!((fraction(0.95, 0.8) - 0.5).abs() < 1e-12);
+        assert_eq!(fraction(f64::NAN, 0.8), 0.0);
+    }
+
+    #[test]
+    fn critical_humidity_by_hand() {
+        let coarse = |p: f64| critical_humidity(p, 300e3);
+        // e^{1 − 1} at the ground; at 0.8 of its pressure 1 − 2.4414 = −1.4414: 0.6 + 0.39 · 0.2366.
+        assert!((coarse(1.0) - 0.99).abs() < 1e-12 && (coarse(0.2) - 0.6).abs() < 1e-12);
+        assert!((coarse(0.8) - 0.69227).abs() < 1e-5);
+        // 37.5 km are an eighth: half of the distance from saturation. No cell is coarser.
+        assert!((critical_humidity(0.2, 37.5e3) - 0.8).abs() < 1e-12);
+        assert_eq!(critical_humidity(0.8, 1e6), coarse(0.8));
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! Arrays are ordered as in the files: level by level from the ground, each level row by row from
 //! the south, each row from the west.
 
+pub mod agreement;
 pub mod air;
 pub mod detail;
 pub mod diagnosed;

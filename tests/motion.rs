@@ -102,3 +102,43 @@ fn another_grid_is_seen() {
     let jump = rms((0..one.len()).map(|p| one[p] - other[p])) / rms(one.iter().copied());
     assert!(jump > GREATEST_JUMP, "{jump}");
 }
+
+/// The supercell in motion, over the step in the middle of 4 s of the scene.
+fn weather(overrides: &[&str]) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/supercell.toml");
+    let all = [
+        "film.width=96",
+        "film.height=72",
+        "film.format='rgba32f'",
+        "time.step_s=0.1",
+        "cloud.0.particles=20000",
+    ];
+    let all: Vec<String> = all.iter().chain(overrides).map(|text| (*text).to_owned()).collect();
+    scene_file::load(&path, &all, None).unwrap_or_else(|e| panic!("{e}")).scene
+}
+
+/// Weather moves evenly: over the steps of the file, where all cells change their course, no frame
+/// changes the picture by more than half as much again as those around it. Measured at 30 s of the
+/// storm a second and 10 frames a second: at most 0.0094 of its RMS, in the mean 0.0080. With depths
+/// that are linear between steps it was 0.026, just after a step.
+#[test]
+fn weather_moves_without_steps() {
+    // A wind takes invented detail through the clouds, which changes the picture more.
+    for (what, overrides, most) in [
+        ("still detail", vec![], 0.012),
+        ("detail in a wind", vec!["cloud.0.detail_wind=[12,0,-5]"], 0.04),
+    ] {
+        let scene = weather(&overrides);
+        // The step is at frame 40.
+        let frames: Vec<u32> = (34..47).collect();
+        let drawn = green(&scene, &frames);
+        let all = rms(drawn[0].iter().copied());
+        let change =
+            |pair: &[Vec<f64>]| rms(pair[1].iter().zip(&pair[0]).map(|(a, b)| a - b)) / all;
+        let changes: Vec<f64> = drawn.windows(2).map(change).collect();
+        println!("{what}: {changes:.5?}");
+        let mean = changes.iter().sum::<f64>() / changes.len() as f64;
+        let greatest = changes.iter().copied().fold(0.0, f64::max);
+        assert!(greatest < most && greatest < 1.5 * mean, "{what}: {greatest}, mean {mean}");
+    }
+}

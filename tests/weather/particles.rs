@@ -289,12 +289,27 @@ fn an_interval_goes_from_one_step_to_the_next() {
     let (a, b) = (step("supercell.nc", 0), step("supercell.nc", 1));
     let layout = Layout::new(&a.grid, &[&a.extinction, &b.extinction], 20_000, 4);
     let interval = Interval::laid_out(&layout, &clouds(&a), Some(&clouds(&b)), Detail::NONE);
-    let at = |weight: f64| {
-        (0..20_000).map(|i| interval.blob(i, weight).expect("a blob")).collect::<Vec<_>>()
-    };
+    let at = |weight: f64| interval.blobs(weight, 0.0);
     let whole = |blobs: &[WeatherBlob]| blobs.iter().map(WeatherBlob::mass).sum::<f64>();
-    let (first, last) = (mass(&a.grid, &a.extinction), mass(&b.grid, &b.extinction));
-    for (weight, expected) in [(0.0, first), (0.25, 0.75 * first + 0.25 * last), (1.0, last)] {
+    // The logarithm of a cell's depth and a tenth is linear in the weight.
+    let n_columns = a.grid.shape().n_columns();
+    let depths = |blobs: &[WeatherBlob]| {
+        let mut depths = vec![0.0; a.extinction.len()];
+        for (blob, place) in blobs.iter().zip(layout.places()) {
+            let i = place.i_cell as usize;
+            depths[i] += blob.mass() / a.grid.ground.area_m2(i % n_columns);
+        }
+        depths
+    };
+    let (first, last) = (depths(&at(0.0)), depths(&at(1.0)));
+    for weight in [0.25, 0.5, 0.9] {
+        for ((now, a), b) in depths(&at(weight)).iter().zip(&first).zip(&last) {
+            let expected = (a + 0.1f64).powf(1.0 - weight) * (b + 0.1f64).powf(weight) - 0.1;
+            assert!((now - expected).abs() < 1e-9 * (1.0 + expected), "{weight}: {now}, {a}, {b}");
+        }
+    }
+    for (weight, step) in [(0.0, &a), (1.0, &b)] {
+        let expected = mass(&step.grid, &step.extinction);
         assert!((whole(&at(weight)) / expected - 1.0).abs() < 1e-9, "{weight}");
     }
     let ends = (at(0.0), at(1.0));
@@ -306,6 +321,5 @@ fn an_interval_goes_from_one_step_to_the_next() {
     }
     let layout = Layout::new(&a.grid, &[&a.extinction], 20_000, 4);
     let alone = Interval::laid_out(&layout, &clouds(&a), None, Detail::NONE);
-    assert_eq!(alone.blob(7, 0.9), Some(blobs_of(&a, 20_000, 4).1[7]));
-    assert!(alone.blob(19_999, 0.0).is_some() && alone.blob(20_000, 0.0).is_none());
+    assert_eq!(alone.blobs(0.9, 0.0), blobs_of(&a, 20_000, 4).1);
 }

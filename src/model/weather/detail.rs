@@ -99,7 +99,13 @@ impl Detail {
             let [x, z] = layout.course(to).across.place(within);
             let room = layout.size_in_cell(grid, i_cell).room;
             let column = to % n_columns;
-            let place = [ground.east_m[column] + room.x * x, ground.south_m[column] + room.z * z];
+            // Toward an open column a blob comes up to the face, so that it crosses without a step.
+            let open = layout.open(column);
+            let range =
+                |size: f64, room: f64, bit: u32| if open >> bit & 1 == 1 { size } else { room };
+            let east = range(ground.dx_m[column], room.x, if x < 0.0 { 1 } else { 7 });
+            let south = range(ground.dy_m[column], room.z, if z < 0.0 { 3 } else { 5 });
+            let place = [ground.east_m[column] + east * x, ground.south_m[column] + south * z];
             Effect { weight, place }
         };
         let n_jobs = places.len().div_ceil(BLOBS_A_JOB);

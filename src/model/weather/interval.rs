@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::detail::{self, Detail, Effect};
 use super::grid::Grid;
-use super::particles::{Layout, WeatherBlob};
+use super::particles::{Layout, Place, WeatherBlob};
 
 /// The clouds of a step.
 #[derive(Debug, Clone)]
@@ -27,6 +27,33 @@ pub struct Interval {
     still: Option<Vec<Effect>>,
     /// `None` for a single step.
     to: Option<Vec<WeatherBlob>>,
+    /// Vertical optical depth of every cell's blobs at both steps; empty for a single step.
+    depths: Vec<[f64; 2]>,
+}
+
+/// Returns the vertical optical depth of every cell's blobs, of two sets of blobs of a layout.
+fn depths(layout: &Layout, grid: &Grid, both: [&[WeatherBlob]; 2]) -> Vec<[f64; 2]> {
+    let n_columns = grid.shape().n_columns();
+    let mut depths = vec![[0.0; 2]; grid.shape().n_cells()];
+    for (k, blobs) in both.into_iter().enumerate() {
+        for (blob, place) in blobs.iter().zip(layout.places()) {
+            let i = place.i_cell as usize;
+            depths[i][k] += blob.mass() / grid.ground.area_m2(i % n_columns);
+        }
+    }
+    depths
+}
+
+/// Vertical optical depth of a cell below which a change of depth is one of what is seen.
+const FAINT_DEPTH: f64 = 0.1;
+
+/// Returns the optical depth of a cell at `weight` of the way between those of two steps, over what
+/// is linear; at most 1. The logarithm of the depth and [`FAINT_DEPTH`] is linear: a thick cell
+/// that comes would else be opaque at once, and go as late.
+fn deepening([a, b]: [f64; 2], weight: f64) -> f64 {
+    let mixed = a + weight * (b - a);
+    let even = (a + FAINT_DEPTH).powf(1.0 - weight) * (b + FAINT_DEPTH).powf(weight) - FAINT_DEPTH;
+    if mixed > 0.0 { (even / mixed).clamp(0.0, 1.0) } else { 1.0 }
 }
 
 impl Interval {
@@ -39,10 +66,13 @@ impl Interval {
         detail: Detail,
     ) -> Self {
         let blobs = |step: &StepClouds| layout.blobs(&step.grid, &step.extinction);
+        let (from, to) = (blobs(a), b.map(blobs));
+        let depths = to.as_ref().map(|to| depths(layout, &a.grid, [&from, to]));
         let is_still = detail.wind == DVec3::ZERO;
         Interval {
-            from: blobs(a),
-            to: b.map(blobs),
+            from,
+            to,
+            depths: depths.unwrap_or_default(),
             still: is_still.then(|| detail.effects(layout, &a.grid, 0.0)),
             layout: layout.clone(),
             grid: a.grid.clone(),
@@ -52,31 +82,55 @@ impl Interval {
 
     /// Returns all blobs at `weight` of the way, with the detail that they have at a time.
     pub fn blobs(&self, weight: f64, time_s: f64) -> Vec<WeatherBlob> {
-        let mut all: Vec<WeatherBlob> =
-            (0..self.from.len()).filter_map(|i| self.blob(i, weight)).collect();
         let Interval { layout, grid, detail, still, .. } = self;
+        let deepenings: Vec<f64> = self.depths.iter().map(|of| deepening(*of, weight)).collect();
+        let mut all: Vec<WeatherBlob> = match &self.to {
+            Some(to) if weight != 0.0 => {
+                let ends = self.from.iter().zip(to).zip(layout.places());
+                let of_blob = |((from, to), place): ((&WeatherBlob, &WeatherBlob), &Place)| {
+                    between(from, to, weight, deepenings[place.i_cell as usize])
+                };
+                ends.map(of_blob).collect()
+            }
+            _ => self.from.clone(),
+        };
         match still {
             Some(effects) => detail::apply(effects, &mut all, layout),
             None => detail::apply(&detail.effects(layout, grid, time_s), &mut all, layout),
         }
         all
     }
+}
 
-    /// Returns a blob at `weight` of the way from the first step to the second, or `None` past the
-    /// last blob. Place, widths and mass are linear in it, so that the clouds' mass is, too.
-    pub fn blob(&self, i: usize, weight: f64) -> Option<WeatherBlob> {
-        let from = *self.from.get(i)?;
-        let Some(to) = self.to.as_ref().map(|to| to[i]).filter(|_| weight != 0.0) else {
-            return Some(from);
-        };
-        let mix = |a: f64, b: f64| a + weight * (b - a);
-        let mut blob = WeatherBlob {
-            position: from.position.lerp(to.position, weight),
-            sigma_xy: mix(from.sigma_xy, to.sigma_xy),
-            sigma_z: mix(from.sigma_z, to.sigma_z),
-            kappa: 1.0,
-        };
-        blob.kappa = mix(from.mass(), to.mass()) / blob.mass();
-        Some(blob)
+/// Returns a blob at `weight` of the way from one step to another, with `share` of the mass in
+/// between. Place, widths and the mass before that are linear.
+fn between(from: &WeatherBlob, to: &WeatherBlob, weight: f64, share: f64) -> WeatherBlob {
+    let mix = |a: f64, b: f64| a + weight * (b - a);
+    let mut blob = WeatherBlob {
+        position: from.position.lerp(to.position, weight),
+        sigma_xy: mix(from.sigma_xy, to.sigma_xy),
+        sigma_z: mix(from.sigma_z, to.sigma_z),
+        kappa: 1.0,
+    };
+    blob.kappa = share * mix(from.mass(), to.mass()) / blob.mass();
+    blob
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_come_and_go_evenly_by_hand() {
+        // From nothing to a depth of 9.9: √(0.1 · 10) − 0.1 = 0.9 halfway, where linear is 4.95.
+        assert!((deepening([0.0, 9.9], 0.5) - 0.9 / 4.95).abs() < 1e-12);
+        assert!((deepening([9.9, 0.0], 0.5) - 0.9 / 4.95).abs() < 1e-12);
+        // Thin cells are nearly linear, and ends are exact.
+        assert!((deepening([1e-4, 3e-4], 0.5) - 1.0).abs() < 1e-3);
+        for weight in [0.0, 1.0] {
+            assert!((deepening([2.0, 7.0], weight) - 1.0).abs() < 1e-12);
+        }
+        assert_eq!((deepening([0.0; 2], 0.3), deepening([0.0, 5.0], 0.0)), (1.0, 1.0));
+        assert!((deepening([2000.0, 1900.0], 0.5) - 1.0).abs() < 1e-3);
     }
 }

@@ -42,9 +42,13 @@ struct Way {
     vec3 origin;
     vec3 direction;
     float distance;
+    // Rounding of its places, in units of the ground's extent: more where it begins far from it.
+    float rounding;
 };
 
 bool meets_box(Way way, vec3 low, vec3 high) {
+    low -= way.rounding;
+    high += way.rounding;
     float enter = 0.0, leave = way.distance;
     for (int axis = 0; axis < 3; ++axis) {
         float from = way.origin[axis], along = way.direction[axis];
@@ -58,7 +62,7 @@ bool meets_box(Way way, vec3 low, vec3 high) {
 
 // Whether the way meets c + s u + t v with s, t >= 0 and s + t <= 1 (Moeller and Trumbore 1997).
 bool meets_triangle(Way way, vec3 c, vec3 u, vec3 v) {
-    float slack = min(EDGE / max(greatest(u), greatest(v)), MOST);
+    float slack = min(way.rounding / max(greatest(u), greatest(v)), MOST);
     vec3 across = cross(way.direction, v);
     float inverse = 1.0 / dot(u, across);
     vec3 from = way.origin - c;
@@ -132,6 +136,7 @@ void main() {
             float inverse_extent = 1.0 / max(greatest(region.u), 1e-30);
             way.origin = (own.position + (center - region.center)) * inverse_extent;
             way.distance = is_lamp ? distance * inverse_extent : distance;
+            way.rounding = EDGE * max(greatest(way.origin), 1.0);
             uint first = region.i_first_facet - push.i_first_ground;
             uint i_own = own.i_region == i_region ? i_point - first : 0xFFFFFFFFu;
             uint end = nodes[node].end;

@@ -53,8 +53,11 @@ void main() {
     u = along_camera(push.camera, u / length_u);
     v = along_camera(push.camera, v / length_v);
     RayPlane plane = ray_plane(c, u, v, length_u, length_v);
-    // Seen from above all of the ground, a back shows only where the rasteriser rounds a ridge.
-    bool is_above = push.camera.eye.y > region.center.y + region.u.y;
+    // From over the ground and above all of it, a back shows only where the rasteriser rounds a
+    // ridge.
+    vec3 over = abs(push.camera.eye - region.center);
+    bool is_above = push.camera.eye.y > region.center.y + region.u.y && over.x < region.u.x
+                    && over.z < region.u.z;
     plane.normal.w = is_above ? max(plane.normal.w, 0.0) : plane.normal.w;
     out_plane = plane.normal;
     out_s = plane.s;

@@ -145,6 +145,25 @@ fn finder(what: &str) -> &'static [&'static str] {
         | "the masses of a run the wrong way round" => {
             &["tests/data/splats.toml", "--set", "draw.lod=1.0"]
         }
+        "air has no light of its own" | "air as dense above as at the sea" => {
+            &["scenes/supercell-sunset.toml", "--set", "cloud.0.particles=2000"]
+        }
+        "a sea mirrors light from where it goes" => {
+            &["scenes/katrina-flight.toml", "--set", "cloud.0.particles=2000"]
+        }
+        "half of each cell of ground throws no shadow" => &[
+            "scenes/cumulus-noon.toml",
+            "--set",
+            "draw.particles=0",
+            "--set",
+            "ground.0.points=[61,57]",
+            "--set",
+            "ground.0.relief=0.8",
+            "--set",
+            "ground.0.relief_length=16",
+            "--set",
+            "light.0.date='2018-06-21 10:20:00'",
+        ],
         "a harmonic of the wrong sign" => &["tests/data/splats.toml"],
         "the sky's light from everywhere is too bright" => {
             &["scenes/cubes-554.toml", "--set", "lighting.mode='single'"]

@@ -97,6 +97,11 @@ fn device_matches_the_reference() {
     let scene = fs::read_to_string(dir.path().join("scene.toml")).expect("the scene");
     let unlit = ["--set", "lighting.mode=\"none\""];
     let two = ["--set", "lighting.mode=\"two-reflection\"", "--set", "lighting.gather=\"exact\""];
+    let fields = ["--set", "material.1.cover=\"land\"", "--set", "material.1.patch_length=900"];
+    let sea = ["--set", "material.1.cover=\"sea\"", "--set", "sky.model=\"hosek-wilkie\""];
+    // Out of sight: its facets stand before those of the ground.
+    let far = "[[surface]]\ncenter = [0.0, -90000.0, 0.0]\nu = [9.0, 0.0, 0.0]\nv = [0.0, 0.0, -9.0]\n\
+               subdivide = [3, 5]\nmaterial = \"rock\"\n";
     let few = [&two[..], &["--set", "lighting.facets_per_cloud=20"]].concat();
     for (what, more) in [
         ("one reflection", vec![]),
@@ -124,6 +129,11 @@ fn device_matches_the_reference() {
                 "lighting.mode=\"diffusion\"",
             ],
         ),
+        ("fields", fields.to_vec()),
+        ("fields, diffuse", [&fields[..], &["--set", "lighting.mode=\"diffusion\""]].concat()),
+        ("sea", sea.to_vec()),
+        ("sea, diffuse", [&sea[..], &["--set", "lighting.mode=\"diffusion\""]].concat()),
+        ("sea, two reflections", [&sea[..], &few[..]].concat()),
         ("by sprites", vec!["--set", "draw.path=\"sprites\""]),
         (
             "far from the origin",
@@ -139,7 +149,9 @@ fn device_matches_the_reference() {
     ] {
         // Lit surfaces are not compared: the reference is in closed form, the device marches.
         for plates in ["", plate].into_iter().take(if what == "nothing lit" { 2 } else { 1 }) {
-            fs::write(dir.path().join("scene.toml"), format!("{scene}{plates}")).expect("a scene");
+            let far = if what == "sea" { far } else { "" };
+            fs::write(dir.path().join("scene.toml"), format!("{scene}{plates}{far}"))
+                .expect("a scene");
             render(&dir, "thin.exr", &[&["--reference", "thin"], &more[..]].concat());
             render(&dir, "drawn.exr", &[&["--validation"], &more[..]].concat());
             let (rmse, max) = differ(&dir, "thin.exr", "drawn.exr");

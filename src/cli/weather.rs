@@ -21,8 +21,8 @@ use crate::model::weather::{steps, sun};
 pub fn run(args: &WeatherArgs) -> Result<()> {
     let file = wrf::open(&args.file)?;
     if args.diagnosed && (file.clouds == Clouds::Diagnosed || !file.has_vapour()) {
-        let what = "--diagnosed: expected a file with clouds (QCLOUD, QICE or QSNOW) and QVAPOR, to \
-                    compare them";
+        let what = "--diagnosed: expected a file with clouds (QCLOUD, QICE or QSNOW) and QVAPOR, \
+                    to compare them";
         return Err(Error::usage(format!("{}: {what}", args.file.display())));
     }
     let wanted = match args.step {

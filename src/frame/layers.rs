@@ -25,6 +25,14 @@ use crate::passes::sprites::{SUMS_FORMAT, Sprites};
 /// Greatest number of a 24-bit depth.
 const MOST_DEPTH24: f32 = 16_777_215.0;
 
+/// Returns the settings that leave out air, and a sea's mirror.
+fn without_air(scene: &Scene) -> &'static str {
+    match scene.has_sea() {
+        true => "--set sky.haze=0 and no cover = \"sea\"",
+        false => "--set sky.haze=0",
+    }
+}
+
 /// Returns the scene as it is drawn for layers: without impostors, which a frame alone never shows,
 /// and with "auto" for the resolution settled.
 ///
@@ -33,10 +41,11 @@ const MOST_DEPTH24: f32 = 16_777_215.0;
 /// cuts off what is below 0, and behind air, which has light of its own.
 pub fn scene_of_layers(mut scene: Scene) -> Result<Scene> {
     if has_haze(&scene) {
-        return Err(Error::usage(
+        return Err(Error::usage(format!(
             "--layers: the air between eye and scene adds light of its own, so that the \
-             reflections do not add up; expected none, as --set sky.haze=0 sets it",
-        ));
+             reflections do not add up; expected none, as {} sets it",
+            without_air(&scene)
+        )));
     }
     scene.draw.impostors = Impostors::Off;
     match scene.draw.resolution {

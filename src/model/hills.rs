@@ -24,6 +24,10 @@ pub struct Hills {
     pub seed: u32,
 }
 
+/// Most points along a side.
+pub const MAX_POINTS: u32 = 4096;
+/// Deviation of the noise in a level plane of its lattice, in which the first octave has less.
+const LEVEL: f64 = 0.967;
 /// Greatest height: no place of a scene is farther.
 const GREATEST: f64 = 1e15;
 /// "hill": a Philox stream of its own.
@@ -54,7 +58,7 @@ impl Hills {
             return 0.0;
         }
         let at = DVec3::new(x, 0.0, z) / self.length;
-        self.relief * turbulence([self.seed, STREAM], 0, at)
+        self.relief / LEVEL * turbulence([self.seed, STREAM], 0, at)
     }
 }
 
@@ -90,7 +94,7 @@ mod tests {
         let all = of(hills);
         let mean = all.iter().sum::<f64>() / all.len() as f64;
         let square = all.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / all.len() as f64;
-        assert!(mean.abs() < 0.02 && (square.sqrt() - 0.5).abs() < 0.02, "{mean} {square}");
+        assert!(mean.abs() < 0.02 && (square.sqrt() - 0.5).abs() < 0.01, "{mean} {square}");
         assert_ne!(all, of(Hills { seed: 2, ..hills }));
     }
 }

@@ -20,6 +20,7 @@ mod metamorphic;
 mod moisture;
 mod scattering;
 mod scenes;
+mod skies;
 mod sorting;
 mod space;
 mod sums;
@@ -47,6 +48,7 @@ pub fn cases() -> Vec<Case> {
         compositing::CASES,
         merged::CASES,
         colours::CASES,
+        skies::CASES,
         space::CASES,
         views::CASES,
         determinism::CASES,

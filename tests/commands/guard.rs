@@ -156,13 +156,7 @@ const READS: &[Fault] = &[
         "hello",
         &[],
     ),
-    fault(
-        "transmit.comp",
-        "facets[k / push.n_lights]",
-        "facets[k / push.n_lights + push.n_facets]",
-        "hello",
-        &[],
-    ),
+    fault("transmit.comp", "facets[j];", "facets[j + push.n_facets];", "hello", &[]),
     fault(
         "contract.comp",
         "float direct = FLOAT(t1, int(l * push.n_rows + rows[0]))",

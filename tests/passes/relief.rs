@@ -258,6 +258,7 @@ fn wrong_shaders_are_noticed() {
         ("is_met ? node + 1u : box.end", "node + 2u"),
         ("(i_cell / n + (k >> 1))", "(i_cell / n)"),
         ("d.y < s * u.y + t * v.y", "d.y < 0.0"),
+        ("EDGE = 2e-6", "EDGE = -1e-3"),
         ("s >= -slack && t >= -slack && d.y", "s >= -slack && d.y"),
         ("return dives(d, a - c, b - c)", "return false"),
         ("i.wzy, i_own, d, c, b", "i.wyz, i_own, d, c, b"),

@@ -323,3 +323,26 @@ fn a_medium_runs_what_its_light_depends_on() {
     };
     assert_eq!([&over_ground, &features].map(repainted), [[true, true], [false, true]]);
 }
+
+#[test]
+fn shadows_of_ground_follow_lights_and_not_clouds() {
+    let hills = SceneFeatures { n_terrains: 1, has_relief: true, ..FEATURES };
+    let last = packet();
+    let runs = |features: &SceneFeatures, change: &dyn Fn(&mut Packet)| {
+        let mut next = packet();
+        change(&mut next);
+        running(features, Some(&last), &next).contains(&"relief")
+    };
+    assert!(runs(&hills, &|p| p.lights[0].toward[1] = 0.5));
+    assert!(runs(&hills, &|p| p.lights[0].energy = [0.0; 3]));
+    assert!(runs(&hills, &|p| p.lights[0].kind = 2));
+    // Clouds that move take the lighting origin along.
+    let moved = |p: &mut Packet| {
+        p.groups[0].offset[2] = 0.5;
+        p.regions[0].center[0] = 1.0;
+        p.lights[0].position[0] = 1.0;
+    };
+    assert!(!runs(&hills, &moved) && !runs(&hills, &|p| p.lights[0].energy[1] = 2.0));
+    assert!(runs(&SceneFeatures { has_lamps: true, ..hills }, &moved));
+    assert!(runs(&SceneFeatures { n_terrains: 2, ..hills }, &moved));
+}

@@ -6,12 +6,9 @@ use super::spec::{Spec, integer, integers, number, pair, vector};
 use crate::error::Result;
 use crate::io::bounds::{AMOUNT, COORDINATE, DIVISOR};
 use crate::io::document::section::Section;
-use crate::model::hills::Hills;
+use crate::model::hills::{Hills, MAX_POINTS};
 use crate::model::material::Material;
 use crate::model::terrain::Terrain;
-
-/// Most points along a side.
-const MAX_POINTS: u32 = 4096;
 
 fn required_pair() -> Spec<[f64; 2]> {
     pair([1.0; 2], DIVISOR).required()

@@ -111,11 +111,11 @@ pub fn tables() -> Vec<Table> {
     tables.push(table("[[material]]", &materials::KEYS));
     tables.push(table("[[material]] path", &materials::PATH_KEYS));
     tables.push(table("[[surface]]", &surfaces::KEYS));
-    tables.push(table("[[ground]]", &grounds::KEYS));
     tables.push(table("[[cloud]]", &clouds::KEYS));
     for (kind, lists) in clouds::kinds() {
         tables.push(table(&format!("[[cloud]] from = \"{kind}\""), lists));
     }
+    tables.push(table("[[ground]]", &grounds::KEYS));
     tables.push(table("[[phase]]", &[phases::PHASE]));
     tables
 }

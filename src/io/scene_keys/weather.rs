@@ -11,6 +11,7 @@ use crate::io::bounds::{Bounds, GREATEST};
 use crate::io::document::section::Section;
 use crate::io::weather::blobs::Settings;
 use crate::io::weather::wrf::WeatherFile;
+use crate::model::hills::MAX_POINTS;
 use crate::model::scene::Simulate;
 use crate::model::terrain::Terrain;
 use crate::model::weather::detail::Detail;
@@ -96,5 +97,14 @@ pub fn ground_of(
     };
     let points = Arc::new(heights.iter().enumerate().map(place).collect());
     let n = [columns as u32, rows as u32];
+    let most = n.into_iter().max().unwrap_or(0);
+    let finest = (MAX_POINTS - 1) / (most - 1);
+    if n_points > 1 && n_points > finest {
+        let what = format!(
+            "expected at most {}: of {most} columns, ground has at most {MAX_POINTS} points a side",
+            finest.max(1)
+        );
+        return Err(s.fault("ground_points", what));
+    }
     Ok(Terrain { origin, points, n, i_material, ..Terrain::default() }.refined(n_points))
 }

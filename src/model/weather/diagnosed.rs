@@ -24,8 +24,8 @@ const MAX_WATER_RATIO: f64 = 0.5e-3;
 const LATENT_HEAT: f64 = 2.501e6;
 
 /// Returns the relative humidity above which a cell has clouds, at a pressure over that of the
-/// ground, in cells `width_m` wide. *Source*: the model ECHAM4, Lohmann and Roeckner 1996, for cells
-/// of 300 km. In smaller ones humidity varies less: by Δx^{1/3} in a spectrum of k^{−5/3}.
+/// ground, in cells `width_m` wide. *Source*: the model ECHAM4, Lohmann and Roeckner 1996, for
+/// cells of 300 km. In smaller ones humidity varies less: by Δx^{1/3} in a spectrum of k^{−5/3}.
 pub fn critical_humidity(pressure: f64, width_m: f64) -> f64 {
     let high = 1.0 - pressure.powi(-CRITICAL_POWER);
     let coarse = CRITICAL_ABOVE + (CRITICAL_AT_GROUND - CRITICAL_ABOVE) * high.exp();
@@ -112,7 +112,8 @@ mod tests {
     #[test]
     fn critical_humidity_by_hand() {
         let coarse = |p: f64| critical_humidity(p, 300e3);
-        // e^{1 − 1} at the ground; at 0.8 of its pressure 1 − 2.4414 = −1.4414: 0.6 + 0.39 · 0.2366.
+        // e^{1 − 1} at the ground; at 0.8 of its pressure 1 − 2.4414 = −1.4414, and 0.6 + 0.39 ·
+        // 0.2366.
         assert!((coarse(1.0) - 0.99).abs() < 1e-12 && (coarse(0.2) - 0.6).abs() < 1e-12);
         assert!((coarse(0.8) - 0.69227).abs() < 1e-5);
         // 37.5 km are an eighth: half of the distance from saturation. No cell is coarser.

@@ -6,6 +6,7 @@ use super::frame::FrameReference;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::scene::Scene;
 use crate::model::shade::{FacetSlope, Shade};
+use crate::model::sky::Haze;
 use crate::reference::sprites::CellLight;
 use crate::reference::{self, Blob};
 
@@ -26,6 +27,17 @@ impl FrameReference {
         let offset = || self.facets[i].position - eye;
         let sea = self.seas.get(i).copied().flatten();
         self.sky.map(|view| reference::haze::seen(&view, offset(), self.radiance_of(i), sea))
+    }
+
+    /// Returns the air before facet `i`, with what a sea mirrors in its light; none without a sky.
+    pub fn air_before(&self, i: usize) -> Haze {
+        let nothing = Haze { through: DVec3::ONE, added: DVec3::ZERO };
+        let Some(view) = self.sky else { return nothing };
+        let offset = self.facets[i].position - (self.state.pose.position - self.state.light_origin);
+        let sea = self.seas.get(i).copied().flatten();
+        // What is seen without light of its own.
+        let (added, _) = reference::haze::seen(&view, offset, DVec3::ZERO, sea);
+        Haze { through: view.before(offset).through, added }
     }
 
     /// Returns the radiance that every particle is drawn with: that of its facet, or its own

@@ -35,9 +35,10 @@ impl ReferenceKind {
         }
         let has_air = !matches!(self.blob_model(), BlobModel::AsDrawn) && self != Self::Volume;
         if has_air && scene.has_haze() {
+            let sea = if scene.has_sea() { " and no cover = \"sea\"" } else { "" };
             return Err(Error::usage(format!(
                 "{self}: this reference has no air between eye and scene; expected --set \
-                 sky.haze=0, or one of thin, slices and volume"
+                 sky.haze=0{sea}, or one of thin, slices and volume"
             )));
         }
         Ok(())

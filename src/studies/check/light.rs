@@ -8,6 +8,7 @@ use glam::DVec3;
 use crate::model::parallel::parallel_map;
 use crate::model::philox::{philox4x32_10, uniform};
 use crate::model::shade::FacetSlope;
+use crate::model::sky::Haze;
 use crate::reference::picture::{FrameReference, PixelShares, SecondOf};
 
 /// Second word of the Philox key: a check shares no random numbers with pixels and paths.
@@ -109,6 +110,18 @@ impl Light {
             light.add(second, pixels.iter().flat_map(|(_, facets)| *facets));
         }
         light
+    }
+
+    /// Returns the light as it is seen behind `air`, by facet.
+    pub fn behind(&self, air: impl Fn(usize) -> Haze) -> Light {
+        let first = |(i, l): (usize, &DVec3)| air(i).over(*l);
+        let second =
+            |(i, (l, error)): (&u32, &(DVec3, f64))| (*i, (air(*i as usize).through * *l, *error));
+        Light {
+            first: self.first.iter().enumerate().map(first).collect(),
+            second: self.second.iter().map(second).collect(),
+            ..self.clone()
+        }
     }
 
     fn add(&mut self, second: &SecondOf<'_>, facets: impl Iterator<Item = u32>) {

@@ -142,13 +142,26 @@ impl<'a> Drawing<'a> {
         let drawing =
             bound::drawing(&device.scene, &device.rgba, &as_set, &sums(&bounds, &allowed));
         let settings_rms = rms(&differences(&as_set, &drawn));
+        // What is shown: behind the air, where there is some.
+        let seen = light.filter(|_| !device.hazed.is_empty()).map(|light| {
+            let shown = by_device.iter().zip(&radiance).enumerate();
+            let of_device = shown.map(|(i, ([_, second], shown))| {
+                let through = frame.air_before(i).through;
+                [*shown - through * *second, through * *second]
+            });
+            (of_device.collect::<Vec<_>>(), light.behind(|i| frame.air_before(i)))
+        });
+        let (by_device, light) = match &seen {
+            Some((of_device, behind)) => (of_device, Some(behind)),
+            None => (&by_device, light),
+        };
         let light_found = match light {
-            Some(light) => light::compare(&self.shares, &self.plan, &by_device, light),
+            Some(light) => light::compare(&self.shares, &self.plan, by_device, light),
             None => vec![None; self.shares.len()],
         };
         let light_bound = light.filter(|_| is_lit).map(|light| {
             let of = (exact, device.time_s, light.grid_error);
-            bound::light(of, &self.shares, &by_device)
+            bound::light(of, &self.shares, by_device)
         });
         let off = differences(&device.rgba, &drawn);
         let samples: Vec<Samples> = light_found

@@ -54,10 +54,11 @@ void main() {
     v = along_camera(push.camera, v / length_v);
     RayPlane plane = ray_plane(c, u, v, length_u, length_v);
     // From over the ground and above all of it, a back shows only where the rasteriser rounds a
-    // ridge.
+    // ridge, unless the near plane cuts the ground.
     vec3 over = abs(push.camera.eye - region.center);
-    bool is_above = push.camera.eye.y > region.center.y + region.u.y && over.x < region.u.x
-                    && over.z < region.u.z;
+    float cut = push.camera.near * length(vec3(push.camera.tan_x, push.camera.tan_y, 1.0));
+    bool is_above = push.camera.eye.y > region.center.y + region.u.y + cut
+                    && over.x < region.u.x && over.z < region.u.z;
     plane.normal.w = is_above ? max(plane.normal.w, 0.0) : plane.normal.w;
     out_plane = plane.normal;
     out_s = plane.s;

@@ -67,7 +67,7 @@ pub fn rounding(view: &SkyView, offset: DVec3, radiance: DVec3, sea: Option<(Sea
 /// The dome's takes its own; the mirrored direction is off by some 1e-6, which moves it up by as
 /// much of the way to the horizon. In the glitter, the sum of two unit vectors has an error of
 /// 2.4e-7, so that the slope between is off by that over the sum's height; its exponent by 5e-7 of
-/// itself more, and all factors by 1e-5.
+/// itself more, the share that is mirrored by 5 times it, and all factors by 1e-5.
 pub fn sea_rounding(view: &SkyView, sea: &Sea, direction: DVec3, sunlit: f64) -> DVec3 {
     let toward_eye = -direction;
     if toward_eye.y <= 0.0 {
@@ -84,7 +84,10 @@ pub fn sea_rounding(view: &SkyView, sea: &Sea, direction: DVec3, sunlit: f64) ->
     let normal = half.normalize();
     let (slope, off) = ((1.0 / normal.y.powi(2) - 1.0).max(0.0).sqrt(), 2.4e-7 / half.y);
     let of_exponent = 2.0 * (2.0 * slope * off + off * off) / sea.slopes;
-    let relative = 2.0 * ROUNDING + 5e-7 * sea.exponent(normal) + of_exponent;
+    // The cosine at the wave errs as its slope, and Schlick's law has 5 (1 − c)⁴ of that.
+    let away = 1.0 - normal.dot(toward_eye).clamp(0.0, 1.0);
+    let of_mirror = 5.0 * off * (1.0 / away.max(1e-9)).min(50.0);
+    let relative = 2.0 * ROUNDING + 5e-7 * sea.exponent(normal) + of_exponent + of_mirror;
     of_sky + sunlit * sea.glitter(view.toward_sun(), toward_eye) * relative.exp_m1() * view.sun
 }
 

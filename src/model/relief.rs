@@ -135,8 +135,9 @@ mod tests {
             points: Arc::new(hills.points.iter().map(|p| DVec3::new(p.x, 0.0, p.z)).collect()),
             ..hills.clone()
         };
-        assert!(may_hide(&[hills.clone()], &[sun, sky]) && !may_hide(&[hills], &[sky]));
-        assert!(!may_hide(&[level.clone()], &[sun]) && !may_hide(&[], &[sun]));
-        assert!(may_hide(&[level.clone(), level], &[sun]));
+        let [hills, level] = [[hills], [level]];
+        assert!(may_hide(&hills, &[sun, sky]) && !may_hide(&hills, &[sky]));
+        assert!(!may_hide(&level, &[sun]) && !may_hide(&[], &[sun]));
+        assert!(may_hide(&[level.clone(), level].concat(), &[sun]));
     }
 }

@@ -132,10 +132,9 @@ impl Shadowing {
                 i = node.end as usize;
                 continue;
             }
-            if let Some(i_cell) = node.i_cell {
-                if self.halves[i_cell as usize].iter().any(|t| way.is_barred_by(*t, slack)) {
-                    return true;
-                }
+            let halves = node.i_cell.map_or(&[][..], |i_cell| &self.halves[i_cell as usize]);
+            if halves.iter().any(|t| way.is_barred_by(*t, slack)) {
+                return true;
             }
             i += 1;
         }

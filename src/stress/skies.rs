@@ -1,5 +1,6 @@
 //! Air before facets, the mirror of a sea, and shadows of ground, at the ends of their ranges.
 
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -148,12 +149,12 @@ fn air(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
 
 fn sea(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     for (slopes, elevation) in
-        [(0.003f32, 1.2), (0.003, 0.02), (0.16, 0.02), (0.16, 1e-3), (0.03, 1.5707)]
+        [(0.003f32, 1.2), (0.003, 0.02), (0.16, 0.02), (0.16, 1e-3), (0.03, FRAC_PI_2)]
     {
         let (sin, cos) = f64::sin_cos(elevation);
         let settings = SkySettings { haze: 0.0, ..SkySettings::of_turbidity(2.0) };
         let view = view(settings, DVec3::new(cos, sin, 0.0), 10.0)?;
-        let places: Vec<[f32; 3]> = [1e-3, 0.02, 0.3, 1.2, 1.5707]
+        let places: Vec<[f32; 3]> = [1e-3, 0.02, 0.3, 1.2, FRAC_PI_2]
             .iter()
             .flat_map(|down: &f64| {
                 let (sin, cos) = down.sin_cos();

@@ -25,8 +25,9 @@ READS(3, ReliefNode, nodes)
 // [point][light]
 WRITES(4, uint, hidden)
 
-// Rounding of a place over the ground's extent, so that no way passes between two triangles; and
-// its greatest share of a triangle's side.
+// Rounding of a place and of a way to a box, over the ground's extent: ten times the three
+// roundings of 2^-24 that each takes, so that no way passes between two triangles. And its greatest
+// share of a triangle's side.
 const float EDGE = 2e-6;
 const float MOST = 0.05;
 // The same of a direction beside a triangle's side, radians.
@@ -42,7 +43,7 @@ struct Way {
     vec3 origin;
     vec3 direction;
     float distance;
-    // Rounding of its places, in units of the ground's extent: more where it begins far from it.
+    // Rounding of its places over the ground's extent: more where the way begins far from it.
     float rounding;
 };
 

@@ -10,6 +10,9 @@ use std::fs;
 
 use glam::DVec3;
 use nimbus::io::scene_file::load;
+use nimbus::model::light::Light;
+use nimbus::model::shape::Shape;
+use nimbus::reference::Blob;
 use nimbus::reference::area::AreaScene;
 use nimbus::reference::picture::FrameReference;
 use program::{differ, path, run};
@@ -366,4 +369,49 @@ fn edges_of_the_clouds_shadows_lie_within_half_a_column() {
         println!("{sun}, {points} a column: {n_edges} edges, off by {worst:.3} at most");
         assert!(n_edges >= 4 && worst <= 0.5, "{n_edges} edges, {worst}");
     }
+}
+
+/// Light between points, at most h²/4 (‖∇x‖² + ‖∇²x‖) beside what it is (model.md §16). h: distance
+/// of points; x: depth that counts. The bound says something, and shrinks with h².
+#[test]
+fn light_between_points_is_within_its_bound() {
+    let (sigma, peak, height) = (1.5, 2.0, 9.0);
+    let kappa = peak / (sigma * (2.0 * std::f64::consts::PI).sqrt());
+    let blob = Blob { position: DVec3::Y * height, sigma, shape: Shape::BALL, kappa };
+    let sun = Light::Directional {
+        direction: DVec3::new(0.5, -1.0, 0.25).normalize(),
+        irradiance: DVec3::ONE,
+    };
+    let (lights, blobs) = ([sun], [blob]);
+    let rays = AreaScene::new(&[], &[], &lights, &blobs, 0.0, &[]);
+    let v = |x: f64, z: f64| rays.visibility(DVec3::new(x, 0.0, z), &sun);
+    let mut worst = vec![];
+    for h in [1.0, 0.5, 0.25] {
+        let bound = 0.25 * h * h * ((peak / sigma).powi(2) / 1f64.exp() + peak / sigma.powi(2));
+        let n = (16.0 / h) as i32;
+        let mut greatest = 0.0f64;
+        for (i, k) in (-n..n).flat_map(|i| (-n..n).map(move |k| (i, k))) {
+            let (x, z) = (h * f64::from(i), h * f64::from(k));
+            let [a, b, c] = [v(x, z), v(x + h, z), v(x, z + h)];
+            for (s, t) in [(0.5, 0.5), (0.5, 0.0), (0.0, 0.5), (0.3, 0.3)] {
+                let drawn = (1.0 - s - t) * a + s * b + t * c;
+                greatest = greatest.max((drawn - v(x + s * h, z + t * h)).abs());
+            }
+        }
+        println!("points {h} apart: {greatest:.4} of {bound:.4}");
+        assert!(greatest <= bound && greatest > 0.1 * bound, "{h}: {greatest} of {bound}");
+        worst.push(greatest);
+    }
+    assert!(worst[1] < 0.3 * worst[0] && worst[2] < 0.3 * worst[1], "{worst:?}");
+}
+
+#[test]
+fn more_points_than_a_side_may_have_are_refused() {
+    let wide = Made::wrf_of(1, 1, [300, 2, 2]);
+    let dir = scene_of(&wide, "ground = \"rock\"\nmaterial = \"cloud\"\nground_points = 14");
+    let loaded = load(&dir.path().join("scene.toml"), &[], None);
+    let what = loaded.expect_err("a fault").to_string();
+    assert!(what.contains("`cloud.0.ground_points`: expected at most 13"), "{what}");
+    let fewer = ["cloud.0.ground_points=13".to_owned()];
+    assert!(load(&dir.path().join("scene.toml"), &fewer, None).is_ok());
 }

@@ -246,7 +246,7 @@ fn describe(name: &str, file: &WeatherFile, notes: &[String], steps: &[StepSumma
 
 fn agreements(steps: &[StepSummary]) -> Vec<Vec<String>> {
     let mut table =
-        header(["step", "bias", "hit rate", "false alarms", "of these clouds", "opacity"]);
+        header(["step", "bias", "hit rate", "false alarm rate", "false alarm ratio", "opacity"]);
     let rate = |rate: Option<f64>| or_dash(rate, |rate| format!("{rate:.3}"));
     for s in steps {
         let Some(Diagnosed { cells, mean_opacity }) = &s.diagnosed else { continue };

@@ -8,9 +8,8 @@ use crate::model::edge::Edge;
 use crate::model::medium;
 use crate::model::scene::{Octaves, Overlap, Scene};
 use crate::passes::blobs::BlobView;
-use crate::passes::haze::HazeParams;
-use crate::passes::relief::ReliefParams;
 use crate::passes::transmit::MarchParams;
+use crate::passes::{haze, relief};
 
 /// Counts of records, and parameters of the passes.
 pub(super) struct FrameConstants {
@@ -107,20 +106,20 @@ impl FrameConstants {
     }
 
     /// Returns the facets and lights behind the air.
-    pub fn haze(&self, packet: &Packet) -> HazeParams {
-        HazeParams {
+    pub fn haze(&self, packet: &Packet) -> haze::Push {
+        haze::Push {
             n_facets: self.march.n_facets,
             n_lights: self.march.n_lights,
             i_sun: self.i_sun,
             n_solids: self.n_solids,
-            backward: self.backward(packet),
+            backward: self.backward(packet) as f32,
         }
     }
 
     /// Returns the points and lights of the ground.
-    pub fn relief(&self) -> ReliefParams {
+    pub fn relief(&self) -> relief::Push {
         let MarchParams { n_lights, n_surfaces, i_first_ground, n_ground, .. } = self.march;
-        ReliefParams {
+        relief::Push {
             n_points: n_ground,
             n_lights,
             n_grounds: self.n_solids - n_surfaces,

@@ -24,22 +24,16 @@ record! {
     }
 }
 
-/// Enlargement of a box on every side, in the ground's greatest extents. A point's coordinate and
-/// the way to a face take three roundings of 2⁻²⁴ each.
-const MARGIN: f64 = 1.0 / 2_097_152.0;
-
 /// Least extent that something is divided by. The shader has the same.
 const LEAST_EXTENT: f64 = 1e-30;
 
 impl ReliefNodeRecord {
     fn new(node: &ReliefNode, extent: f64, i_first: u32) -> ReliefNodeRecord {
-        let scaled = |corner: DVec3, margin: f64| {
-            ((corner / extent) + DVec3::splat(margin)).as_vec3().to_array()
-        };
+        let scaled = |corner: DVec3| (corner / extent).as_vec3().to_array();
         ReliefNodeRecord {
-            low: scaled(node.low, -MARGIN),
+            low: scaled(node.low),
             end: i_first + node.end,
-            high: scaled(node.high, MARGIN),
+            high: scaled(node.high),
             i_cell: node.i_cell.unwrap_or(NO_CELL),
         }
     }

@@ -1,4 +1,4 @@
-//! What covers ground: one colour, land in patches, or a sea (model.md §16, §19).
+//! Covers of ground: one colour, land in patches, or a sea (model.md §16, §19).
 
 use glam::{DVec2, DVec3};
 
@@ -10,7 +10,7 @@ pub enum Cover {
     /// The material's colour.
     #[default]
     Plain,
-    /// Fields and woods.
+    /// Fields.
     Land(Land),
     /// Water that mirrors the sun and the sky.
     Sea(Sea),

@@ -26,7 +26,8 @@ pub struct Hills {
 
 /// Most points along a side.
 pub const MAX_POINTS: u32 = 4096;
-/// Deviation of the noise in a level plane of its lattice, in which the first octave has less.
+/// Deviation of the noise in the plane y = 0. It is a lattice plane of the first octave, which has
+/// 0.851 of its variance there (by a Monte Carlo sum); √((0.851 + Σ of the others)/Σ of all).
 const LEVEL: f64 = 0.967;
 /// Greatest height: no place of a scene is farther.
 const GREATEST: f64 = 1e15;

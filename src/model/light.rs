@@ -109,6 +109,11 @@ impl Light {
         }
     }
 
+    /// Returns whether the light is parallel, as a sun's.
+    pub fn is_sun(&self) -> bool {
+        matches!(self, Light::Directional { .. })
+    }
+
     /// Returns whether the light comes from a point.
     pub fn is_lamp(&self) -> bool {
         matches!(self, Light::Point { .. } | Light::Spot { .. })

@@ -15,7 +15,7 @@ pub struct Material {
     pub keys: Vec<MaterialKey>,
     /// How a cloud of the material scatters light, for the reference "transport".
     pub scattering: Scattering,
-    /// What covers ground of the material.
+    /// Cover of ground that is of the material.
     pub cover: Cover,
 }
 

@@ -1,4 +1,4 @@
-//! Noise with the spectrum of turbulence, for what is invented: detail of clouds, hills, fields.
+//! Noise with the spectrum of turbulence, for invented detail of clouds and invented hills.
 
 use glam::DVec3;
 

@@ -239,7 +239,7 @@ impl Scene {
 
     /// Returns the number of the first light that is a sun.
     pub fn i_sun(&self) -> Option<usize> {
-        self.lights.iter().position(|light| matches!(light, Light::Directional { .. }))
+        self.lights.iter().position(Light::is_sun)
     }
 
     /// Returns the sky as it is seen from `eye`; `None` without.

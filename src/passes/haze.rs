@@ -19,7 +19,7 @@ record! {
         i_sun: u32,
         /// Number of regions of surfaces and ground.
         n_solids: u32,
-        /// Share of the depth that weakens light on its way to them.
+        /// Share of the depth that weakens light on its way to them, where depths arrive.
         backward: f32,
     }
 }
@@ -57,21 +57,6 @@ pub struct HazeVariant {
     pub has_depths: bool,
 }
 
-/// The facets and lights of a scene.
-#[derive(Debug, Clone, Copy)]
-pub struct HazeParams {
-    /// Number of facets.
-    pub n_facets: u32,
-    /// Number of lights.
-    pub n_lights: u32,
-    /// Number of the sun among them.
-    pub i_sun: u32,
-    /// Number of regions of surfaces and ground.
-    pub n_solids: u32,
-    /// Share of the depth that weakens light on its way to them, where depths arrive.
-    pub backward: f64,
-}
-
 /// The pipeline of the pass.
 pub struct HazePass {
     kernel: Kernel,
@@ -98,11 +83,8 @@ impl HazePass {
         &self,
         rec: &mut Recorder<'_>,
         buffers: &HazeBuffers<'_>,
-        params: &HazeParams,
+        push: &Push,
     ) -> Result<()> {
-        let HazeParams { n_facets, n_lights, i_sun, n_solids, backward } = *params;
-        let backward = backward as f32;
-        let push = Push { n_facets, n_lights, i_sun, n_solids, backward };
-        rec.dispatch(&self.kernel, &buffers.by_binding(), &push, n_facets)
+        rec.dispatch(&self.kernel, &buffers.by_binding(), push, push.n_facets)
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! In: points, lights, regions, boxes over the cells. Out: 1 by point and light where ground lies
 //! between. Law: the way meets a triangle, or dives below one whose corner the point is. Source:
-//! model.md §16. Error: a way that passes a triangle's side within 2e-6 of the ground's extent may
-//! count as meeting it.
+//! model.md §16. Error: a way that passes a triangle's side within 2e-6 of the ground's extent, or
+//! of its own distance where that is greater, may count as meeting it.
 
 use crate::error::Result;
 use crate::gpu::{Compiler, Device, Kernel, Recorder};
@@ -41,21 +41,6 @@ bindings! {
     }
 }
 
-/// The points and lights of a scene.
-#[derive(Debug, Clone, Copy)]
-pub struct ReliefParams {
-    /// Number of points of all grounds.
-    pub n_points: u32,
-    /// Number of lights.
-    pub n_lights: u32,
-    /// Number of grounds.
-    pub n_grounds: u32,
-    /// Region of the first ground.
-    pub i_first_region: u32,
-    /// Facet of its first point.
-    pub i_first_ground: u32,
-}
-
 /// The pipeline of the pass.
 pub struct Relief {
     kernel: Kernel,
@@ -78,11 +63,8 @@ impl Relief {
         &self,
         rec: &mut Recorder<'_>,
         buffers: &ReliefBuffers<'_>,
-        params: &ReliefParams,
+        push: &Push,
     ) -> Result<()> {
-        let ReliefParams { n_points, n_lights, n_grounds, i_first_region, i_first_ground } =
-            *params;
-        let push = Push { n_points, n_lights, n_grounds, i_first_region, i_first_ground };
-        rec.dispatch(&self.kernel, &buffers.by_binding(), &push, n_points * n_lights)
+        rec.dispatch(&self.kernel, &buffers.by_binding(), push, push.n_points * push.n_lights)
     }
 }

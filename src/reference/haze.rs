@@ -64,10 +64,12 @@ pub fn rounding(view: &SkyView, offset: DVec3, radiance: DVec3, sea: Option<(Sea
 
 /// Returns the bound of the rounding of what a sea mirrors.
 ///
-/// The dome's takes its own; the mirrored direction is off by some 1e-6, which moves it up by as
-/// much of the way to the horizon. In the glitter, the sum of two unit vectors has an error of
-/// 2.4e-7, so that the slope between is off by that over the sum's height; its exponent by 5e-7 of
-/// itself more, the share that is mirrored by 5 times it, and all factors by 1e-5.
+/// The dome has its own. The mirrored direction is off by some 1e-6, of which 2e-6 upward count.
+///
+/// In the glitter, the sum of two unit vectors errs by 2.4e-7, and the wave's slope by that over
+/// the sum's height. By Schlick's power, the share that is mirrored errs by 5 times as much as the
+/// slope. The exponent errs as the slope's square, and by 5e-7 of itself. All other factors err by
+/// 1e-5.
 pub fn sea_rounding(view: &SkyView, sea: &Sea, direction: DVec3, sunlit: f64) -> DVec3 {
     let toward_eye = -direction;
     if toward_eye.y <= 0.0 {

@@ -17,8 +17,8 @@ use crate::model::light::Light;
 use crate::model::material::Brdf;
 use crate::model::sky::{Sky, SkySettings, SkyView};
 use crate::model::terrain::Terrain;
-use crate::passes::haze::{HazeBuffers, HazeParams, HazePass, HazeVariant};
-use crate::passes::relief::{Relief, ReliefBuffers, ReliefParams};
+use crate::passes::haze::{self, HazeBuffers, HazePass, HazeVariant};
+use crate::passes::relief::{self, Relief, ReliefBuffers};
 use crate::reference::haze::{rounding, seen};
 use crate::reference::relief::Ground;
 
@@ -47,7 +47,7 @@ pub const CASES: &[Case] = &[
 
 /// Returns a sky without its sun's disc, and the view of an eye.
 fn view(settings: SkySettings, toward: DVec3, height_m: f64) -> Result<SkyView> {
-    // What the device has.
+    // The device has it in f32.
     let toward = toward.normalize().as_vec3().as_dvec3();
     let sky = Sky::new(settings, toward).map_err(|what| Error::Fault { what })?;
     let sun = Light::Directional { direction: -toward, irradiance: DVec3::new(3.0, 2.5, 2.0) };
@@ -85,9 +85,8 @@ fn seen_by_device(
         arriving: &arriving,
         seas: &seas,
     };
-    let params =
-        HazeParams { n_facets: n as u32, n_lights: 1, i_sun: 0, n_solids: 1, backward: 1.0 };
-    ctx.run(|rec| pass.record(rec, &buffers, &params))?;
+    let push = haze::Push { n_facets: n as u32, n_lights: 1, i_sun: 0, n_solids: 1, backward: 1.0 };
+    ctx.run(|rec| pass.record(rec, &buffers, &push))?;
     Ok(ctx.download::<LitRecord>(&hazed, n)?.iter().map(|l| l.first).collect())
 }
 
@@ -216,14 +215,14 @@ fn ground(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
             nodes: &nodes,
             hidden: &hidden,
         };
-        let params = ReliefParams {
+        let push = relief::Push {
             n_points,
             n_lights: lights.len() as u32,
             n_grounds: 1,
             i_first_region: 0,
             i_first_ground: 0,
         };
-        ctx.run(|rec| pass.record(rec, &buffers, &params))?;
+        ctx.run(|rec| pass.record(rec, &buffers, &push))?;
         let found = ctx.download::<u32>(&hidden, n_total)?;
         let n_hidden = found.iter().filter(|found| **found == 1).count();
         let share = n_hidden as f64 / n_total as f64;

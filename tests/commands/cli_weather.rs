@@ -131,7 +131,7 @@ fn diagnosed_clouds_are_compared_with_the_files_own() {
     assert_eq!(cells, 48.0 * 48.0 * 14.0);
     assert!(number("hit_rate") > 0.99 && number("bias") < 5.0, "{of}");
     let (_, out, _) = said(&["weather", katrina, "--step", "0", "--diagnosed"]);
-    assert!(out.contains("hit rate") && out.contains("false alarms"), "{out}");
+    assert!(out.contains("hit rate") && out.contains("false alarm ratio"), "{out}");
     let (_, out, _) = said(&["weather", katrina, "--step", "0"]);
     assert!(!out.contains("hit rate"), "{out}");
     // Nothing to compare with.

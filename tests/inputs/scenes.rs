@@ -315,6 +315,9 @@ fn warnings_say_what_and_where() {
         "{:?}",
         loaded.warnings
     );
+    let sea = "[[material]]\nname = 'cloud'\ncover = 'sea'\n[[ground]]\nsize = [9, 9]\n";
+    assert!(good(sea).warnings[0].contains("mirrors nothing without a [sky]"));
+    assert!(good(&format!("[sky]\nmodel = 'hosek-wilkie'\n{sea}")).warnings.is_empty());
 }
 
 #[test]

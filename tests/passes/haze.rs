@@ -10,7 +10,7 @@ use nimbus::model::cover::Sea;
 use nimbus::model::light::Light;
 use nimbus::model::philox::philox4x32_10;
 use nimbus::model::sky::{Sky, SkySettings, SkyView};
-use nimbus::passes::haze::{HazeBuffers, HazeParams, HazePass, HazeVariant};
+use nimbus::passes::haze::{HazeBuffers, HazePass, HazeVariant, Push};
 use nimbus::reference::haze::{rounding, seen};
 
 const VARIANTS: [HazeVariant; 3] = [
@@ -91,7 +91,7 @@ const I_SUN: usize = 1;
 const N_LIGHTS: usize = 3;
 const BACKWARD: f64 = 0.25;
 
-/// What arrives of the lights at a facet: shares, or depths, some of which are barred.
+/// The share or the depth of each light at a facet. Some depths are barred.
 fn arriving(i: u32, has_depths: bool) -> [f32; N_LIGHTS] {
     let [a, b, c, _] = some(i, 5).map(|v| 0.5 + 0.5 * v);
     match has_depths {
@@ -125,12 +125,12 @@ fn run(
     let seas = gpu.upload(&SEAS);
     let of_lights: Vec<f32> = (0..N as u32).flat_map(|i| arriving(i, variant.has_depths)).collect();
     let of_lights = gpu.upload(&of_lights);
-    let params = HazeParams {
+    let push = Push {
         n_facets: N as u32,
         n_lights: N_LIGHTS as u32,
         i_sun: I_SUN as u32,
         n_solids: N_SOLIDS,
-        backward: BACKWARD,
+        backward: BACKWARD as f32,
     };
     let all = || 0..N as u32;
     let facets = gpu.upload(&all().map(facet).collect::<Vec<_>>());
@@ -150,7 +150,7 @@ fn run(
         arriving: &of_lights,
         seas: &seas,
     };
-    gpu.run(|rec| pass.record(rec, &buffers, &params));
+    gpu.run(|rec| pass.record(rec, &buffers, &push));
     (gpu.download(&hazed, N), gpu.download(&hazed_slopes, N))
 }
 
@@ -225,8 +225,7 @@ fn no_scene_is_too_large_for_its_air() {
         let pass = HazePass::new(&gpu.device, &gpu.compiler, variant).expect("the pass");
         let seas = gpu.upload(&[0.003f32]);
         let arriving = gpu.upload(&[1.0f32; 125]);
-        let params =
-            HazeParams { n_facets: 125, n_lights: 1, i_sun: 0, n_solids: 1, backward: 1.0 };
+        let push = Push { n_facets: 125, n_lights: 1, i_sun: 0, n_solids: 1, backward: 1.0 };
         let ends = [-1e15f32, -1.0, 0.0, 1.0, 1e15];
         let at = |k: usize| [ends[k % 5], ends[k / 5 % 5], ends[k / 25]];
         let facet = |k| FacetRecord { position: at(k), ..Default::default() };
@@ -245,7 +244,7 @@ fn no_scene_is_too_large_for_its_air() {
             arriving: &arriving,
             seas: &seas,
         };
-        gpu.run(|rec| pass.record(rec, &buffers, &params));
+        gpu.run(|rec| pass.record(rec, &buffers, &push));
         for (k, l) in gpu.download::<LitRecord>(&hazed, 125).iter().enumerate() {
             let is_light = l.first.iter().all(|v| v.is_finite() && *v >= 0.0);
             assert!(is_light, "{unit} {height} {:?}: {:?}", at(k), l.first);

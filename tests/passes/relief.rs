@@ -13,7 +13,7 @@ use nimbus::model::light::Light;
 use nimbus::model::material::Brdf;
 use nimbus::model::philox::philox4x32_10;
 use nimbus::model::terrain::Terrain;
-use nimbus::passes::relief::{Relief, ReliefBuffers, ReliefParams};
+use nimbus::passes::relief::{Push, Relief, ReliefBuffers};
 use nimbus::passes::transmit::{Arriving, MarchParams, Transmit, TransmitBuffers};
 use nimbus::reference::relief::Ground;
 
@@ -117,7 +117,7 @@ fn run(
     let pass = Relief::new(&gpu.device, compiler.unwrap_or(&gpu.compiler)).expect("relief");
     let Uploaded { points, regions, nodes } = records(terrains);
     let n_total = points.len() * lights.len();
-    let params = ReliefParams {
+    let push = Push {
         n_points: points.len() as u32,
         n_lights: lights.len() as u32,
         n_grounds: terrains.len() as u32,
@@ -134,13 +134,13 @@ fn run(
         nodes: &nodes,
         hidden: &hidden,
     };
-    gpu.run(|rec| pass.record(rec, &buffers, &params));
+    gpu.run(|rec| pass.record(rec, &buffers, &push));
     gpu.download(&hidden, n_total)
 }
 
-/// Share of a triangle's side within which f32 may decide. Places over the extent of some 20 cells
-/// have errors of 3 · 2⁻²⁴, so of 4e-6 of a cell, and the lowest suns lengthen them by 50; `EDGE`
-/// adds 2e-6 · 20.
+/// Share of a triangle's side within which f32 may decide. Places over an extent of some 20 cells
+/// err by 3 · 2⁻²⁴, which is 4e-6 of a cell. The lowest suns lengthen that by 50, and `EDGE` adds
+/// 2e-6 · 20.
 const UNSURE: f64 = 3e-4;
 
 /// Returns a sun turned a little to both sides: exactly along a row its ways lie between triangles,

@@ -59,7 +59,7 @@ const COVERS: &[(&str, CoverName)] =
     &[("plain", CoverName::Plain), ("land", CoverName::Land), ("sea", CoverName::Sea)];
 
 keys! {
-    /// What covers ground of the material: "land" has patches of other brightness and hue, and
+    /// Cover of ground that is of the material: "land" has patches of other brightness and hue, and
     /// "sea" mirrors the sun and the sky of [sky].
     COVER: fn cover_name(s) -> CoverName = "cover": choice("plain", COVERS);
 }

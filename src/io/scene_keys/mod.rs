@@ -272,6 +272,9 @@ pub(super) fn read_scene(
         return Err(Error::scene(root.place("cloud"), what));
     }
     warnings.extend(grouped(&scene));
+    if scene.sky.is_none() && scene.seas().any(|sea| sea.is_some()) {
+        warnings.push("cover = \"sea\" mirrors nothing without a [sky]: set sky.model".to_owned());
+    }
     Ok(Read { scene, resolved: root.finish(), contents, warnings })
 }
 

@@ -101,7 +101,7 @@ pub fn ground_of(
     let finest = (MAX_POINTS - 1) / (most - 1);
     if n_points > 1 && n_points > finest {
         let what = format!(
-            "expected at most {}: of {most} columns, ground has at most {MAX_POINTS} points a side",
+            "expected at most {}: ground of {most} columns has at most {MAX_POINTS} points a side",
             finest.max(1)
         );
         return Err(s.fault("ground_points", what));

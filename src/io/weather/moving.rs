@@ -194,9 +194,9 @@ mod tests {
         for t in [-1.0, 0.0, 0.7, 2.0, 3.1, 4.0, 9.0] {
             let (a, b) = (many.animation.at(t).unwrap(), few.animation.at(t).unwrap());
             assert_eq!((a.len(), b.len()), (2001, 2001));
-            // Between steps the change of a cell is not linear in its mass, and the layouts' cells
-            // stand for others.
-            let most = if [0.7, 3.1].contains(&t) { 0.15 } else { 1e-9 };
+            // Between steps a cell's mass is not linear in time, and the cells of the two layouts
+            // stand for other mass: by 0.0027 as measured, of which the limit is twice.
+            let most = if [0.7, 3.1].contains(&t) { 0.0054 } else { 1e-9 };
             let ratio = mass_of(&a) / mass_of(&b);
             assert!((ratio - 1.0).abs() < most, "{t}: {ratio}");
             let within = |p: &Particle| {

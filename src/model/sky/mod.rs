@@ -47,7 +47,7 @@ named! {
 /// skies, has a luminance of 0.8; 1 without such light.
 pub fn sunlit_exposure(lights: &[Light]) -> f64 {
     const SHOWN: f64 = 0.8;
-    let is_far = |light: &&Light| light.is_sky() || matches!(light, Light::Directional { .. });
+    let is_far = |light: &&Light| light.is_sky() || light.is_sun();
     let all = luminance(lights.iter().filter(is_far).map(Light::energy).sum());
     if all > 0.0 { SHOWN * PI / all } else { 1.0 }
 }
@@ -207,13 +207,13 @@ impl SkyView {
         time_s: f64,
     ) -> SkyView {
         let SkySettings { metres_per_unit, exaggeration, sea_level, .. } = sky.settings;
-        let suns = lights.iter().filter(|light| matches!(light, Light::Directional { .. }));
+        let suns = lights.iter().filter(|light| light.is_sun());
         let sun: DVec3 = suns.map(Light::energy).sum();
         let disc = sun / (PI * SUN_RADIUS.sin().powi(2));
         let dimmed = disc * (GREATEST_DISC / disc.max_element().max(GREATEST_DISC));
         // The law of a facet that faces up (model.md §7), with nothing in the way.
         let level = |light: &Light| light.share(UP, &light.arrival(DVec3::ZERO), 1.0);
-        let far = |light: &&Light| light.is_sky() || matches!(light, Light::Directional { .. });
+        let far = |light: &&Light| light.is_sky() || light.is_sun();
         let on_ground: DVec3 = lights.iter().filter(far).map(|l| l.energy() * level(l)).sum();
         let ground = |i: usize| materials[i].at(time_s).kd * on_ground / PI;
         SkyView {

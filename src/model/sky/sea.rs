@@ -11,7 +11,7 @@ use glam::DVec3;
 use crate::model::cover::Sea;
 
 /// Share of light that water mirrors straight from above.
-pub const MIRRORED_FROM_ABOVE: f64 = 0.02;
+const MIRRORED_FROM_ABOVE: f64 = 0.02;
 /// Least sine of the elevations of the sun and of a wave's normal.
 const LEAST_UP: f64 = 1e-4;
 
@@ -26,8 +26,8 @@ impl Sea {
         (0.5 * self.slopes).sqrt()
     }
 
-    /// Returns the shares Φ(c) and φ(c) of the normal distribution at c = cot θ over the slopes'
-    /// deviation, and sin θ, for a direction with cos θ = `up` ≥ 0.
+    /// Returns Φ(c) and φ(c) of the normal distribution, and sin θ, for a direction with
+    /// cos θ = `up` ≥ 0. c is cot θ over the slopes' deviation.
     fn normal_at(&self, up: f64) -> [f64; 3] {
         let across = (1.0 - up * up).max(0.0).sqrt();
         let c = up / (self.deviation() * across).max(1e-12);

@@ -23,9 +23,9 @@ const MAX_WATER_RATIO: f64 = 0.5e-3;
 /// Latent heat of evaporation, J/kg, at 0 °C.
 const LATENT_HEAT: f64 = 2.501e6;
 
-/// Returns the relative humidity above which a cell has clouds, at a pressure over that of the
-/// ground, in cells `width_m` wide. *Source*: the model ECHAM4, Lohmann and Roeckner 1996, for
-/// cells of 300 km. In smaller ones humidity varies less: by Δx^{1/3} in a spectrum of k^{−5/3}.
+/// Returns the relative humidity above which a cell `width_m` wide has clouds. `pressure` is over
+/// that of the ground. *Source*: the model ECHAM4, Lohmann and Roeckner 1996, for cells of 300 km.
+/// In smaller ones humidity varies less: by Δx^{1/3} in a spectrum of k^{−5/3}.
 pub fn critical_humidity(pressure: f64, width_m: f64) -> f64 {
     let high = 1.0 - pressure.powi(-CRITICAL_POWER);
     let coarse = CRITICAL_ABOVE + (CRITICAL_AT_GROUND - CRITICAL_ABOVE) * high.exp();

@@ -86,7 +86,7 @@ pub fn first_out_of_order(times_s: &[f64]) -> Option<usize> {
 
 /// Returns the step before `t_s`, of steps at rising `times_s`, and the weight of the step after
 /// it; the step itself has the rest. Steps at most [`LONGEST_INTERPOLATED_S`] apart are
-/// interpolated linearly; otherwise the earlier one counts. The first step stands for all earlier
+/// interpolated; otherwise the earlier one counts. The first step stands for all earlier
 /// times, the last for all later ones. `None` without steps or for NaN.
 pub fn between(times_s: &[f64], t_s: f64) -> Option<(usize, f64)> {
     if times_s.is_empty() || t_s.is_nan() {

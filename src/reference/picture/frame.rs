@@ -43,7 +43,7 @@ pub struct FrameReference {
     pub blobs: Vec<Blob>,
     /// Facets; empty if the lighting mode is "none".
     pub facets: Vec<Facet>,
-    /// Colour of every facet: 1 for surfaces and ground.
+    /// Colour of every facet: 1 for surfaces.
     pub facet_colors: Vec<DVec3>,
     /// I_d of every facet; of a medium the fluence of suns and lamps, W m⁻².
     pub irradiance: Vec<DVec3>,
@@ -333,8 +333,8 @@ fn colors(scene: &Scene, blobs: &[Blob], eye: DVec3) -> Vec<DVec3> {
 /// Returns the sea of every facet of surfaces and ground, and what arrives of the sun. `passed`
 /// [point][light]: of the ground's points first.
 fn seas(scene: &Scene, lights: &[Light], passed: &[f64]) -> Vec<Option<(Sea, f64)>> {
-    let is_sun = |light: &Light| matches!(light, Light::Directional { .. });
-    let Some(i_sun) = lights.iter().position(is_sun).filter(|_| scene.has_sea()) else {
+    let i_sun = lights.iter().position(Light::is_sun);
+    let Some(i_sun) = i_sun.filter(|_| scene.has_sea()) else {
         return vec![];
     };
     let of_ground = scene

@@ -35,7 +35,7 @@ impl FrameReference {
         let Some(view) = self.sky else { return nothing };
         let offset = self.facets[i].position - (self.state.pose.position - self.state.light_origin);
         let sea = self.seas.get(i).copied().flatten();
-        // What is seen without light of its own.
+        // The facet counts as dark.
         let (added, _) = reference::haze::seen(&view, offset, DVec3::ZERO, sea);
         Haze { through: view.before(offset).through, added }
     }

@@ -156,8 +156,8 @@ fn scatterers(scene: &Scene, frame: &FrameReference) -> (Vec<u32>, Vec<Scatterer
 /// A corner and two sides, and the index of a material.
 type Flat = ([DVec3; 3], u32);
 
-/// Returns the rectangles, and the ground's triangles. Those of coloured ground have materials of
-/// their own, which are added to `brdfs`: with the mean colour of their corners.
+/// Returns the rectangles, and the ground's triangles. Each triangle of coloured ground gets a
+/// material with the mean colour of its corners, which is added to `brdfs`.
 fn flats(scene: &Scene, local: &LocalScene, brdfs: &mut Vec<Brdf>) -> [Vec<Flat>; 2] {
     let rectangle = |(s, i): (&Surface, u32)| ([s.center - s.u - s.v, 2.0 * s.u, 2.0 * s.v], i);
     let rectangles = local.surfaces.iter().zip(0u32..).map(rectangle).collect();

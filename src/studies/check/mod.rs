@@ -142,7 +142,7 @@ impl<'a> Drawing<'a> {
         let drawing =
             bound::drawing(&device.scene, &device.rgba, &as_set, &sums(&bounds, &allowed));
         let settings_rms = rms(&differences(&as_set, &drawn));
-        // What is shown: behind the air, where there is some.
+        // The light as it is shown behind the air.
         let seen = light.filter(|_| !device.hazed.is_empty()).map(|light| {
             let shown = by_device.iter().zip(&radiance).enumerate();
             let of_device = shown.map(|(i, ([_, second], shown))| {

@@ -42,6 +42,7 @@ READS(4, vec4, faces)
 #endif
 
 #include "faces.glsl"
+#include "angle.glsl"
 #include "sky.glsl"
 
 // Parts of a direction, in each order and with each sign. The means of 1, of a cosine over its half
@@ -68,12 +69,14 @@ vec3 sent_along(int c, vec3 w) {
 
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
+    Skies skies = all_skies();
     FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
         int c = int(i);
         ivec3 at = place_of(level, i);
         vec3 phi = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
         for (uint k = 0; k < N_DIRECTIONS; ++k) {
-            vec3 w = direction(k), l = radiance_along(level, at, w, w.y < 0.0 ? 1.0 : 0.0);
+            vec3 w = direction(k);
+            vec3 l = radiance_along(level, at, w, w.y < 0.0 ? 1.0 : 0.0, skies);
             phi += l;
             x += l * w.x;
             y += l * w.y;

@@ -2,6 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 #include "light.glsl"
+#include "angle.glsl"
 #include "patches.glsl"
 
 // Gathers the light of surfaces and ground on the faces of the grid's box, less that of the sky
@@ -24,6 +25,8 @@ READS(0, Light, lights)
 TEXELS(1, solids)
 WRITES(2, vec4, faces)
 
+#include "sky.glsl"
+
 vec4 solid_at(uint k) { return uintBitsToFloat(TEXEL(solids, int(k))); }
 
 shared vec3 sums[64];
@@ -33,20 +36,15 @@ void main() {
     Patch to = patch_at(push.grid, gl_WorkGroupID.x);
     vec3 deeper = min(vec3(push.lift), 0.5 * extent_of(push.grid));
     vec3 at = to.center - to.outward * deeper;
-    vec3 above = vec3(0.0), all = vec3(0.0);
-    for (uint l = 0; l < push.n_lights; ++l) {
-        if (lights[l].kind == LIGHT_SKY) {
-            above += lights[l].energy;
-            all += lights[l].energy * lights[l].constant;
-        }
-    }
+    Skies skies = all_skies();
     vec3 sum = vec3(0.0);
     for (uint j = k; j < push.n_facets; j += 64u) {
         vec4 place = solid_at(3u * j);
         vec3 offset = place.xyz - at;
         float share = share_between(offset, solid_at(3u * j + 1u).xyz, place.w, to.outward);
         vec3 sent = solid_at(3u * j + 2u).rgb;
-        sum += share * (sent - all - (offset.y > 0.0 ? above : vec3(0.0)));
+        vec3 toward = offset * inversesqrt(max(dot(offset, offset), 1e-30));
+        sum += share * (sent - sky_along(skies, toward, offset.y > 0.0 ? 1.0 : 0.0));
     }
     sums[k] = sum;
     for (uint n = 32u; n > 0u; n /= 2u) {

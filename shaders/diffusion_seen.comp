@@ -42,6 +42,7 @@ READS(4, vec4, faces)
 #endif
 
 #include "faces.glsl"
+#include "angle.glsl"
 #include "sky.glsl"
 
 vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
@@ -74,6 +75,7 @@ float extinction_of(int c) { return arrived_at(4 * c).w; }
 
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
+    Skies skies = all_skies();
     FOR_EACH(c, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
         ivec3 at = place_of(level, c);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
@@ -81,7 +83,9 @@ void main() {
         vec3 w = dot(to_eye, to_eye) > 0.0 ? normalize(to_eye) : vec3(0.0, 1.0, 0.0);
         // A cell at the eye's height has the horizon behind it: light must not jump there.
         float above = clamp(0.5 - to_eye.y / edges.y, 0.0, 1.0);
-        vec3 own = sent_along(int(c), w), behind = radiance_along(level, at, w, above);
+        vec3 own = sent_along(int(c), w);
+        // A tilted sky may be below 0 opposite of a low sun.
+        vec3 behind = max(radiance_along(level, at, w, above, skies), vec3(0.0));
         vec3 all = push.weakened * own + (1.0 - push.weakened) * behind;
         seen[c] = vec4(INV_FOUR_PI * all, extinction_of(int(c)));
     }

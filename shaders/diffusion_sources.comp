@@ -58,6 +58,8 @@ WRITES(4, vec4, arrived)
 #include "reach.glsl"
 #include "march.glsl"
 #include "medium.glsl"
+#include "angle.glsl"
+#include "sky.glsl"
 
 // Returns the length of the way through the middle of a cell.
 float chord_of(vec3 toward) {
@@ -101,7 +103,8 @@ void main() {
         vec3 weakened = 1.0 - push.albedo * push.straight;
         vec3 kept = 1.0 - push.albedo * push.g;
         vec3 fluence = vec3(0.0), from_middle = vec3(0.0);
-        vec3 fallen = vec3(0.0), direct = vec3(0.0);
+        // Flux of the skies along x, y and z.
+        vec3 fallen[3] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0)), direct = vec3(0.0);
         vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
@@ -112,7 +115,10 @@ void main() {
                 Arrival a = arrival_at(light, p);
                 float tau = depth_along(p, a.toward, a.distance, true);
                 if (is_sky) {
-                    fallen += light.energy * through(tau * kept);
+                    vec3 e = light.energy * through(tau * kept);
+                    fallen[0] -= MEAN_UP * light.tilt_x * e;
+                    fallen[1] -= e;
+                    fallen[2] -= MEAN_UP * light.tilt_z * e;
                 } else {
                     vec3 e = light.energy * a.falloff;
                     direct += e * through(tau * weakened);
@@ -132,9 +138,10 @@ void main() {
         vec3 carried = 3.0 * reach * push.albedo * (push.g - push.straight) * sigma;
         vec3 scattered = push.albedo * (1.0 - push.straight) * sigma * from_middle;
         field[4 * c] = vec4(scattered, dot(direct, vec3(1.0 / 3.0)));
-        field[4 * c + 1] = vec4(carried * x, 0.0);
-        field[4 * c + 2] = vec4(carried * y - reach * push.inverse_chord * fallen, 0.0);
-        field[4 * c + 3] = vec4(carried * z, 0.0);
+        vec3 bounded = reach * push.inverse_chord;
+        field[4 * c + 1] = vec4(carried * x + bounded * fallen[0], 0.0);
+        field[4 * c + 2] = vec4(carried * y + bounded * fallen[1], 0.0);
+        field[4 * c + 3] = vec4(carried * z + bounded * fallen[2], 0.0);
 #if BOUNCES
         // Also where nothing scatters yet: the cells about have a mixture.
         vec3 share = push.albedo / max(weakened, vec3(1e-30));

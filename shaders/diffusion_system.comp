@@ -48,10 +48,12 @@ float extinction_of(int c) { return min(FLOAT(density, c), push.densest); }
 vec3 reach_of(int c) { return 1.0 / (3.0 * extinction_of(c) * push.kept + push.inverse_chord); }
 
 #include "faces.glsl"
+#include "angle.glsl"
 #include "sky.glsl"
 
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
+    Skies skies = all_skies();
     FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
         int c = int(i);
         ivec3 at = place_of(level, i), stride = strides_of(level);
@@ -74,7 +76,9 @@ void main() {
                 right -= 0.5 * inverse * (carried + field_at(4 * after + 1 + axis));
             } else {
                 sink += through;
-                vec3 j = of_sky(axis == 1 ? 1.0 : 0.5) + of_solids(at, uint(axis), 1u);
+                vec3 outward = vec3(0.0);
+                outward[axis] = 1.0;
+                vec3 j = sky_on(skies, outward) + of_solids(at, uint(axis), 1u);
                 right += through * (4.0 * max(j, vec3(0.0)) - half_cell * carried);
             }
             if (at[axis] > 0) {
@@ -84,7 +88,9 @@ void main() {
                 right += 0.5 * inverse * (carried + field_at(4 * prior + 1 + axis));
             } else {
                 sink += through;
-                vec3 j = of_sky(axis == 1 ? 0.0 : 0.5) + of_solids(at, uint(axis), 0u);
+                vec3 outward = vec3(0.0);
+                outward[axis] = -1.0;
+                vec3 j = sky_on(skies, outward) + of_solids(at, uint(axis), 0u);
                 right += through * (4.0 * max(j, vec3(0.0)) + half_cell * carried);
             }
         }

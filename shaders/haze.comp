@@ -2,6 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 #include "each.glsl"
+#include "angle.glsl"
 #include "clear_sky.glsl"
 #include "sea.glsl"
 

@@ -8,6 +8,7 @@
 
 #include "records.glsl"
 #include "camera.glsl"
+#include "angle.glsl"
 #include "clear_sky.glsl"
 #include "sea.glsl"
 #include "behind.glsl"

@@ -80,6 +80,8 @@ TEXELS(9, patches)
 TEXELS(8, patches)
 #endif
 #include "patches.glsl"
+#include "angle.glsl"
+#include "sky.glsl"
 #endif
 
 float arriving(float tau) {
@@ -222,24 +224,22 @@ vec3 patch_value(uint k) { return uintBitsToFloat(TEXEL(patches, int(k))).rgb; }
 // Returns the irradiance of a facet of a surface or ground by the sky and the light of the clouds.
 // Inside of the box it is that of the cells, beyond a patch's edge that of the patches.
 vec3 of_sky_and_clouds(uint j, Facet facet) {
-    vec3 above = vec3(0.0), all = vec3(0.0);
+    Skies skies = all_skies();
     bool is_roofed = false;
     for (uint l = 0; l < push.n_lights; ++l) {
         if (lights[l].kind == LIGHT_SKY) {
             bool is_barred = transmittance[j * push.n_lights + l] >= BARRED_DEPTH;
-            all += lights[l].energy * lights[l].constant;
-            above += lights[l].energy;
             is_roofed = is_roofed || (is_barred && any(notEqual(lights[l].energy, vec3(0.0))));
         }
     }
     if (is_roofed) {
-        return all;
+        return skies.all;
     }
     vec3 extent = extent_of(push.grid), p = facet.position;
     vec3 nearest = clamp(p, push.grid.low, push.grid.low + extent);
     float edge = max(extent.x, max(extent.y, extent.z)) / float(PATCHES);
     float far = min(distance(p, nearest) / edge, 1.0);
-    vec3 outside = above * (0.5 + 0.5 * facet.normal.y) + all;
+    vec3 outside = sky_on(skies, facet.normal);
     for (uint face = 0; face < 6u; ++face) {
         // Where the facet is behind a face, none of its patches counts.
         Patch of_face = patch_at(push.grid, face * OF_FACE);
@@ -253,7 +253,7 @@ vec3 of_sky_and_clouds(uint j, Facet facet) {
             vec3 along = to.x * patch_value(4u * i + 1u) + to.y * patch_value(4u * i + 2u)
                          + to.z * patch_value(4u * i + 3u);
             vec3 sent = 0.25 * max(patch_value(4u * i) - 3.0 * along, vec3(0.0));
-            outside += share * (sent - all - (offset.y > 0.0 ? above : vec3(0.0)));
+            outside += share * (sent - sky_along(skies, to, offset.y > 0.0 ? 1.0 : 0.0));
         }
     }
     Weights of = weights_at(push.grid, nearest);

@@ -1,5 +1,5 @@
 // The sky behind a scene, and the plane at sea level (model.md §19, src/model/sky/mod.rs). Needs
-// clear_sky.glsl and sea.glsl.
+// angle.glsl, clear_sky.glsl and sea.glsl.
 
 // Returns the radiance behind everything, in a unit direction.
 vec3 sky_behind(Sky sky, vec3 direction) {

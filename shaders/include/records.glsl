@@ -206,6 +206,12 @@ struct Light {
     float cone_scale;
     float cone_offset;
     vec2 unused;
+    vec3 tilt_x;
+    float unused_a;
+    vec3 tilt_y;
+    float unused_b;
+    vec3 tilt_z;
+    float unused_c;
 };
 struct Medium {
     vec3 reflected;

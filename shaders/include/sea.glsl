@@ -1,4 +1,5 @@
-// The mirror of a sea under wind (model.md §19, src/model/sky/sea.rs). Needs clear_sky.glsl.
+// The mirror of a sea under wind (model.md §19, src/model/sky/sea.rs). Needs angle.glsl
+// and clear_sky.glsl.
 
 const float MIRRORED_FROM_ABOVE = 0.02;
 // Least sine of the elevations of the sun and of a wave's normal.

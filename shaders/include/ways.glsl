@@ -15,7 +15,7 @@ vec3 kept_by(float depth) { return through(push.weakened * depth); }
 
 // Returns 4 pi times the radiance along w in the middle of a cell. Of what comes from outside, the
 // share `above` comes from above the horizon.
-vec3 radiance_along(Level level, ivec3 at, vec3 w, float above) {
+vec3 radiance_along(Level level, ivec3 at, vec3 w, float above, Skies skies) {
     vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
     // Length of the way through a cell along each axis, and to the next face.
     vec3 across = edges / max(abs(w), vec3(1e-6)), face = 0.5 * across;
@@ -43,7 +43,7 @@ vec3 radiance_along(Level level, ivec3 at, vec3 w, float above) {
             c += stride[axis];
         }
     }
-    vec3 outside = of_sky(above);
+    vec3 outside = sky_along(skies, -w, above);
     outside += of_solids(at, axis, turn[axis] > 0 ? 1u : 0u);
     return sum + 4.0 * passed * outside;
 }

@@ -5,6 +5,7 @@ mod grid;
 mod spot;
 mod vector;
 
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use glam::DVec3;
@@ -14,6 +15,7 @@ use crate::model::light::Light;
 use crate::model::phase::Phase;
 use crate::model::scene::Scene;
 use crate::reference::picture::TransportParts;
+use crate::reference::transport::Lights;
 
 pub use grid::Grid;
 use grid::{extinction, reach, usual_step};
@@ -69,7 +71,7 @@ pub fn export(scene: &Scene, time_s: f64, step: Option<f64>, n_samples: u32) -> 
         Some((extinction, albedo)) => (Some(extinction), albedo.filter(|_| !is_even)),
         None => (None, None),
     };
-    let sky = sky(&parts.lights);
+    let sky = sky(&parts);
     let spots = parts.lights.iter().filter_map(spot::picture).collect();
     let ground = (!parts.triangles.is_empty()).then(|| ply(&parts));
     let mut text = String::new();
@@ -104,19 +106,21 @@ fn check(parts: &TransportParts) -> Result<()> {
     Ok(())
 }
 
-/// Returns the sky's picture, rows from the zenith down; none without a sky.
-fn sky(lights: &[Light]) -> Option<([u32; 2], Vec<f32>)> {
-    let [mut above, mut below] = [DVec3::ZERO; 2];
-    for light in lights {
-        if let Light::Sky { irradiance, constant } = light {
-            above += *irradiance * (1.0 + constant) / std::f64::consts::PI;
-            below += *irradiance * *constant / std::f64::consts::PI;
-        }
-    }
-    let of_row = |j: u32| if j < SKY[1] / 2 { above } else { below };
-    let pixel = |l: DVec3| [l.x as f32, l.y as f32, l.z as f32, 1.0];
-    let pixels = || (0..SKY[1]).flat_map(|j| (0..SKY[0]).flat_map(move |_| pixel(of_row(j))));
-    (above != DVec3::ZERO).then(|| (SKY, pixels().collect()))
+/// Returns the sky's picture, rows from the zenith down; none without a sky. Column 0 looks along
+/// -z, and the next ones turn toward x.
+fn sky(parts: &TransportParts) -> Option<([u32; 2], Vec<f32>)> {
+    let lights = Lights::new(&parts.lights, parts.sun_radius).under(parts.sky);
+    let pixel = |i: u32, j: u32| {
+        let [around, down] = [(i, TAU / f64::from(SKY[0])), (j, PI / f64::from(SKY[1]))]
+            .map(|(k, step)| (f64::from(k) + 0.5) * step);
+        let direction =
+            DVec3::new(around.sin() * down.sin(), down.cos(), -around.cos() * down.sin());
+        let l = lights.sky_radiance(direction).as_vec3();
+        [l.x, l.y, l.z, 1.0]
+    };
+    let shines = |light: &Light| light.is_sky() && light.energy() != DVec3::ZERO;
+    let pixels = || (0..SKY[1]).flat_map(|j| (0..SKY[0]).flat_map(move |i| pixel(i, j)));
+    parts.lights.iter().any(shines).then(|| (SKY, pixels().collect()))
 }
 
 /// Returns the ground's triangles as PLY.

@@ -38,6 +38,18 @@ record! {
         cone_offset: f32,
         /// Padding.
         unused: [f32; 2],
+        /// Change of a sky's radiance along x, by channel ([`Tilt`](crate::model::tilt::Tilt)).
+        tilt_x: [f32; 3],
+        /// Padding.
+        unused_a: f32,
+        /// Along y.
+        tilt_y: [f32; 3],
+        /// Padding.
+        unused_b: f32,
+        /// Along z.
+        tilt_z: [f32; 3],
+        /// Padding.
+        unused_c: f32,
     }
 }
 
@@ -55,10 +67,13 @@ impl LightRecord {
             Light::Directional { direction, .. } => {
                 LightRecord { toward: f32s(-direction), kind: LIGHT_DIRECTIONAL, ..record }
             }
-            Light::Sky { constant, .. } => LightRecord {
+            Light::Sky { constant, tilt, .. } => LightRecord {
                 toward: f32s(UP),
                 kind: LIGHT_SKY,
                 constant: constant as f32,
+                tilt_x: f32s(tilt.along[0]),
+                tilt_y: f32s(tilt.along[1]),
+                tilt_z: f32s(tilt.along[2]),
                 ..record
             },
             Light::Point { position, radius, .. } => LightRecord {

@@ -3,6 +3,8 @@
 
 use glam::DVec3;
 
+use super::tilt::Tilt;
+
 /// A light of a scene; energies are linear RGB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Light {
@@ -44,6 +46,8 @@ pub enum Light {
         irradiance: DVec3,
         /// Share of E that arrives whatever the normal and the clouds.
         constant: f64,
+        /// Where it is brighter and darker. Diffuse light in clouds knows it.
+        tilt: Tilt,
     },
 }
 
@@ -67,6 +71,11 @@ pub struct Arrival {
 }
 
 impl Light {
+    /// Returns a sky that has the same radiance everywhere above the horizon.
+    pub const fn even_sky(irradiance: DVec3, constant: f64) -> Light {
+        Light::Sky { irradiance, constant, tilt: Tilt::EVEN }
+    }
+
     /// Returns the light relative to `origin`.
     pub fn relative_to(mut self, origin: DVec3) -> Light {
         if let Light::Point { position, .. } | Light::Spot { position, .. } = &mut self {
@@ -168,7 +177,7 @@ mod tests {
 
     #[test]
     fn the_sky_lights_from_above_and_a_constant_from_everywhere() {
-        let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.25 };
+        let sky = Light::even_sky(DVec3::ONE, 0.25);
         let a = sky.arrival(DVec3::ONE);
         assert_eq!((sky.share(DVec3::Y, &a, 1.0), sky.share(DVec3::NEG_Y, &a, 1.0)), (1.25, 0.25));
         assert_eq!(sky.share(DVec3::X, &a, 0.5), 0.5);

@@ -53,6 +53,7 @@ pub mod sums;
 pub mod surface;
 pub mod terrain;
 pub mod texture;
+pub mod tilt;
 pub mod tree;
 pub mod visibility;
 pub mod weather;

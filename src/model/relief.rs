@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn level_ground_and_a_sky_hide_nothing() {
         let sun = Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::ONE };
-        let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
+        let sky = Light::even_sky(DVec3::ONE, 0.0);
         let hills = stairs([3, 3]);
         let level = Terrain {
             points: Arc::new(hills.points.iter().map(|p| DVec3::new(p.x, 0.0, p.z)).collect()),

@@ -101,6 +101,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "impostors.frag",
     "impostors.vert",
     "impostors_part.comp",
+    "include/angle.glsl",
     "include/arriving.glsl",
     "include/behind.glsl",
     "include/blob.glsl",

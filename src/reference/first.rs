@@ -84,7 +84,7 @@ mod tests {
 
     #[test]
     fn the_sky_lights_from_above_and_a_constant_from_everywhere() {
-        let sky = Light::Sky { irradiance: DVec3::splat(PI), constant: 0.25 };
+        let sky = Light::even_sky(DVec3::splat(PI), 0.25);
         let l = |n, v| lit(sky, n, v).x;
         assert_eq!((l(DVec3::Y, 1.0), l(DVec3::NEG_Y, 1.0), l(DVec3::X, 1.0)), (1.25, 0.25, 0.75));
         assert_eq!(l(DVec3::Y, 0.0), 0.25);
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn lights_add_and_regions_and_colors_choose_the_albedo() {
-        let sky = Light::Sky { irradiance: DVec3::splat(PI), constant: 0.0 };
+        let sky = Light::even_sky(DVec3::splat(PI), 0.0);
         let e = irradiance(
             &[DVec3::ZERO; 2],
             &[DVec3::Y, DVec3::NEG_Y],
@@ -138,7 +138,7 @@ mod tests {
                 && (before[1] - 0.5 * gap.powf(0.25)).abs() < 1e-15
         );
         assert_eq!(of(&SUN, toward_eye(-0.5, sin60)), [0.5 / PI, 0.0]);
-        let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
+        let sky = Light::even_sky(DVec3::ONE, 0.0);
         assert_eq!(of(&sky, toward_eye(0.5, sin60)), [0.5 / PI, 0.0]);
     }
 }

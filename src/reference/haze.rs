@@ -78,7 +78,7 @@ pub fn sea_rounding(view: &SkyView, sea: &Sea, direction: DVec3, sunlit: f64) ->
     let (mirrored, share) = sea.mirror(toward_eye);
     let turned = |by: f64| {
         let up = DVec3::new(mirrored.x, (mirrored.y + by).max(0.0), mirrored.z).normalize();
-        view.sky_radiance(up)
+        view.sky.radiance(up)
     };
     let moved = (turned(1e-4) - turned(-1e-4)).abs() * (2e-6 / 2e-4);
     let of_sky = share * (2.0 * ROUNDING * magnitude(view, mirrored) + moved);

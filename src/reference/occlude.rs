@@ -183,7 +183,7 @@ mod tests {
             intensity: DVec3::ONE,
             radius: 1e-3,
         };
-        let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
+        let sky = Light::even_sky(DVec3::ONE, 0.0);
         let below = DVec3::new(1.0, 0.0, 3.0);
         for light in [lamp, sky] {
             assert!(

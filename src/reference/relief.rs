@@ -198,7 +198,7 @@ mod tests {
         assert_eq!(hidden(lamp(2.0, 1.0), 9..18), [14, 15, 16, 17]);
         assert_eq!(hidden(lamp(6.5, 1.0), 14..18), NONE);
         assert_eq!(hidden(lamp(4.0, 9.0), 9..18), NONE);
-        assert_eq!(hidden(Light::Sky { irradiance: DVec3::ONE, constant: 0.0 }, 0..27), NONE);
+        assert_eq!(hidden(Light::even_sky(DVec3::ONE, 0.0), 0..27), NONE);
     }
 
     /// Boxes decide nothing: with all triangles looked at, the same is hidden.

@@ -33,7 +33,7 @@ pub fn radiance(
 ) -> DVec3 {
     let outgoing = (eye - p).try_normalize().unwrap_or(UP);
     let of = |(light, tau): (&Light, f64)| match *light {
-        Light::Sky { irradiance, constant } if has_sky => {
+        Light::Sky { irradiance, constant, .. } if has_sky => {
             irradiance / PI * law.of_sky(outgoing.dot(UP), constant, tau)
         }
         Light::Sky { .. } => DVec3::ZERO,

@@ -235,8 +235,8 @@ mod tests {
             step: 0.5,
             forward: 0.5,
         };
-        let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
-        let dark = Light::Sky { irradiance: DVec3::ZERO, constant: 0.0 };
+        let sky = Light::even_sky(DVec3::ONE, 0.0);
+        let dark = Light::even_sky(DVec3::ZERO, 0.0);
         let at = |x: f64, y: f64, i_region| Receiver { position: DVec3::new(x, y, 1.0), i_region };
         // On the floor, in the cloud under the lid and beside it, on the lid itself.
         let receivers = [at(0.0, -1.0, 0), at(0.75, 1.0, 2), at(1.25, 1.0, 2), at(-1.0, 5.0, 1)];
@@ -250,7 +250,7 @@ mod tests {
 
     #[test]
     fn facets_run_slower_than_lights_and_steps_are_counted() {
-        let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
+        let sky = Light::even_sky(DVec3::ONE, 0.0);
         let p = [DVec3::new(0.25, 1.0, 1.0), DVec3::new(2.25, 1.0, 1.0)];
         let receivers = p.map(|position| Receiver { position, i_region: 0 });
         let all =

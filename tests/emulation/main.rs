@@ -27,7 +27,7 @@ use nimbus::reference::occlude::Rectangle;
 
 const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::ONE, cell: 1.0, low: DVec3::ZERO };
 const PAIRS: Pairs = Pairs { size: 0.5, levels: 6, steps: 16 };
-const GLOW: Light = Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 };
+const GLOW: Light = Light::even_sky(DVec3::splat(PI), 1.0);
 
 fn matte(kd: f64) -> Brdf {
     Brdf { kd: DVec3::splat(kd), ks: DVec3::ZERO, ns: 1.0 }

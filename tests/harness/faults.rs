@@ -262,7 +262,7 @@ pub const FAULTS: &[Fault] = &[
     (
         "a bounce has no light of the sky",
         "include/ways.glsl",
-        "vec3 outside = of_sky(above);",
+        "vec3 outside = sky_along(skies, -w, above);",
         "vec3 outside = vec3(0.0);",
         "scattering/furnace",
     ),
@@ -276,14 +276,14 @@ pub const FAULTS: &[Fault] = &[
     (
         "ground does not hide the sky from clouds",
         "diffusion_faces.comp",
-        "(sent - all - ",
-        "(sent - ",
+        "sent - sky_along(",
+        "sent - 0.0 * sky_along(",
         "scattering/furnace",
     ),
     (
         "clouds do not hide the sky from ground",
         "scatter.comp",
-        "(sent - all - (offset.y > 0.0 ? above : vec3(0.0)))",
+        "(sent - sky_along(skies, to, offset.y > 0.0 ? 1.0 : 0.0))",
         "sent",
         "scattering/furnace",
     ),

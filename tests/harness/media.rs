@@ -29,9 +29,15 @@ const LIGHTS: &str = "[[light]]\nkind = 'directional'\ndirection = [-0.5, -0.8, 
 const FROM_BELOW: &str = "[[light]]\nkind = 'sky'\nirradiance = [0.8, 0.87, 1]\nconstant = 0.3\n\
     [[light]]\nkind = 'point'\nposition = [0.3, -2.6, 0.2]\nintensity = [0.4, 0.2, 0.1]\n";
 
+/// A clear sky of a low sun, which itself is dark, and a lamp under the clouds.
+const EVENING: &str = "[[light]]\nkind = 'sky'\nconstant = 0.1\n[[light]]\n\
+    kind = 'directional'\ndirection = [-0.7, -0.3, 0.6]\nirradiance = [0, 0, 0]\n[[light]]\n\
+    kind = 'point'\nposition = [0.3, -2.6, 0.2]\nintensity = [0.4, 0.2, 0.1]\n\
+    [sky]\nmodel = 'hosek-wilkie'\nhaze = 0\n";
+
 /// Scenes by name: coloured balls among lamps and surfaces, droplets in facets of several, flat
-/// blobs over one another, boxes, boxes with "opaque" cells; "floors" whose lamps no cloud hides, in
-/// the box of the grid, near it, and far from it.
+/// blobs over one another, boxes, boxes with "opaque" cells; "floors" whose lamps no cloud hides,
+/// in the box of the grid, near it, and far from it, and the same in the "evening".
 pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
     let dir = tempfile::tempdir().expect("a folder");
     let write = |file: &str, text: &str| std::fs::write(dir.path().join(file), text).expect("room");
@@ -50,7 +56,7 @@ pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
              subdivide = [3, 3]\n[[surface]]\ncenter = [1.2, 1.0, 0.5]\nu = [0.6, 0, 0]\n\
              v = [0, 0, 0.6]\nmaterial = 'm'\n",
         ),
-        "floors" => (
+        "floors" | "evening" => (
             "kd = [0.9, 0.8, 0.7]\n",
             "[[cloud]]\nfrom = 'particles'\nfile = 'points.csv'\nmaterial = 'm'\n[[surface]]\n\
              center = [0, -3.5, 0]\nu = [0, 0, 5]\nv = [5, 0, 0]\nmaterial = 'm'\n\
@@ -82,7 +88,11 @@ pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
         "merged" => ("diffusion", "bounces = 2\nbounce_cells = 3\n"),
         _ => (mode, ""),
     };
-    let lights = if name == "floors" { FROM_BELOW } else { LIGHTS };
+    let lights = match name {
+        "floors" => FROM_BELOW,
+        "evening" => EVENING,
+        _ => LIGHTS,
+    };
     let text = format!(
         "[film]\nwidth = 64\nheight = 48\n[camera]\nposition = [0.5, 1, 6]\ntarget = [0, 0, 0]\n\
          [lighting]\nmode = '{mode}'\ngrid = 20\n{grouped}{bounces}{lights}[[material]]\nname = 'm'\n\
@@ -187,7 +197,7 @@ pub fn check(gpu: &Gpu, name: &str, mode: &str) {
     let (found, truth) = (on_device(gpu, &gpu.compiler, &scene), by_twin(&scene));
     // The twin lights surfaces without the grid, which is the same where no cloud is between.
     let of_solids = match name {
-        "floors" => apart(&found.of_solids, &truth.of_solids),
+        "floors" | "evening" => apart(&found.of_solids, &truth.of_solids),
         _ => 0.0,
     };
     let off = [
@@ -218,7 +228,7 @@ pub fn check_found(gpu: &Gpu, wrong: &[Wrong]) {
             _ => off.max(apart(&found.direct, &truth.direct)),
         };
         let off = match *name {
-            "floors" => off.max(apart(&found.of_solids, &truth.of_solids)),
+            "floors" | "evening" => off.max(apart(&found.of_solids, &truth.of_solids)),
             _ => off,
         };
         println!("{name}, {mode}, {file}, {from} -> {to}: {off:e}");

@@ -75,7 +75,7 @@ pub fn case_of_cells(aspect: f64) -> Case {
     let position = |r: &mut Random| [0, 1, 2].map(|i| r.within(low[i] + 1e-4, high[i] - 1e-4));
     let facets = (0..700).map(|_| in_cloud(position(&mut r))).collect();
     let mut lights: Vec<Light> = (0..4).map(|_| sun(double(r.direction()))).collect();
-    lights.push(Light::Sky { irradiance: DVec3::ONE, constant: 0.5 });
+    lights.push(Light::even_sky(DVec3::ONE, 0.5));
     lights.push(sun(DVec3::Z));
     Case { spec, density, surfaces: vec![], facets, lights }
 }
@@ -119,7 +119,7 @@ pub fn room() -> Case {
     for position in [DVec3::new(7.0, -4.5, 1.0), DVec3::new(0.5, 0.25, -0.5)] {
         case.lights.push(Light::Point { position, intensity: DVec3::ONE, radius: 0.125 });
     }
-    case.lights.push(Light::Sky { irradiance: DVec3::X, constant: 0.5 });
+    case.lights.push(Light::even_sky(DVec3::X, 0.5));
     case.lights.push(Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::ZERO });
     case
 }

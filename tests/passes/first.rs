@@ -39,10 +39,7 @@ fn case(n_suns: usize, n_near: usize, sky: bool) -> Case {
         .collect();
     lights.extend((0..2 * n_near).map(|i| near_light(&mut r, 3.0, i % 2 == 1)));
     if sky {
-        lights.insert(
-            n_suns / 2,
-            Light::Sky { irradiance: DVec3::new(0.25, 0.5, 1.5), constant: 0.125 },
-        );
+        lights.insert(n_suns / 2, Light::even_sky(DVec3::new(0.25, 0.5, 1.5), 0.125));
     }
     let facet = |i: usize, r: &mut Random| FacetRecord {
         position: [0; 3].map(|_| r.within(-4.0, 4.0)),

@@ -81,7 +81,7 @@ fn suns() -> Vec<Light> {
         sun(0.1, -1.0, 0.05),
         // From below.
         sun(0.2, 0.4, 0.1),
-        Light::Sky { irradiance: DVec3::ONE, constant: 0.5 },
+        Light::even_sky(DVec3::ONE, 0.5),
         lamp(70.0, -4.0, 30.0),
         // Just above the middle of a triangle.
         close(&grounds()[0]),
@@ -278,7 +278,7 @@ fn wrong_shaders_are_noticed() {
 fn the_march_ends_at_ground() {
     let mut gpu = Gpu::new();
     let sun = Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::ONE };
-    let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
+    let sky = Light::even_sky(DVec3::ONE, 0.0);
     let lights = gpu.upload(&lights::records(&[sun, sky]));
     let facets = gpu.upload(&[FacetRecord { i_region: 7, ..Default::default() }; 4]);
     let regions = gpu.upload(&[RegionRecord::default()]);

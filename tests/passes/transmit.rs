@@ -130,11 +130,7 @@ fn nothing_on_the_way_is_exactly_one() {
         outside.push(in_cloud(p.to_array()));
     }
     case.facets = outside;
-    case.lights = vec![
-        sun(DVec3::NEG_Y),
-        sun(DVec3::Z),
-        Light::Sky { irradiance: DVec3::ONE, constant: 0.0 },
-    ];
+    case.lights = vec![sun(DVec3::NEG_Y), sun(DVec3::Z), Light::even_sky(DVec3::ONE, 0.0)];
     assert_eq!(case.run(&mut gpu, None, 0.5, 0.0)[0], [1.0; 12], "past the box");
     case.lights = vec![sun(DVec3::X)];
     let through = &case.run(&mut gpu, None, 0.5, 0.0)[0];

@@ -13,7 +13,7 @@ fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
     let tables: Vec<Vec<f64>> =
         table.chunks(N_NODES).map(|v| v.iter().map(|v| f64::from(*v)).collect()).collect();
     let toward = r.direction();
-    let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.25 };
+    let sky = Light::even_sky(DVec3::ONE, 0.25);
     let lights = [Light::Directional { direction: -double(toward), irradiance: DVec3::ONE }, sky];
     let eye = [0.5, 1.5, -0.25];
     let n_vectors = tables.len() as u32;

@@ -137,7 +137,7 @@ fn single_scattering_is_its_integral() {
 #[test]
 fn layers_tell_orders_and_lights() {
     let sun = Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::ONE };
-    let sky = Light::Sky { irradiance: DVec3::splat(0.5), constant: 0.2 };
+    let sky = Light::even_sky(DVec3::splat(0.5), 0.2);
     let of = |lights: &[Light], solids: Solids| TransportScene {
         medium: medium(0.9, Phase::HenyeyGreenstein { g: 0.5 }),
         solids,
@@ -172,7 +172,7 @@ fn the_dark_is_black() {
         cos_inner: 0.9,
         cos_outer: 0.8,
     };
-    let black = Light::Sky { irradiance: DVec3::ZERO, constant: 0.5 };
+    let black = Light::even_sky(DVec3::ZERO, 0.5);
     let eye = ray(DVec3::new(3.0, 1.0, 4.0), DVec3::ZERO);
     for lights in [&[][..], &[spot], &[black]] {
         let scene = TransportScene {

@@ -11,7 +11,7 @@ use crate::{Mean, radiance, radiance_within};
 /// A sky of radiance 1 above the horizon.
 fn sky() -> Lights {
     let irradiance = DVec3::splat(std::f64::consts::PI);
-    Lights::new(&[Light::Sky { irradiance, constant: 0.0 }], 0.005)
+    Lights::new(&[Light::even_sky(irradiance, 0.0)], 0.005)
 }
 
 /// Standard error of every mean, as a share of it: two of them are half of a percent.

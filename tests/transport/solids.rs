@@ -6,6 +6,7 @@ use glam::DVec3;
 use nimbus::model::light::Light;
 use nimbus::model::material::Brdf;
 use nimbus::model::phase::Phase;
+use nimbus::model::sky::{Sky, SkySettings};
 use nimbus::reference::transport::{Lights, Ray, Solids, TransportScene};
 
 use crate::{Vacuum, radiance, ray};
@@ -151,4 +152,43 @@ fn a_cloud_in_a_room_takes_nothing_away() {
     let truth = 4.0 * PI / 24.0 / (1.0 - rho);
     assert!(bare.off(truth).abs() < 4.0 && cloudy.off(truth).abs() < 4.0, "{truth}");
     assert!(error < 0.01 * truth);
+}
+
+/// A floor and walls under a clear sky: the irradiance is that of the dome, by quadrature, and not
+/// that of an even sky.
+#[test]
+fn a_clear_sky_lights_walls_as_its_dome() {
+    let toward_sun = DVec3::new(0.8, 0.3, -0.5).normalize();
+    let sky = Sky::new(SkySettings::of_turbidity(4.0), toward_sun).expect("a sky");
+    let irradiance = sky.of_sky();
+    let light = Light::Sky { irradiance, constant: 0.0, tilt: sky.tilt() };
+    let quadrature = |n: DVec3| {
+        let (n_up, n_around) = (300, 300);
+        let mut sum = 0.0;
+        for k in 0..n_up * n_around {
+            let up = (f64::from(k / n_around) + 0.5) / f64::from(n_up);
+            let (sin, cos) =
+                ((f64::from(k % n_around) + 0.5) * 2.0 * PI / f64::from(n_around)).sin_cos();
+            let across = (1.0 - up * up).sqrt();
+            let w = DVec3::new(across * cos, up, across * sin);
+            sum += sky.radiance(w).y * w.dot(n).max(0.0);
+        }
+        sum * 2.0 * PI / f64::from(n_up * n_around)
+    };
+    let level = quadrature(DVec3::Y);
+    assert!((level / irradiance.y - 1.0).abs() < 2e-3, "{level} {irradiance}");
+    for n in [DVec3::Y, DVec3::X, DVec3::NEG_X] {
+        let u = if n == DVec3::Y { DVec3::Z } else { DVec3::Y };
+        let v = n.cross(u);
+        let wall = [-u - v, 2.0 * u, 2.0 * v];
+        let scene = TransportScene {
+            medium: Vacuum,
+            solids: Solids::new(&[(wall, 0)], &[], vec![diffuse(0.5)]),
+            lights: Lights::new(&[light], 0.005).under(Some(sky)),
+        };
+        let found = radiance(&scene, ray(n + 0.2 * v, DVec3::ZERO), 60_000);
+        found.assert_is("clear sky", 0.5 * quadrature(n) / PI, 1e-2);
+    }
+    // An even sky would give walls half of what the floor has.
+    assert!(quadrature(DVec3::X) > 1.2 * level && quadrature(DVec3::NEG_X) < 0.8 * level);
 }

@@ -32,7 +32,7 @@ fn checks<E: Estimator>() -> Vec<f64> {
     let albedo = 0.8;
     let truth = Operators::of_slab(2.0, albedo, 0.85, 32);
     let irradiance = DVec3::splat(std::f64::consts::PI);
-    let sky = Lights::new(&[Light::Sky { irradiance, constant: 0.0 }], 0.005);
+    let sky = Lights::new(&[Light::even_sky(irradiance, 0.0)], 0.005);
     let slab = TransportScene {
         medium: Slab::new(2.0, albedo, 0.85),
         solids: Solids::default(),
@@ -172,7 +172,7 @@ fn wrong_flights_are_found() {
         let scene = TransportScene {
             medium: Faulty { inner: Slab::new(2.0, 0.8, 0.0), flight },
             solids: Solids::default(),
-            lights: Lights::new(&[Light::Sky { irradiance, constant: 0.0 }], 0.005),
+            lights: Lights::new(&[Light::even_sky(irradiance, 0.0)], 0.005),
         };
         let eye = toward(2.0, true, truth.nodes[16]);
         paths::<_, Unbiased>(&scene, eye, 60_000, |l| l.radiance().y).off(truth.albedo(16))

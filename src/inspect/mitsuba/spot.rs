@@ -114,9 +114,6 @@ mod tests {
             cos_inner: 1.0,
             cos_outer: 81f64.to_radians().cos(),
         };
-        assert!(
-            is_too_wide(&wide)
-                && picture(&Light::Sky { irradiance: DVec3::ONE, constant: 0.0 }).is_none()
-        );
+        assert!(is_too_wide(&wide) && picture(&Light::even_sky(DVec3::ONE, 0.0)).is_none());
     }
 }

@@ -10,6 +10,7 @@ use crate::io::document::section::Section;
 use crate::io::document::suggest::shown;
 use crate::model::light::Light;
 use crate::model::sky::{Sky, SkySettings};
+use crate::model::tilt::Tilt;
 use crate::model::weather::{steps, sun};
 
 /// Lights of a scene without any `[[light]]`: a sun from the upper right, and the sky.
@@ -24,10 +25,11 @@ irradiance = [0.8, 0.87, 1.0]
 constant = 0.55
 "#;
 
-/// Irradiance of the sun and of the sky that a clear sky has.
+/// Irradiance of the sun and of the sky that a clear sky has, and where the sky is bright.
 pub struct Clear {
     sun: DVec3,
     sky: DVec3,
+    tilt: Tilt,
 }
 
 type Reader = fn(&mut Section, Option<&Clear>) -> Result<Light>;
@@ -109,6 +111,7 @@ keys! { SPOT: fn spot(s, cone: Cone) -> Light { Light::Spot;
 }}
 
 keys! { SKY: fn sky(s, clear: Option<&Clear>) -> Light { Light::Sky;
+    tilt => clear.map_or(Tilt::EVEN, |c| c.tilt);
     /// Linear RGB irradiance from above. A `[sky]` has a default for it.
     irradiance: required_vector(AMOUNT) => |_| irradiance(clear.map(|c| c.sky)).take(s, IRRADIANCE);
     /// Share of the irradiance that reaches every facet, whatever is in the way.
@@ -143,7 +146,7 @@ pub fn under_sky(root: &mut Section, settings: SkySettings) -> Result<Sky> {
     for s in &mut root.sections("light")? {
         let (_, read) = kind(s)?;
         // What the sky sets does not matter for the place of its sun.
-        let any = Some(&Clear { sun: DVec3::ZERO, sky: DVec3::ZERO });
+        let any = Some(&Clear { sun: DVec3::ZERO, sky: DVec3::ZERO, tilt: Tilt::EVEN });
         if let Light::Directional { direction, .. } = read(s, any)? {
             suns.push(-direction);
         }
@@ -169,7 +172,7 @@ pub fn kinds() -> impl Iterator<Item = (&'static str, &'static [Keys])> {
 
 /// Reads every `[[light]]`. Under a clear sky, sun and sky need no `irradiance`.
 pub fn read_lights(root: &mut Section, sky: Option<&Sky>) -> Result<Vec<Light>> {
-    let clear = sky.map(|sky| Clear { sun: sky.of_sun(), sky: sky.of_sky() });
+    let clear = sky.map(|sky| Clear { sun: sky.of_sun(), sky: sky.of_sky(), tilt: sky.tilt() });
     read_tables(root, "light", |s, _| {
         let (lists, read) = kind(s)?;
         s.expect_keys(names(&[&[KIND], lists].concat()))?;

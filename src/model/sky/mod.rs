@@ -26,6 +26,7 @@ use super::cover::Sea;
 use super::light::{Light, UP};
 use super::material::Material;
 use super::named::named;
+use super::tilt::Tilt;
 
 /// Angular radius of the sun, radians.
 pub const SUN_RADIUS: f64 = 4.65e-3;
@@ -98,6 +99,7 @@ pub struct Sky {
     air: ClearAir,
     /// Irradiance of the sky on a level plane.
     irradiance: DVec3,
+    tilt: Tilt,
 }
 
 impl Sky {
@@ -108,12 +110,9 @@ impl Sky {
     pub fn new(settings: SkySettings, toward_sun: DVec3) -> Result<Sky, String> {
         let dome = Dome::new(toward_sun, settings.turbidity, settings.albedo)?;
         let dome = Dome { scale: balanced(dome.scale), ..dome };
-        Ok(Sky {
-            settings,
-            dome,
-            air: ClearAir::new(settings.turbidity),
-            irradiance: level_irradiance(&dome),
-        })
+        let irradiance = level_irradiance(&dome);
+        let tilt = tilt_of(&dome, irradiance);
+        Ok(Sky { settings, dome, air: ClearAir::new(settings.turbidity), irradiance, tilt })
     }
 
     /// Returns the sun's irradiance across its light at sea level, linear RGB.
@@ -124,6 +123,17 @@ impl Sky {
     /// Returns the sky's irradiance on a level plane, linear RGB.
     pub fn of_sky(&self) -> DVec3 {
         self.irradiance
+    }
+
+    /// Returns where the sky is brighter and darker, as a plane over the directions: walls toward
+    /// the sun and away from it have the sky's irradiance.
+    pub fn tilt(&self) -> Tilt {
+        self.tilt
+    }
+
+    /// Returns the radiance from a unit direction, as it is seen from sea level.
+    pub fn radiance(&self, direction: DVec3) -> DVec3 {
+        self.dome.radiance(direction)
     }
 
     /// Returns the share of light that all air over the sea takes, in a direction whose sine of
@@ -157,6 +167,35 @@ fn level_irradiance(dome: &Dome) -> DVec3 {
     };
     let all = (0..N_HEIGHTS).flat_map(|i| (0..N_AZIMUTHS).map(move |k| (i, k)));
     all.map(at).sum::<DVec3>() * (PI / f64::from(N_HEIGHTS * N_AZIMUTHS))
+}
+
+/// Returns ∫ L max(0, n·ω) over the upper half of the directions.
+fn irradiance_on(dome: &Dome, n: DVec3) -> DVec3 {
+    let at = |(i, k): (u32, u32)| {
+        let up = (f64::from(i) + 0.5) / f64::from(N_HEIGHTS);
+        let across = (1.0 - up * up).sqrt();
+        let (sin, cos) = azimuth(k);
+        let direction = DVec3::new(across * cos, up, across * sin);
+        dome.radiance(direction) * direction.dot(n).max(0.0)
+    };
+    let all = (0..N_HEIGHTS).flat_map(|i| (0..N_AZIMUTHS).map(move |k| (i, k)));
+    all.map(at).sum::<DVec3>() * (TAU / f64::from(N_HEIGHTS * N_AZIMUTHS))
+}
+
+/// Walls over which the mean is taken.
+const N_WALLS: u32 = 8;
+
+/// Returns the tilt of a dome that has the irradiance `level` on a level plane.
+fn tilt_of(dome: &Dome, level: DVec3) -> Tilt {
+    let sun = DVec3::new(dome.toward_sun.x, 0.0, dome.toward_sun.z).normalize_or(DVec3::X);
+    let on = |n: DVec3| irradiance_on(dome, n) / level.max(DVec3::splat(f64::MIN_POSITIVE));
+    let wall = |k: u32| {
+        let (sin, cos) = (f64::from(k) * TAU / f64::from(N_WALLS)).sin_cos();
+        on(DVec3::new(cos * sun.x - sin * sun.z, 0.0, sin * sun.x + cos * sun.z))
+    };
+    let walls: Vec<DVec3> = (0..N_WALLS).map(wall).collect();
+    let mean = walls.iter().sum::<DVec3>() / f64::from(N_WALLS);
+    Tilt::of_walls(sun, [walls[0], walls[N_WALLS as usize / 2], mean])
 }
 
 /// Returns the share of light that air of an optical depth takes.
@@ -235,12 +274,7 @@ impl SkyView {
         }
         let (mirrored, share) = sea.mirror(toward_eye);
         let of_sun = sunlit * sea.glitter(self.toward_sun(), toward_eye);
-        share * self.sky_radiance(mirrored) + of_sun * self.sun
-    }
-
-    /// Returns the radiance of the sky from a unit direction, as it is seen from sea level.
-    pub fn sky_radiance(&self, direction: DVec3) -> DVec3 {
-        self.sky.dome.radiance(direction)
+        share * self.sky.radiance(mirrored) + of_sun * self.sun
     }
 
     /// Returns the dome's coefficients by channel.
@@ -266,7 +300,7 @@ impl SkyView {
     /// Returns the radiance that opaque air has in a unit direction: the sky's over the share of
     /// light that its air takes. Down, air is seen as high up as above the horizon.
     fn of_air(&self, direction: DVec3) -> DVec3 {
-        self.sky.dome.radiance(direction) / self.sky.taken_from_sea(direction.y.abs())
+        self.sky.radiance(direction) / self.sky.taken_from_sea(direction.y.abs())
     }
 
     /// Returns the air before a place at `offset` from the eye, scene units.

@@ -104,7 +104,7 @@ fn kernel(at: &Receiver, rectangle: &Rectangle, point: DVec3) -> f64 {
 /// `surface`, and its error estimate.
 pub fn form_factor(surface: &Surface, p: DVec3, normal: DVec3, accuracy: &Accuracy) -> (f64, f64) {
     // A white surface under a sky that lights everything with π has radiance 1 everywhere.
-    let sky = [Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 }];
+    let sky = [Light::even_sky(DVec3::splat(PI), 1.0)];
     let white = Brdf { kd: DVec3::ONE, ks: DVec3::ZERO, ns: 0.0 };
     let mut scene = AreaScene::new(&[*surface], &[white], &sky, &[], 0.0, &[]);
     scene.regions[0] =

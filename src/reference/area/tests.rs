@@ -41,7 +41,7 @@ fn glossy(kd: f64, ks: f64, ns: f64) -> Brdf {
 }
 
 /// A white surface that no other light reaches has L1 = 1 under this sky.
-const GLOW: Light = Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 };
+const GLOW: Light = Light::even_sky(DVec3::splat(PI), 1.0);
 
 fn close(e: &Estimate, irradiance: f64, relative: f64) {
     let off = (e.irradiance.x - irradiance).abs();
@@ -130,7 +130,7 @@ fn cube(albedo: Brdf) -> (Vec<Surface>, Vec<Brdf>) {
 #[test]
 fn a_furnace_reflects_powers_of_its_albedo() {
     let (faces, brdfs) = cube(matte(0.7));
-    let sky = [Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 }];
+    let sky = [Light::even_sky(DVec3::splat(PI), 1.0)];
     let s = AreaScene::new(&faces, &brdfs, &sky, &[], 0.0, &[]);
     for (i, face) in faces.iter().enumerate() {
         for (a, b) in [(0.0, 0.0), (0.31, -0.77), (0.999, 0.2), (-0.999_99, 0.999_99)] {

@@ -35,7 +35,7 @@ impl<'a> BoxLight<'a> {
         lights: &[Light],
         is_open: impl Fn(usize) -> bool,
     ) -> DVec3 {
-        let skies = Skies::new(lights, &is_open);
+        let skies = Skies::new(lights);
         let is_roofed = |(i, light): (usize, &Light)| {
             light.is_sky() && light.energy() != DVec3::ZERO && !is_open(i)
         };
@@ -54,10 +54,9 @@ impl<'a> BoxLight<'a> {
             let along = *x * to.x + *y * to.y + *z * to.z;
             let sent = 0.25 * (*phi - 3.0 * along).max(DVec3::ZERO);
             let share = share((patch.center, patch.outward), patch.area, (p, normal));
-            share * (sent - skies.along(to.y))
+            share * (sent - skies.from(to))
         };
-        let sky = skies.above * (0.5 + 0.5 * normal.y) + skies.all;
-        let outside = sky + self.patches.iter().map(of_patch).sum::<DVec3>();
+        let outside = skies.on(normal) + self.patches.iter().map(of_patch).sum::<DVec3>();
         inside.lerp(outside.max(DVec3::ZERO), far)
     }
 }
@@ -80,7 +79,7 @@ mod tests {
     #[test]
     fn an_empty_box_does_not_change_the_sky() {
         // φ = 2E + 4kE and F = −E along y, inside of the box, below it and beside it.
-        let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.3 };
+        let sky = Light::even_sky(DVec3::ONE, 0.3);
         let diffuse = constant(2.0 + 1.2, DVec3::NEG_Y);
         let of = BoxLight::new(&GRID, &diffuse);
         let at = |p, n| of.irradiance((p, n), &[sky], |_| true).x;
@@ -98,7 +97,7 @@ mod tests {
 
     #[test]
     fn even_light_arrives_from_the_box_as_from_the_sky() {
-        let even = Light::Sky { irradiance: DVec3::splat(1e-9), constant: 1e9 };
+        let even = Light::even_sky(DVec3::splat(1e-9), 1e9);
         let diffuse = constant(4.0, DVec3::ZERO);
         let of = BoxLight::new(&GRID, &diffuse);
         for p in [DVec3::ONE, DVec3::new(2.0, -0.2, 1.0), DVec3::new(9.0, -1.0, 1.0)] {

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use crate::model::grid::{GridSpec, PATCHES};
 use crate::model::light::Light;
+use crate::model::tilt::Tilt;
 use crate::reference::facets::Facet;
 
 /// A part of a face of the box.
@@ -43,35 +44,44 @@ pub(super) fn share(from: (DVec3, DVec3), area: f64, to: (DVec3, DVec3)) -> f64 
     }
 }
 
-/// Irradiance by lights of the sky: from above the horizon, and from everywhere.
-#[derive(Debug, Clone, Copy, Default)]
+/// The skies of a scene.
+#[derive(Debug, Clone)]
 pub(super) struct Skies {
-    pub above: DVec3,
+    /// Irradiance and tilt of what comes from above the horizon.
+    above: Vec<(DVec3, Tilt)>,
+    /// Irradiance from everywhere.
     pub all: DVec3,
 }
 
 impl Skies {
-    /// Returns the sum of all skies among `lights`; from above, those alone of which `is_open`.
-    pub fn new(lights: &[Light], is_open: impl Fn(usize) -> bool) -> Skies {
-        let mut sum = Skies::default();
-        for (i, light) in lights.iter().enumerate() {
-            if let Light::Sky { irradiance, constant } = *light {
-                sum.all += irradiance * constant;
-                sum.above += if is_open(i) { irradiance } else { DVec3::ZERO };
+    /// Returns the skies among `lights`.
+    pub fn new(lights: &[Light]) -> Skies {
+        let mut skies = Skies { above: vec![], all: DVec3::ZERO };
+        for light in lights {
+            if let Light::Sky { irradiance, constant, tilt } = *light {
+                skies.all += irradiance * constant;
+                skies.above.push((irradiance, tilt));
             }
         }
-        sum
+        skies
     }
 
-    /// Returns π times the radiance from a direction whose vertical part is `y`.
-    pub fn along(&self, y: f64) -> DVec3 {
-        self.of_share(if y > 0.0 { 1.0 } else { 0.0 })
+    /// Returns π times the radiance from a unit direction, of which the share `above` comes from
+    /// above the horizon.
+    pub fn along(&self, direction: DVec3, above: f64) -> DVec3 {
+        let lifted = direction.with_y(direction.y.max(0.0));
+        self.all
+            + above * self.above.iter().map(|(e, tilt)| e * tilt.radiance(lifted)).sum::<DVec3>()
     }
 
-    /// Returns π times the mean radiance from directions of which `above` come from above the
-    /// horizon.
-    pub fn of_share(&self, above: f64) -> DVec3 {
-        self.all + above * self.above
+    /// Returns the same from a direction that is above the horizon or not.
+    pub fn from(&self, direction: DVec3) -> DVec3 {
+        self.along(direction, if direction.y > 0.0 { 1.0 } else { 0.0 })
+    }
+
+    /// Returns the irradiance on a facet of unit normal `n`.
+    pub fn on(&self, n: DVec3) -> DVec3 {
+        self.all + self.above.iter().map(|(e, tilt)| e * tilt.irradiance(n)).sum::<DVec3>()
     }
 }
 
@@ -93,7 +103,7 @@ impl FaceLight {
         lift: f64,
     ) -> FaceLight {
         let n = PATCHES as usize;
-        let skies = Skies::new(lights, |_| true);
+        let skies = Skies::new(lights);
         let half = 0.5 * (grid.high() - grid.low);
         let at = |i: usize| {
             let (axis, side) = (i / (2 * n * n), i / (n * n) % 2);
@@ -101,7 +111,7 @@ impl FaceLight {
             let place = center - outward * lift.min(half[axis]);
             let of = |(f, sent): (&Facet, &DVec3)| {
                 let share = share((f.position, f.normal), f.area, (place, outward));
-                share * (*sent - skies.along(f.position.y - place.y))
+                share * (*sent - skies.from((f.position - place).normalize_or_zero()))
             };
             facets.iter().zip(radiosity).map(of).sum()
         };
@@ -167,11 +177,11 @@ mod tests {
     #[test]
     fn a_floor_as_bright_as_the_sky_changes_nothing() {
         let floor = floor(-2.0);
-        let even = Light::Sky { irradiance: DVec3::ZERO, constant: 1.0 };
+        let even = Light::even_sky(DVec3::ZERO, 1.0);
         // Of no sky, it hides nothing.
         let light = FaceLight::new(&GRID, &floor, &vec![DVec3::ZERO; 6400], &[even], 0.5);
         assert_eq!(light.at(1, 0, DVec3::splat(0.3)), DVec3::ZERO);
-        let sky = Light::Sky { irradiance: DVec3::splat(2.0), constant: 0.5 };
+        let sky = Light::even_sky(DVec3::splat(2.0), 0.5);
         let light = FaceLight::new(&GRID, &floor, &vec![DVec3::ONE; 6400], &[sky], 0.5);
         assert_eq!(light.at(1, 0, DVec3::splat(0.3)), DVec3::ZERO);
         // A black one hides the share that comes from everywhere.

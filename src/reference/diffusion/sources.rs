@@ -66,7 +66,7 @@ impl Sources {
             let (p, whole) = (spec.center(c), obstacles.cells[c]);
             let extinction = whole.min(of.densest);
             let receiver = Receiver { position: p, i_region: u32::MAX };
-            let (mut fluence, mut flux, mut fallen) = (DVec3::ZERO, DMat3::ZERO, DVec3::ZERO);
+            let (mut fluence, mut flux, mut fallen) = (DVec3::ZERO, DMat3::ZERO, [DVec3::ZERO; 3]);
             let (mut direct, mut from_middle) = (0.0, DVec3::ZERO);
             for light in lights.iter().filter(|light| has_sky_flux || !light.is_sky()) {
                 let way = light.arrival(p);
@@ -74,8 +74,9 @@ impl Sources {
                 if tau >= BARRED {
                     continue;
                 }
-                if light.is_sky() {
-                    fallen += light.energy() * (-tau * kept).exp();
+                if let Light::Sky { irradiance, tilt, .. } = light {
+                    let passed = irradiance * (-tau * kept).exp();
+                    fallen.iter_mut().zip(tilt.flux()).for_each(|(f, along)| *f += along * passed);
                     continue;
                 }
                 let e = light.energy() * way.falloff;
@@ -94,10 +95,10 @@ impl Sources {
                 }
             }
             let of_suns = [fluence, flux.x_axis, flux.y_axis, flux.z_axis];
-            let mut carried = [0, 1, 2].map(|axis| {
-                3.0 * of.reach(extinction) * albedo * (g - f) * extinction * flux.col(axis)
+            let carried = [0, 1, 2].map(|axis| {
+                let of_suns = 3.0 * albedo * (g - f) * extinction * flux.col(axis);
+                of.reach(extinction) * (of_suns + of.inverse_chord * fallen[axis])
             });
-            carried[1] -= of.reach(extinction) * of.inverse_chord * fallen;
             (albedo * (1.0 - f) * extinction * from_middle, (carried, of_suns, direct))
         });
         let (scattered, rest): (Vec<DVec3>, Vec<_>) = found.into_iter().unzip();

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, USizeVec3};
 
-use super::faces::FaceLight;
+use super::faces::{FaceLight, Skies};
 use super::sources::{DiffusionMedium, Sources};
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
@@ -34,21 +34,6 @@ pub(super) fn before(n: USizeVec3, c: usize, axis: usize) -> Option<usize> {
     (!is_first).then(|| c - stride)
 }
 
-/// Returns the light of the sky that comes in through a face of the box: `side` is 0 for the
-/// lower and 1 for the upper face of an axis.
-fn of_sky(lights: &[Light], axis: usize, side: usize) -> DVec3 {
-    let share = match (axis, side) {
-        (1, 1) => 1.0,
-        (1, _) => 0.0,
-        _ => 0.5,
-    };
-    let of = |light: &Light| match *light {
-        Light::Sky { irradiance, constant } => irradiance * (share + constant),
-        _ => DVec3::ZERO,
-    };
-    lights.iter().map(of).sum()
-}
-
 impl System {
     /// Returns the equations of the cells of `grid`, in which extinction is `cells`.
     pub fn new(
@@ -69,12 +54,15 @@ impl System {
             source: sources.scattered.clone(),
         };
         let extent = grid.high() - grid.low;
-        // Light that arrives at the face of the box at cell c.
+        let skies = Skies::new(lights);
+        // Light that arrives at the face of the box at cell c: `side` is 0 for the lower and 1 for
+        // the upper face of an axis.
         let arriving = |c: usize, axis: usize, side: usize| {
             let solids =
                 |light: &FaceLight| light.at(axis, side, (grid.center(c) - grid.low) / extent);
             let of_solids = of_solids.map_or(DVec3::ZERO, solids);
-            (of_sky(lights, axis, side) + of_solids).max(DVec3::ZERO)
+            let outward = if side == 1 { DVec3::AXES[axis] } else { -DVec3::AXES[axis] };
+            (skies.on(outward) + of_solids).max(DVec3::ZERO)
         };
         for c in 0..cells.len() {
             for axis in 0..3 {

@@ -42,7 +42,7 @@ fn lights() -> [Light; 3] {
             irradiance: DVec3::new(3.0, 2.5, 2.0),
         },
         Light::Point { position: DVec3::new(1.5, 0.8, 0.9), intensity: DVec3::ONE, radius: 0.1 },
-        Light::Sky { irradiance: DVec3::new(0.5, 0.7, 1.0), constant: 0.3 },
+        Light::even_sky(DVec3::new(0.5, 0.7, 1.0), 0.3),
     ]
 }
 
@@ -108,7 +108,7 @@ fn elimination_solves_the_equations() {
 #[test]
 fn light_from_everywhere_is_the_same_everywhere() {
     // A radiance of 1 has φ = 4π and no flux; only what absorbs is darker.
-    let even = Light::Sky { irradiance: DVec3::splat(1e-9), constant: 1e9 * std::f64::consts::PI };
+    let even = Light::even_sky(DVec3::splat(1e-9), 1e9 * std::f64::consts::PI);
     let grid = spec([8, 6, 5], 1.0);
     let (of, cells, sources, system) = system(&grid, &[even]);
     let phi = solve(&system);
@@ -151,7 +151,7 @@ fn finer_grids_converge_at_second_order() {
 #[test]
 fn an_empty_box_lets_the_sky_through() {
     // φ = 2E + 4kE and F = −E along y in all cells, as without the box.
-    let sky = Light::Sky { irradiance: DVec3::new(1.0, 2.0, 0.5), constant: 0.2 };
+    let sky = Light::even_sky(DVec3::new(1.0, 2.0, 0.5), 0.2);
     let grid = spec([6, 5, 4], 0.7);
     let of = DiffusionMedium::new(MEAN, &grid);
     let cells = vec![0.0; 120];

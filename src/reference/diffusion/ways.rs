@@ -23,7 +23,7 @@ impl<'a> Ways<'a> {
         lights: &[Light],
         of_solids: Option<&'a FaceLight>,
     ) -> Ways<'a> {
-        Ways { grid, weakened, skies: Skies::new(lights, |_| true), of_solids }
+        Ways { grid, weakened, skies: Skies::new(lights), of_solids }
     }
 
     /// Returns 4π times the radiance that comes to the middle of cell `c` from the direction
@@ -53,7 +53,7 @@ impl<'a> Ways<'a> {
             if at[k] == [0, n[k] - 1][side] {
                 let part = (DVec3::from(at.map(|i| i as f64)) + 0.5) / n.as_dvec3();
                 let of_solids = self.of_solids.map_or(DVec3::ZERO, |f| f.at(k, side, part));
-                return sum + 4.0 * passed * (of_solids + self.skies.of_share(above));
+                return sum + 4.0 * passed * (of_solids + self.skies.along(toward, above));
             }
             let stride = [1, n.x, n.x * n.y][k];
             (at[k], c) = match side {

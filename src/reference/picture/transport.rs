@@ -17,6 +17,7 @@ use crate::model::material::Brdf;
 use crate::model::medium::Medium;
 use crate::model::parallel::parallel_map;
 use crate::model::scene::Scene;
+use crate::model::sky::Sky;
 use crate::model::surface::Surface;
 use crate::reference::Blob;
 use crate::reference::transport::{
@@ -47,6 +48,8 @@ pub struct TransportParts {
     pub brdfs: Vec<Brdf>,
     /// Lights.
     pub lights: Vec<Light>,
+    /// Clear sky that they belong to.
+    pub sky: Option<Sky>,
     /// Angular radius of directional lights, radians.
     pub sun_radius: f64,
 }
@@ -74,6 +77,7 @@ impl TransportParts {
             triangles,
             brdfs,
             lights: local.lights,
+            sky: scene.sky,
             sun_radius: scene.lighting.sun_radius,
         }
     }
@@ -92,7 +96,7 @@ impl TransportPicture {
         let of = TransportScene {
             medium: BlobMedium::new(&parts.blobs, &parts.i_scatterer, parts.scatterers),
             solids: Solids::new(&parts.rectangles, &parts.triangles, parts.brdfs),
-            lights: Lights::new(&parts.lights, parts.sun_radius),
+            lights: Lights::new(&parts.lights, parts.sun_radius).under(parts.sky),
         };
         TransportPicture { of, view: parts.view }
     }

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::ray::around;
 use super::stream::Stream;
 use crate::model::light::{Light, UP};
+use crate::model::sky::Sky;
 
 /// A sun: a disc of even radiance in the sky.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,12 +19,14 @@ struct Sun {
     radiance: DVec3,
 }
 
-/// The lights of a scene. A sky has the radiance E/π above and `constant` E/π all around.
+/// The lights of a scene. A sky has the radiance E/π above and `constant` E/π all around. Under a
+/// clear sky E/π is that of its dome instead, in proportion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lights {
     suns: Vec<Sun>,
-    /// Radiance of the sky from above, and from below.
+    /// Radiance of the sky from above, and from below; means under a clear sky.
     sky: [DVec3; 2],
+    clear: Option<Sky>,
     /// Point and spot lights.
     lamps: Vec<Light>,
 }
@@ -55,7 +58,7 @@ impl Lights {
                     let radiance = irradiance / (PI * sun_radius.sin().powi(2));
                     suns.push(Sun { toward: -direction, width, irradiance, radiance });
                 }
-                Light::Sky { irradiance, constant } => {
+                Light::Sky { irradiance, constant, .. } => {
                     let [above, below] = &mut sky;
                     *above += irradiance * ((1.0 + constant) / PI);
                     *below += irradiance * (constant / PI);
@@ -63,12 +66,17 @@ impl Lights {
                 Light::Point { .. } | Light::Spot { .. } => lamps.push(*light),
             }
         }
-        Lights { suns, sky, lamps }
+        Lights { suns, sky, clear: None, lamps }
+    }
+
+    /// Returns the lights under a clear sky.
+    pub fn under(self, clear: Option<Sky>) -> Lights {
+        Lights { clear, ..self }
     }
 
     /// Returns lights of a sky of that radiance all around.
     pub fn uniform(radiance: DVec3) -> Lights {
-        Lights { suns: vec![], sky: [radiance; 2], lamps: vec![] }
+        Lights { suns: vec![], sky: [radiance; 2], clear: None, lamps: vec![] }
     }
 
     /// Returns whether nothing shines.
@@ -80,7 +88,20 @@ impl Lights {
     /// and of the sky.
     pub fn environment(&self, toward: DVec3) -> [DVec3; 2] {
         let of_suns = self.suns.iter().filter(|sun| sun.shows(toward)).map(|sun| sun.radiance);
-        [of_suns.sum(), self.sky[usize::from(toward.dot(UP) < 0.0)]]
+        [of_suns.sum(), self.sky_radiance(toward)]
+    }
+
+    /// Returns the radiance of the sky alone.
+    pub fn sky_radiance(&self, toward: DVec3) -> DVec3 {
+        let [above, below] = self.sky;
+        match &self.clear {
+            _ if toward.dot(UP) < 0.0 => below,
+            Some(clear) => {
+                let mean = clear.of_sky().max(DVec3::splat(f64::MIN_POSITIVE)) / PI;
+                below + (above - below) * (clear.radiance(toward) / mean)
+            }
+            None => above,
+        }
     }
 
     /// Returns the density per solid angle with which [`Lights::sample`] at `p` samples the

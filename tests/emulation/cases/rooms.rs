@@ -44,7 +44,7 @@ fn random(seed: u32) -> Room {
     let lights = vec![
         Light::Directional { direction, irradiance: DVec3::new(3.0, 2.9, 2.7) },
         Light::Point { position, intensity: DVec3::splat(4.0), radius: 0.05 },
-        Light::Sky { irradiance: DVec3::new(0.3, 0.4, 0.6), constant: 0.2 },
+        Light::even_sky(DVec3::new(0.3, 0.4, 0.6), 0.2),
     ];
     Room { surfaces, brdfs, lights, eye: EYE }
 }

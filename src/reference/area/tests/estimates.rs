@@ -33,7 +33,7 @@ fn random_scene(seed: u32) -> (Vec<Surface>, Vec<Brdf>, Vec<Light>) {
     let lights = vec![
         Light::Directional { direction, irradiance: at(3.0, 2.9, 2.7) },
         Light::Point { position: at(0.5, 2.5, -1.0), intensity: DVec3::splat(4.0), radius: 0.01 },
-        Light::Sky { irradiance: at(0.3, 0.4, 0.6), constant: 0.1 },
+        Light::even_sky(at(0.3, 0.4, 0.6), 0.1),
     ];
     (surfaces, brdfs, lights)
 }

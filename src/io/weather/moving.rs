@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::model::animated::{AnimatedParticles, Animation};
 use crate::model::cloud::{MIN_ASPECT, Particle, Shape, mass};
 use crate::model::weather::particles::{Layout, SPREAD, WeatherBlob};
+use crate::model::weather::places::GREATEST_WIDTH;
 use crate::model::weather::steps::between;
 
 /// Factor by which heights of steps that were not read may exceed those of the steps that were.
@@ -115,7 +116,7 @@ impl Bounds {
         Bounds {
             low: shape * (low - more),
             high: shape * (high + more),
-            sigma: SPREAD * widest,
+            sigma: SPREAD * GREATEST_WIDTH * widest,
             sigma_y: even(MORE_HEIGHT * stretch * thickest),
         }
     }

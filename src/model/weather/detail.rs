@@ -19,7 +19,7 @@ const FRAY: f64 = 0.35;
 /// Least extinction over the mean that counts there.
 const THINNEST: f64 = 0.25;
 /// Standard deviation of the displacement with `detail` = 1, cells.
-const SHIFT: f64 = 0.5;
+const SHIFT: f64 = 0.57;
 /// Most cells in height of one unit of the modulation, so that the detail of flat cells is not
 /// flat, too.
 const FLATTEST: f64 = 4.0;
@@ -42,22 +42,25 @@ pub struct Detail {
 /// Returns which column around its own a blob comes to, eastward and southward from 0 to 2 with 1
 /// for its own, and where it is there. `even`: its place in its own column, from −½ to ½, if
 /// extinction were even; `shift` in columns; `is_open` tells which columns it may enter. It is
-/// turned back at the face of another.
+/// turned back at the face of another. It enters a column across a corner if those on both sides are
+/// open, too; if that across is not, it is turned about the corner. So it never moves by a step.
 fn displaced(
     even: [f64; 2],
     shift: [f64; 2],
     is_open: impl Fn(usize, usize) -> bool,
 ) -> ([usize; 2], [f64; 2]) {
-    let to = [0, 1].map(|k| (even[k] + shift[k]).clamp(-1.49, 1.49));
-    let [x, z] = to.map(|v| if v < -0.5 { 0 } else { 1 + usize::from(v > 0.5) });
-    let column = if is_open(x, z) {
-        [x, z]
-    } else if is_open(x, 1) {
-        [x, 1]
-    } else if is_open(1, z) {
-        [1, z]
-    } else {
-        [1, 1]
+    let mut to = [0, 1].map(|k| (even[k] + shift[k]).clamp(-1.49, 1.49));
+    let column_at = |to: [f64; 2]| to.map(|v| if v < -0.5 { 0 } else { 1 + usize::from(v > 0.5) });
+    let [x, z] = column_at(to);
+    let column = match (is_open(x, 1), is_open(1, z)) {
+        (true, true) if is_open(x, z) => [x, z],
+        (true, true) => {
+            to = about_corner(to);
+            column_at(to)
+        }
+        (true, false) => [x, 1],
+        (false, true) => [1, z],
+        (false, false) => [1, 1],
     };
     let within = [0, 1].map(|k| match (column[k], to[k]) {
         // Turned back at the face.
@@ -65,6 +68,15 @@ fn displaced(
         (of, v) => v + 1.0 - of as f64,
     });
     (column, within)
+}
+
+/// Turns a place beyond a corner of its column about that corner: the quarter beyond it is spread
+/// over the three others, and its edges stay.
+fn about_corner(to: [f64; 2]) -> [f64; 2] {
+    let beyond = to.map(|v| v.abs() - 0.5);
+    let (radius, angle) = (beyond[0].hypot(beyond[1]), -3.0 * beyond[1].atan2(beyond[0]));
+    let turned = [angle.cos(), angle.sin()].map(|part| 0.5 + radius.min(0.99) * part);
+    [to[0].signum() * turned[0], to[1].signum() * turned[1]]
 }
 
 impl Detail {
@@ -97,14 +109,24 @@ impl Detail {
             // Rows run north, and z points south.
             let to = i_cell + east + nx - 1 - nx * south;
             let [x, z] = layout.course(to).across.place(within);
-            let room = layout.size_in_cell(grid, i_cell).room;
+            let room = layout.size(grid, places[i]).room;
             let column = to % n_columns;
             // Toward an open column a blob comes up to the face, so that it crosses without a step.
-            let open = layout.open(column);
-            let range =
-                |size: f64, room: f64, bit: u32| if open >> bit & 1 == 1 { size } else { room };
-            let east = range(ground.dx_m[column], room.x, if x < 0.0 { 1 } else { 7 });
-            let south = range(ground.dy_m[column], room.z, if z < 0.0 { 3 } else { 5 });
+            let is_open = |column: usize, to: u32| layout.open(column) >> to & 1 == 1;
+            let (to_x, beside_x) =
+                if x < 0.0 { (1, column.wrapping_sub(1)) } else { (7, column + 1) };
+            let (to_z, beside_z) =
+                if z < 0.0 { (3, column + nx) } else { (5, column.wrapping_sub(nx)) };
+            // Where two columns meet a blob has the smaller of their extents along their face.
+            let extent =
+                |size: f64, room: f64, to: u32, (to_side, beside, lean): (u32, usize, f64)| {
+                    let of = |column: usize| if is_open(column, to) { size } else { room };
+                    let meets = is_open(column, to_side);
+                    let least = if meets { of(column).min(of(beside)) } else { of(column) };
+                    of(column) + (least - of(column)) * 2.0 * lean.abs()
+                };
+            let east = extent(ground.dx_m[column], room.x, to_x, (to_z, beside_z, z));
+            let south = extent(ground.dy_m[column], room.z, to_z, (to_x, beside_x, x));
             let place = [ground.east_m[column] + east * x, ground.south_m[column] + south * z];
             Effect { weight, place }
         };
@@ -259,8 +281,24 @@ mod tests {
         assert!(is(of(&[[2, 1]], [0.3, 0.0]), [2, 1], [-0.3, 0.25]));
         // Into the corner: the column beside is open, that of the corner is not.
         assert!(is(of(&[[2, 1]], [0.3, 0.5]), [2, 1], [-0.3, 0.25]));
-        assert!(is(of(&[[2, 2]], [0.3, 0.5]), [2, 2], [-0.3, -0.25]));
+        // Across the corner alone none is open.
+        assert!(is(of(&[[2, 2]], [0.3, 0.5]), [1, 1], [0.3, 0.25]));
+        assert!(is(of(&[[2, 1], [1, 2], [2, 2]], [0.3, 0.5]), [2, 2], [-0.3, -0.25]));
         assert!(is(of(&[[1, 2]], [0.3, 0.5]), [1, 2], [0.3, -0.25]));
+        // Around a closed corner of two open columns it goes without a step, through its own.
+        let sides = [[2, 1], [1, 2]];
+        let around = |step: i32| {
+            let angle = f64::from(step) * 0.01 - 0.2;
+            let at =
+                |([x, z], [u, v]): ([usize; 2], [f64; 2])| [x as f64 - 1.0 + u, z as f64 - 1.0 + v];
+            at(of(&sides, [0.1 + 0.3 * angle.cos(), 0.25 + 0.3 * angle.sin()]))
+        };
+        for step in 0..200 {
+            let (a, b) = (around(step), around(step + 1));
+            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 0.02, "{step}: {a:?} {b:?}");
+            assert!(a[0] < 0.5 + 1e-9 || a[1] < 0.5 + 1e-9, "{a:?}");
+        }
+        assert!(is(of(&sides, [0.3, 0.45]), [1, 1], [0.3, 0.3]));
         // No blob comes farther than the next column.
         assert!(is(of(&[], [-0.8, -0.7]), [1, 1], [-0.4, -0.45]));
         assert!(is(of(&[[2, 1]], [9.0, 0.0]), [2, 1], [0.49, 0.25]));

@@ -11,6 +11,7 @@ pub mod detail;
 pub mod diagnosed;
 pub mod extinction;
 pub mod grid;
+mod hidden;
 pub mod interval;
 mod opaque;
 pub mod particles;

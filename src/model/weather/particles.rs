@@ -6,6 +6,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::grid::{Grid, Shape};
+use super::hidden::depths_around;
 use super::opaque::open_columns;
 use super::places::CellSeed;
 use super::profile::{Plane, Profile};
@@ -18,7 +19,7 @@ pub const THIN: f64 = 1e-3;
 pub const AFFORDED: usize = 10;
 /// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other,
 /// narrower ones leave gaps (errors: model.md §15).
-pub const SPREAD: f64 = 0.45;
+pub const SPREAD: f64 = 0.40;
 /// σ of a uniform distribution over a length of 1: 1/√12.
 const EVEN: f64 = 0.288_675_134_594_812_9;
 /// Variance across that blobs of a cell among equal ones have more than an even cell, over the
@@ -65,6 +66,8 @@ pub struct Place {
 pub struct Layout {
     seed: u32,
     n_blobs: Vec<u32>,
+    /// For every cell the sum of the squares of its blobs' widths.
+    areas: Vec<f64>,
     /// For every cell with blobs, how its extinction runs.
     courses: Vec<Course>,
     /// For every cell the cell whose blobs hold its mass; itself if it has blobs.
@@ -80,12 +83,14 @@ impl Layout {
     /// greatest weight in any of them.
     pub fn new(grid: &Grid, moments: &[&[f64]], n: usize, seed: u32) -> Self {
         let depths = greatest_depths(grid, moments);
-        let n_blobs = allocate(grid, &depths, n);
+        let n_blobs = allocate(grid, &depths, &weights(grid, moments, &depths), n);
         let hosts = hosts(grid, &depths, &n_blobs);
         let mut ordered: Vec<(f64, Place)> = Vec::with_capacity(n);
-        for (i_cell, &n_here) in (0u32..).zip(&n_blobs) {
+        let mut areas = vec![0.0; n_blobs.len()];
+        for ((i_cell, &n_here), area) in (0u32..).zip(&n_blobs).zip(&mut areas) {
             if n_here > 0 {
                 let cell = CellSeed::new(seed, i_cell);
+                *area = (0..n_here).map(|number| cell.width(number, n_here).powi(2)).sum();
                 ordered.extend(
                     (0..n_here)
                         .map(|number| (cell.order(number, n_here), Place { i_cell, number })),
@@ -96,7 +101,7 @@ impl Layout {
         let places = ordered.into_iter().map(|(_, place)| place).collect();
         let courses = courses(grid, &depths, |i| n_blobs[i] > 0);
         let open = open_columns(grid.shape(), &depths);
-        Layout { seed, n_blobs, courses, hosts, open, places }
+        Layout { seed, n_blobs, areas, courses, hosts, open, places }
     }
 
     /// Returns all blobs in drawing order.
@@ -160,17 +165,27 @@ impl Layout {
     fn blob(&self, grid: &Grid, place: Place, mass_of_cell: f64) -> WeatherBlob {
         let i = place.i_cell as usize;
         let (i_column, ground) = (i % grid.shape().n_columns(), &grid.ground);
-        let SizeInCell { sigma_xy, sigma_z, room } = self.size_in_cell(grid, i);
+        let SizeInCell { sigma_xy, sigma_z, room } = self.size(grid, place);
         let middle =
             DVec3::new(ground.east_m[i_column], grid.middle_m(i), ground.south_m[i_column]);
         let position = middle + room * self.place_in_cell(place);
         let mut blob = WeatherBlob { position, sigma_xy, sigma_z, kappa: 1.0 };
-        blob.kappa = mass_of_cell / f64::from(self.n_blobs[i]) / blob.mass();
+        blob.kappa = mass_of_cell * self.share(place) / blob.mass();
         blob
     }
 
-    /// Returns the widths of a cell's blobs, and the room of their centres.
-    pub fn size_in_cell(&self, grid: &Grid, i: usize) -> SizeInCell {
+    fn width(&self, Place { i_cell, number }: Place) -> f64 {
+        CellSeed::new(self.seed, i_cell).width(number, self.n_blobs[i_cell as usize])
+    }
+
+    /// Returns the share of its cell's mass that a blob has: as its area's.
+    fn share(&self, place: Place) -> f64 {
+        self.width(place).powi(2) / self.areas[place.i_cell as usize]
+    }
+
+    /// Returns the widths of a blob, and the room of its centre.
+    pub fn size(&self, grid: &Grid, place: Place) -> SizeInCell {
+        let i = place.i_cell as usize;
         let (n, ground) = (f64::from(self.n_blobs[i]), &grid.ground);
         let i_column = i % grid.shape().n_columns();
         let (dx, dy, thickness) =
@@ -178,7 +193,7 @@ impl Layout {
         // Where the cells around are alike, blobs may reach into them: single ones would be a row
         // of balls.
         let across = (EVEN * EVEN + self.courses[i].evenness * REACH).sqrt();
-        let sigma_xy = (SPREAD * (dx * dy / n).sqrt()).min(across * dx.min(dy));
+        let sigma_xy = (SPREAD * self.width(place) * (dx * dy / n).sqrt()).min(across * dx.min(dy));
         let sigma_z = if n > 1.0 { THICKNESS } else { EVEN } * thickness;
         // Centres and widths together have this variance: the centres' range shrinks as blobs are
         // wider.
@@ -195,7 +210,7 @@ impl Layout {
     }
 }
 
-/// Widths of the blobs of a cell, and the extent of their centres.
+/// Widths of a blob, and the extent of its centre.
 #[derive(Debug, Clone, Copy)]
 pub struct SizeInCell {
     /// Standard deviation along x and z, m.
@@ -259,15 +274,32 @@ pub fn courses(grid: &Grid, depths: &[f64], has: impl Fn(usize) -> bool) -> Vec<
     (0..depths.len()).map(of).collect()
 }
 
-/// Returns the number of blobs of each cell. Columns get blobs by Σ 1 − e^{−τ}, and the cells of a
-/// column by rounding the running sum, so that thin cells share one.
-fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
+/// Least share of blobs that a cell has deep inside of a cloud.
+const LEAST_SEEN: f64 = 0.05;
+
+/// Returns the weight of every cell of greatest depth `depths`: 1 − e^{−τ}, but less by what the
+/// cells around it hide in the moment in which they hide least.
+fn weights(grid: &Grid, moments: &[&[f64]], depths: &[f64]) -> Vec<f64> {
+    let mut around = vec![f64::INFINITY; depths.len()];
+    for moment in moments {
+        let depths: Vec<f64> =
+            moment.iter().enumerate().map(|(i, beta)| beta * grid.thickness_m(i)).collect();
+        let now = depths_around(grid, &depths);
+        around.iter_mut().zip(now).for_each(|(least, now)| *least = least.min(now));
+    }
+    let seen = |around: f64| (-around).exp().max(LEAST_SEEN);
+    depths.iter().zip(around).map(|(depth, around)| -(-depth).exp_m1() * seen(around)).collect()
+}
+
+/// Returns the number of blobs of each cell. Columns get blobs by their cells' weights, and the
+/// cells of a column by rounding the running sum, so that cells of little weight share one.
+fn allocate(grid: &Grid, depths: &[f64], of_cells: &[f64], n: usize) -> Vec<u32> {
     let shape = grid.shape();
     let n_columns = shape.n_columns();
     let mut weights = vec![0.0; n_columns];
     let mut of_columns = vec![0.0; n_columns];
     for (i, depth) in depths.iter().enumerate() {
-        weights[i % n_columns] += -(-depth).exp_m1();
+        weights[i % n_columns] += of_cells[i];
         of_columns[i % n_columns] += depth;
     }
     let mut n_blobs = vec![0u32; depths.len()];
@@ -277,7 +309,7 @@ fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
         let (mut sum, mut n_before) = (0.0, 0);
         for k in 0..shape.nz {
             let i = shape.cell(k, i_column);
-            sum += -(-depths[i]).exp_m1();
+            sum += of_cells[i];
             // The last sum equals the weight to the bit.
             let n_until = if n_column == 0 {
                 0

@@ -12,6 +12,14 @@ const STREAM: u32 = 0x7765_6174;
 /// effectiveness of quasirandom sequences" (2018).
 const PLANE_ROOT: f64 = 1.324_717_957_244_746;
 const LINE_ROOT: f64 = 1.618_033_988_749_895;
+/// Step of the widths of a cell's blobs: √2 − 1, which no step of the places repeats.
+const WIDTH_STEP: f64 = std::f64::consts::SQRT_2 - 1.0;
+/// Width of the widest of a cell's blobs, and of the narrowest its inverse, over the middle one.
+const WIDEST: f64 = 1.5;
+/// Root of the mean square of W^t for t from −1 to 1: √(sinh u/u) with u = 2 ln W.
+const MEAN_WIDTH: f64 = 1.055_112_306_602_911_8;
+/// Greatest width of a blob over the common one of its cell ([`CellSeed::width`]).
+pub const GREATEST_WIDTH: f64 = WIDEST / MEAN_WIDTH;
 
 /// Random numbers of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +42,18 @@ impl CellSeed {
         let steps = DVec3::new(1.0 / PLANE_ROOT, 1.0 / LINE_ROOT, 1.0 / (PLANE_ROOT * PLANE_ROOT));
         let at = self.shift + steps * (f64::from(number) + 1.0);
         at - at.floor() - 0.5
+    }
+
+    /// Returns the width of the `number`-th of `n` blobs over their common one. A blob alone has 1;
+    /// of many, the logarithms are spread evenly, and the squares are 1 in the mean.
+    pub fn width(self, number: u32, n: u32) -> f64 {
+        if n == 1 {
+            return 1.0;
+        }
+        // A sum of even numbers, less its whole part, is even and independent of each of them.
+        let shift = self.shift.element_sum();
+        let even = (shift + f64::from(number) * WIDTH_STEP).fract();
+        WIDEST.powf(2.0 * even - 1.0) / MEAN_WIDTH
     }
 
     /// Returns the position of the `number`-th of `n` blobs in the drawing order, in [0, 1). Any
@@ -62,6 +82,26 @@ mod tests {
         assert!(plane.iter().chain(&line).all(|n| (7..=13).contains(n)), "{plane:?} {line:?}");
         assert_ne!(CellSeed::new(7, 4), cell);
         assert_ne!(CellSeed::new(8, 3), cell);
+    }
+
+    #[test]
+    fn widths_are_spread_and_keep_the_area() {
+        let cell = CellSeed::new(7, 3);
+        assert_eq!(cell.width(0, 1), 1.0);
+        let widths: Vec<f64> = (0..400).map(|number| cell.width(number, 400)).collect();
+        let least = GREATEST_WIDTH / (WIDEST * WIDEST);
+        assert!(widths.iter().all(|w| (least..=GREATEST_WIDTH).contains(w)));
+        // As many in each quarter of the logarithms.
+        for quarter in 0..4 {
+            let part = |q: i32| least * WIDEST.powf(0.5 * f64::from(q));
+            let range = part(quarter)..part(quarter + 1);
+            let n = widths.iter().filter(|w| range.contains(w)).count();
+            assert!((96..=104).contains(&n), "{n}");
+        }
+        let area = widths.iter().map(|w| w * w).sum::<f64>() / 400.0;
+        assert!((area - 1.0).abs() < 5e-3, "{area}");
+        let u = 2.0 * WIDEST.ln();
+        assert!((MEAN_WIDTH - (u.sinh() / u).sqrt()).abs() < 1e-15);
     }
 
     #[test]

@@ -1,0 +1,69 @@
+//! How deep in a cloud cells lie: what nobody sees needs few blobs (model.md §15).
+
+use super::grid::{Grid, Shape};
+
+/// Vertical optical depth below which a cell hides nothing.
+const CLEAR: f64 = 1e-2;
+
+/// Returns the optical depth of cloud around every cell of vertical depths `depths`: the least along
+/// the six directions of the axes, up to a clear cell or the end of the domain. The cell's own does
+/// not count.
+pub fn depths_around(grid: &Grid, depths: &[f64]) -> Vec<f64> {
+    let Shape { nx, ny, nz } = grid.shape();
+    let (n_columns, ground) = (grid.shape().n_columns(), &grid.ground);
+    let mut around = vec![f64::INFINITY; depths.len()];
+    let mut along = |cells: &mut dyn Iterator<Item = usize>, widths: Option<&[f64]>| {
+        let mut before = 0.0;
+        for i in cells {
+            around[i] = around[i].min(before);
+            let across = widths.map_or(1.0, |widths| widths[i % n_columns] / grid.thickness_m(i));
+            before = if depths[i] < CLEAR { 0.0 } else { before + depths[i] * across };
+        }
+    };
+    for column in 0..n_columns {
+        along(&mut (0..nz).map(|k| column + n_columns * k), None);
+        along(&mut (0..nz).rev().map(|k| column + n_columns * k), None);
+    }
+    for k in 0..nz {
+        let level = n_columns * k;
+        for y in 0..ny {
+            along(&mut (0..nx).map(|x| level + nx * y + x), Some(&ground.dx_m));
+            along(&mut (0..nx).rev().map(|x| level + nx * y + x), Some(&ground.dx_m));
+        }
+        for x in 0..nx {
+            along(&mut (0..ny).map(|y| level + nx * y + x), Some(&ground.dy_m));
+            along(&mut (0..ny).rev().map(|y| level + nx * y + x), Some(&ground.dy_m));
+        }
+    }
+    around
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::weather::grid::Ground;
+
+    #[test]
+    fn depths_end_at_clear_cells() {
+        // Cells of 100 x 100 x 50 m: five levels of 5 x 5 columns.
+        let shape = Shape { nx: 5, ny: 5, nz: 5 };
+        let ones = vec![1.0; 25];
+        let ground = Ground::new(shape, (100.0, 100.0), (&ones, &ones), false).unwrap();
+        let heights = (0..150).map(|i| 50.0 * f64::from(i / 25)).collect();
+        let grid = Grid::new(ground, heights).unwrap();
+        let cell = |x: usize, y: usize, k: usize| x + 5 * y + 25 * k;
+        // A depth of 2 upward is one of 4 across.
+        let mut depths = vec![2.0; 125];
+        let around = depths_around(&grid, &depths);
+        assert_eq!([cell(2, 2, 4), cell(0, 2, 2)].map(|i| around[i]), [0.0; 2]);
+        assert_eq!(
+            [cell(2, 2, 3), cell(1, 1, 2), cell(2, 2, 2)].map(|i| around[i]),
+            [2.0, 4.0, 4.0]
+        );
+        // A clear cell beside the middle one opens it, whatever lies beyond.
+        depths[cell(3, 2, 2)] = 0.0;
+        let around = depths_around(&grid, &depths);
+        assert_eq!([cell(2, 2, 2), cell(4, 2, 2), cell(3, 2, 3)].map(|i| around[i]), [0.0; 3]);
+        assert_eq!(around[cell(1, 2, 2)], 4.0);
+    }
+}

@@ -4,11 +4,28 @@ use super::grid::{Grid, Shape};
 
 /// Vertical optical depth below which a cell hides nothing.
 const CLEAR: f64 = 1e-2;
+/// Least weight of an opaque cell deep inside of a cloud.
+const LEAST_SEEN: f64 = 0.05;
 
-/// Returns the optical depth of cloud around every cell of vertical depths `depths`: the least along
+/// Returns the weight of every cell by which it gets blobs: 1 − e^{−τ} of its greatest depth
+/// `depths`, times the share of light that the cells around let through in the moment in which they
+/// hide it least.
+pub fn weights(grid: &Grid, moments: &[&[f64]], depths: &[f64]) -> Vec<f64> {
+    let mut around = vec![f64::INFINITY; depths.len()];
+    for moment in moments {
+        let depths: Vec<f64> =
+            moment.iter().enumerate().map(|(i, beta)| beta * grid.thickness_m(i)).collect();
+        let now = depths_around(grid, &depths);
+        around.iter_mut().zip(now).for_each(|(least, now)| *least = least.min(now));
+    }
+    let seen = |around: f64| (-around).exp().max(LEAST_SEEN);
+    depths.iter().zip(around).map(|(depth, around)| -(-depth).exp_m1() * seen(around)).collect()
+}
+
+/// Returns the optical depth of cloud around every cell of vertical depths `depths`: the least of
 /// the six directions of the axes, up to a clear cell or the end of the domain. The cell's own does
 /// not count.
-pub fn depths_around(grid: &Grid, depths: &[f64]) -> Vec<f64> {
+fn depths_around(grid: &Grid, depths: &[f64]) -> Vec<f64> {
     let Shape { nx, ny, nz } = grid.shape();
     let (n_columns, ground) = (grid.shape().n_columns(), &grid.ground);
     let mut around = vec![f64::INFINITY; depths.len()];

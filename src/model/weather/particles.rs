@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 use super::grid::{Grid, Shape};
-use super::hidden::depths_around;
+use super::hidden::weights;
 use super::opaque::open_columns;
 use super::places::CellSeed;
 use super::profile::{Plane, Profile};
@@ -272,23 +272,6 @@ pub fn courses(grid: &Grid, depths: &[f64], has: impl Fn(usize) -> bool) -> Vec<
         Course { across, upward: Profile::between(below, extinction(i), above), evenness }
     };
     (0..depths.len()).map(of).collect()
-}
-
-/// Least share of blobs that a cell has deep inside of a cloud.
-const LEAST_SEEN: f64 = 0.05;
-
-/// Returns the weight of every cell of greatest depth `depths`: 1 − e^{−τ}, but less by what the
-/// cells around it hide in the moment in which they hide least.
-fn weights(grid: &Grid, moments: &[&[f64]], depths: &[f64]) -> Vec<f64> {
-    let mut around = vec![f64::INFINITY; depths.len()];
-    for moment in moments {
-        let depths: Vec<f64> =
-            moment.iter().enumerate().map(|(i, beta)| beta * grid.thickness_m(i)).collect();
-        let now = depths_around(grid, &depths);
-        around.iter_mut().zip(now).for_each(|(least, now)| *least = least.min(now));
-    }
-    let seen = |around: f64| (-around).exp().max(LEAST_SEEN);
-    depths.iter().zip(around).map(|(depth, around)| -(-depth).exp_m1() * seen(around)).collect()
 }
 
 /// Returns the number of blobs of each cell. Columns get blobs by their cells' weights, and the

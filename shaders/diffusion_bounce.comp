@@ -65,6 +65,8 @@ vec3 sent_along(int c, vec3 w) {
            + w.z * sent_at(4 * c + 3).rgb;
 }
 
+// Sums over directions keep its flux.
+#define OUTSIDE(radiance) (radiance)
 #include "ways.glsl"
 
 void main() {

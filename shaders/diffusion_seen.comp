@@ -71,6 +71,7 @@ vec3 sent_along(int c, vec3 w) {
 
 float extinction_of(int c) { return arrived_at(4 * c).w; }
 
+#define OUTSIDE(radiance) max(radiance, vec3(0.0))
 #include "ways.glsl"
 
 void main() {
@@ -84,8 +85,7 @@ void main() {
         // A cell at the eye's height has the horizon behind it: light must not jump there.
         float above = clamp(0.5 - to_eye.y / edges.y, 0.0, 1.0);
         vec3 own = sent_along(int(c), w);
-        // A tilted sky may be below 0 opposite of a low sun.
-        vec3 behind = max(radiance_along(level, at, w, above, skies), vec3(0.0));
+        vec3 behind = radiance_along(level, at, w, above, skies);
         vec3 all = push.weakened * own + (1.0 - push.weakened) * behind;
         seen[c] = vec4(INV_FOUR_PI * all, extinction_of(int(c)));
     }

@@ -1,6 +1,7 @@
 // Straight ways through the cells, which are even inside (model.md §18). Needs faces.glsl,
 // sky.glsl, medium.glsl, push.grid and push.weakened. Of each cell it needs extinction_of(c), and
-// sent_along(c, w): 4 pi times what it sends out along w.
+// sent_along(c, w): 4 pi times what it sends out along w. OUTSIDE(l) is what a bounce or an eye
+// takes of the sky's radiance l, which is below 0 high up under a low sun.
 
 // Returns the share of light that passes a depth, by channel where channels differ.
 #if N_SETS == 1
@@ -43,7 +44,7 @@ vec3 radiance_along(Level level, ivec3 at, vec3 w, float above, Skies skies) {
             c += stride[axis];
         }
     }
-    vec3 outside = sky_along(skies, -w, above);
+    vec3 outside = OUTSIDE(sky_along(skies, -w, above));
     outside += of_solids(at, axis, turn[axis] > 0 ? 1u : 0u);
     return sum + 4.0 * passed * outside;
 }

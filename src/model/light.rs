@@ -46,7 +46,7 @@ pub enum Light {
         irradiance: DVec3,
         /// Share of E that arrives whatever the normal and the clouds.
         constant: f64,
-        /// Where it is brighter and darker. Diffuse light in clouds knows it.
+        /// Where it is brighter and darker, for the light of mode "diffusion".
         tilt: Tilt,
     },
 }

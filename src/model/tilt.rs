@@ -20,17 +20,17 @@ impl Tilt {
     /// The same radiance from all of the upper directions.
     pub const EVEN: Tilt = Tilt { along: [DVec3::ZERO; 3] };
 
-    /// Returns the tilt of a sky that lights planes across the horizon with the irradiances
-    /// `toward` and `away` if they face the unit vector `level` and its opposite, and with `mean`
-    /// as a mean over the azimuths. All are shares of the irradiance of a level plane.
+    /// Returns the tilt of a sky whose light on walls is `mean` as a mean over the azimuths. A wall
+    /// that faces the unit vector `level` has as much more than its opposite as `toward` is more
+    /// than `away`. All are irradiances over that of a level plane.
     pub fn of_walls(level: DVec3, [toward, away, mean]: [DVec3; 3]) -> Tilt {
         let across = 1.5 * (toward - away);
         let up = (mean - 0.5) / (MEAN_UP / PI - 0.5 * MEAN_UP);
         Tilt { along: [across * level.x, up, across * level.z] }
     }
 
-    /// Returns π times the radiance from an upward unit direction over E. Opposite of a low sun it
-    /// may be below 0.
+    /// Returns π times the radiance from an upward unit direction over E. High up under a
+    /// low sun it may be below 0.
     pub fn radiance(&self, direction: DVec3) -> DVec3 {
         let [x, y, z] = self.along;
         1.0 + x * direction.x + y * (direction.y - MEAN_UP) + z * direction.z
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn walls_have_the_light_that_the_tilt_was_made_of() {
+    fn walls_have_the_mean_and_the_difference_that_the_tilt_was_made_of() {
         let level = DVec3::new(0.6, 0.0, -0.8);
         let [toward, away] = [DVec3::new(0.9, 0.7, 0.5), DVec3::new(0.4, 0.5, 0.5)];
         let mean = DVec3::new(0.62, 0.58, 0.5);

@@ -262,7 +262,7 @@ pub const FAULTS: &[Fault] = &[
     (
         "a bounce has no light of the sky",
         "include/ways.glsl",
-        "vec3 outside = sky_along(skies, -w, above);",
+        "vec3 outside = OUTSIDE(sky_along(skies, -w, above));",
         "vec3 outside = vec3(0.0);",
         "scattering/furnace",
     ),

@@ -256,7 +256,8 @@ fn blobs_lie_in_their_cells_and_a_first_part_stands_for_all() {
     let squares: f64 = blobs.iter().map(|b| b.mass().powi(2)).sum();
     let scatter = (0.1 * 0.9 * squares).sqrt();
     assert!((tenth - 0.1 * whole).abs() < 3.0 * scatter, "{tenth} {whole} {scatter}");
-    assert!(scatter < 0.01 * whole, "{scatter} {whole}");
+    println!("a tenth scatters by {:.4} of the whole", scatter / whole);
+    assert!(scatter < 0.006 * whole, "{scatter} {whole}");
     // Deep inside, single blobs have much of the mass: the centres are some 10 km from all of it.
     let off = 3.0 * 10e3 * scatter / (0.1 * whole);
     assert!((centre - centre_of_tenth).length() < off, "{centre} {centre_of_tenth} {off}");

@@ -1,6 +1,7 @@
 //! Particles of a weather file at any time, interpolated between steps that are near enough
 //! (model.md §15 "Time").
 
+use std::f64::consts::SQRT_2;
 use std::fmt;
 use std::sync::Arc;
 
@@ -111,12 +112,12 @@ impl Bounds {
         let more = DVec3::Y * (MORE_HEIGHT - 1.0) * (high.y - low.y);
         let shape = DVec3::new(1.0, stretch, 1.0);
         // A blob is no higher than a uniform density over its cell, whose σ is 1/√12 of the size,
-        // and no wider than a single one among equal cells.
+        // and no wider than a single one among equal cells, or the wider one of two.
         let even = |size: f64| size / 12f64.sqrt();
         Bounds {
             low: shape * (low - more),
             high: shape * (high + more),
-            sigma: SPREAD * GREATEST_WIDTH * widest,
+            sigma: SPREAD * (GREATEST_WIDTH / SQRT_2).max(1.0) * widest,
             sigma_y: even(MORE_HEIGHT * stretch * thickest),
         }
     }

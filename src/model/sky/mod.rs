@@ -125,8 +125,8 @@ impl Sky {
         self.irradiance
     }
 
-    /// Returns where the sky is brighter and darker, as a plane over the directions: walls toward
-    /// the sun and away from it have the sky's irradiance.
+    /// Returns where the sky is brighter and darker, as a plane over the directions. Walls have the
+    /// sky's irradiance in the mean, and the difference between toward the sun and away from it.
     pub fn tilt(&self) -> Tilt {
         self.tilt
     }

@@ -42,8 +42,9 @@ pub struct Detail {
 /// Returns which column around its own a blob comes to, eastward and southward from 0 to 2 with 1
 /// for its own, and where it is there. `even`: its place in its own column, from −½ to ½, if
 /// extinction were even; `shift` in columns; `is_open` tells which columns it may enter. It is
-/// turned back at the face of another. It enters a column across a corner if those on both sides
-/// are open, too; if that across is not, it is turned about the corner. So no shift makes it jump.
+/// turned back at the face of another. It enters a column across a corner only if those on both
+/// sides are open, too. If those are open and that across is not, it is turned about the corner
+/// into one of the three others. So a shift that changes evenly moves it evenly.
 fn displaced(
     even: [f64; 2],
     shift: [f64; 2],

@@ -1,4 +1,5 @@
-//! How deep in a cloud cells lie: what nobody sees needs few blobs (model.md §15).
+//! Weights by which cells get blobs: cells inside of a cloud, which nobody sees, get few (model.md
+//! §15).
 
 use super::grid::{Grid, Shape};
 
@@ -59,6 +60,30 @@ fn depths_around(grid: &Grid, depths: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::model::weather::grid::Ground;
+
+    #[test]
+    fn hidden_cells_have_a_twentieth_of_the_weight() {
+        // A row of three cells of 100 x 100 x 50 m, five rows wide and five levels high.
+        let shape = Shape { nx: 3, ny: 5, nz: 5 };
+        let ones = vec![1.0; 15];
+        let ground = Ground::new(shape, (100.0, 100.0), (&ones, &ones), false).unwrap();
+        let heights = (0..90).map(|i| 50.0 * f64::from(i / 15)).collect();
+        let grid = Grid::new(ground, heights).unwrap();
+        // Depths of 5 upward and 10 across, but in one moment the cell west of the middle is clear.
+        let (middle, west) = (1 + 3 * 2 + 15 * 2, 3 * 2 + 15 * 2);
+        let all = vec![0.1; 75];
+        let mut opened = all.clone();
+        opened[west] = 0.0;
+        let depths = vec![5.0; 75];
+        let opaque = 1.0 - (-5f64).exp();
+        let of = |moments: &[&[f64]]| weights(&grid, moments, &depths)[middle];
+        assert!((of(&[&all]) - 0.05 * opaque).abs() < 1e-15);
+        assert!((of(&[&all, &opened]) - opaque).abs() < 1e-15);
+        // Thin cells hide as much as they are deep: 0.2 across.
+        let thin = vec![2e-3; 75];
+        let found = weights(&grid, &[&thin], &[0.1; 75])[middle];
+        assert!((found - (1.0 - (-0.1f64).exp()) * (-0.2f64).exp()).abs() < 1e-15, "{found}");
+    }
 
     #[test]
     fn depths_end_at_clear_cells() {

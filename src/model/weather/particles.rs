@@ -79,8 +79,8 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Distributes `n` blobs by 1 − e^{−τ} of the cells. With several moments, each cell has its
-    /// greatest weight in any of them.
+    /// Distributes `n` blobs by the cells' weights ([`hidden`](super::hidden)). Of several moments
+    /// the greatest depth of a cell counts, and the least depth around it.
     pub fn new(grid: &Grid, moments: &[&[f64]], n: usize, seed: u32) -> Self {
         let depths = greatest_depths(grid, moments);
         let n_blobs = allocate(grid, &depths, &weights(grid, moments, &depths), n);

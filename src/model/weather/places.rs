@@ -45,12 +45,12 @@ impl CellSeed {
     }
 
     /// Returns the width of the `number`-th of `n` blobs over their common one. A blob alone has 1;
-    /// of many, the logarithms are spread evenly, and the squares are 1 in the mean.
+    /// of many, the logarithms are spread evenly, and the squares are 1 in the mean over cells.
     pub fn width(self, number: u32, n: u32) -> f64 {
         if n == 1 {
             return 1.0;
         }
-        // A sum of even numbers, less its whole part, is even and independent of each of them.
+        // The sum of uniform numbers modulo 1 is uniform, and independent of each of them.
         let shift = self.shift.element_sum();
         let even = (shift + f64::from(number) * WIDTH_STEP).fract();
         WIDEST.powf(2.0 * even - 1.0) / MEAN_WIDTH

@@ -70,7 +70,7 @@ impl Bounces<'_> {
             let mut sum = [DVec3::ZERO; 4];
             for d in all {
                 let above = if d.y > 0.0 { 1.0 } else { 0.0 };
-                let l = ways.radiance(c, (d, above), |k| sent(k, d)) / all.len() as f64;
+                let l = ways.radiance(c, (d, above), |sky| sky, |k| sent(k, d)) / all.len() as f64;
                 let add = [l, -l * d.x, -l * d.y, -l * d.z];
                 sum.iter_mut().zip(add).for_each(|(sum, l)| *sum += l);
             }

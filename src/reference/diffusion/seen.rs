@@ -69,7 +69,7 @@ impl SeenCells {
             let to_eye = eye - grid.center(c);
             let w = to_eye.try_normalize().unwrap_or(UP);
             let above = (0.5 - to_eye.y / grid.edges().y).clamp(0.0, 1.0);
-            let behind = ways.radiance(c, (-w, above), |k| sent(k, w)).max(DVec3::ZERO);
+            let behind = ways.radiance(c, (-w, above), |sky| sky.max(DVec3::ZERO), |k| sent(k, w));
             let all = weakened * sent(c, w) + (DVec3::ONE - weakened) * behind;
             (all / (4.0 * PI), extinction[c])
         });

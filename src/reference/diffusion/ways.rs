@@ -28,11 +28,12 @@ impl<'a> Ways<'a> {
 
     /// Returns 4π times the radiance that comes to the middle of cell `c` from the direction
     /// `toward`, where cells send out `sent` along the way, times 4π. The share `above` of it comes
-    /// from above the horizon.
+    /// from above the horizon. Of the sky, `outside` is taken.
     pub fn radiance(
         &self,
         c: usize,
         (toward, above): (DVec3, f64),
+        outside: impl Fn(DVec3) -> DVec3,
         sent: impl Fn(usize) -> DVec3,
     ) -> DVec3 {
         let (n, edges) = (self.grid.n_cells.as_usizevec3(), self.grid.edges());
@@ -53,7 +54,8 @@ impl<'a> Ways<'a> {
             if at[k] == [0, n[k] - 1][side] {
                 let part = (DVec3::from(at.map(|i| i as f64)) + 0.5) / n.as_dvec3();
                 let of_solids = self.of_solids.map_or(DVec3::ZERO, |f| f.at(k, side, part));
-                return sum + 4.0 * passed * (of_solids + self.skies.along(toward, above));
+                let of_sky = outside(self.skies.along(toward, above));
+                return sum + 4.0 * passed * (of_solids + of_sky);
             }
             let stride = [1, n.x, n.x * n.y][k];
             (at[k], c) = match side {

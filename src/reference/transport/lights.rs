@@ -20,7 +20,7 @@ struct Sun {
 }
 
 /// The lights of a scene. A sky has the radiance E/π above and `constant` E/π all around. Under a
-/// clear sky E/π is that of its dome instead, in proportion.
+/// clear sky, that from above is multiplied by the dome's radiance over the dome's own E/π.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lights {
     suns: Vec<Sun>,

@@ -4,6 +4,7 @@
 #include "each.glsl"
 #include "light.glsl"
 #include "medium.glsl"
+#include "angle.glsl"
 
 // Computes the light that the facets of surfaces and ground send out for the clouds (model.md §18,
 // passes.md "diffusion").
@@ -22,6 +23,7 @@ READS(1, Light, lights)
 READS(2, float, depths)
 TEXELS(3, regions)
 #include "regions.glsl"
+#include "sky.glsl"
 WRITES(4, vec4, solids)
 
 void main() {
@@ -32,8 +34,11 @@ void main() {
             Light light = lights[l];
             float tau = depths[j * push.n_lights + l];
             float v = tau < BARRED_DEPTH ? through(vec3(push.backward * tau)).x : 0.0;
-            irradiance +=
-                light.energy * share_of(light, arrival_at(light, facet.position), facet.normal, v);
+            vec3 n = facet.normal;
+            irradiance += light.energy
+                          * (light.kind == LIGHT_SKY
+                                 ? share_of_sky(light, n, v)
+                                 : vec3(share_of(light, arrival_at(light, facet.position), n, v)));
         }
         solids[3u * j] = vec4(facet.position, facet.area);
         solids[3u * j + 1u] = vec4(facet.normal, 0.0);

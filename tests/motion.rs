@@ -118,16 +118,16 @@ fn weather(overrides: &[&str]) -> Scene {
 }
 
 /// Weather moves evenly, at the steps of a file, too, where all cells change their course. No frame
-/// changes the picture by more than twice as much as the mean one. At 30 s of the storm a
+/// changes the picture by more than half as much again as the mean one. At 30 s of the storm a
 /// second and 10 frames a second a frame changes 0.0122 of the picture's RMS at most and 0.0085 in
 /// the mean. Depths that are linear between steps make it 2.8 times as much just after a step.
 #[test]
 fn weather_moves_without_steps() {
-    // A wind takes invented detail through the clouds, which changes the picture more: by 0.042 in
-    // the mean and by up to 0.073 of these few, wide blobs. The limits have a fifth to a quarter to spare.
+    // A wind takes invented detail through the clouds, which changes the picture more: by 0.039 in
+    // the mean and by up to 0.057. The limits have a fifth to a quarter to spare.
     for (what, overrides, most) in [
         ("still detail", vec![], 0.015),
-        ("detail in a wind", vec!["cloud.0.detail_wind=[12,0,-5]"], 0.09),
+        ("detail in a wind", vec!["cloud.0.detail_wind=[12,0,-5]"], 0.07),
     ] {
         let scene = weather(&overrides);
         // The step is at frame 40.
@@ -140,6 +140,6 @@ fn weather_moves_without_steps() {
         println!("{what}: {changes:.5?}");
         let mean = changes.iter().sum::<f64>() / changes.len() as f64;
         let greatest = changes.iter().copied().fold(0.0, f64::max);
-        assert!(greatest < most && greatest < 2.0 * mean, "{what}: {greatest}, mean {mean}");
+        assert!(greatest < most && greatest < 1.5 * mean, "{what}: {greatest}, mean {mean}");
     }
 }

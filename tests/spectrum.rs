@@ -1,5 +1,5 @@
-//! Spectra of pictures of weather from above: the lattice of a file's cells does not show, and
-//! small things are as bright as in pictures of clouds (model.md §15).
+//! Spectra of pictures of weather from above: the lattice of a file's cells has no peak, and the
+//! power falls with the wave number between its squares and its power of 3.5 (model.md §15).
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -83,7 +83,8 @@ fn from_above(name: &str, middle: [f64; 2], width: f64, overrides: &[String]) ->
     ];
     all.extend_from_slice(overrides);
     let scene = scene_file::load(&path, &all, None).unwrap_or_else(|e| panic!("{e}")).scene;
-    let mut stage = Stage::new(scene, &DeviceChoice::default(), true).expect("a stage");
+    let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
+    let mut stage = Stage::new(scene, &choice, true).expect("a stage");
     stage.renderer.step(stage.game.step(0).expect("a packet")).expect("a frame");
     let bytes = stage.renderer.image_bytes().expect("bytes");
     let pixels: &[[f32; 4]] = bytemuck::cast_slice(&bytes);

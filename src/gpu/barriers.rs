@@ -149,7 +149,11 @@ impl Used {
 
     fn add(&mut self, scope: Scope) {
         match scope.writes() {
-            Accesses::NONE => self.reads = self.reads.and(scope),
+            Accesses::NONE => {
+                self.reads = self.reads.and(scope);
+                // No barrier has made anything wait for this read.
+                self.waiting = Stages::NONE;
+            }
             // Whatever waits for this write has waited for what came before it, too.
             _ => *self = Used { write: scope, ..Used::default() },
         }
@@ -242,4 +246,30 @@ pub(super) fn image_barrier(
     let dependency = vk::DependencyInfo::default().image_memory_barriers(&barrier);
     unsafe { device.cmd_pipeline_barrier2(commands, &dependency) };
     image.layout = to;
+}
+
+#[cfg(test)]
+mod tests {
+    use ash::vk::Handle;
+
+    use super::*;
+
+    const READ: Scope = Scope::new(Stages::COMPUTE_SHADER, Accesses::SHADER_STORAGE_READ);
+    const WRITE: Scope = Scope::new(Stages::COMPUTE_SHADER, Accesses::SHADER_STORAGE_WRITE);
+
+    #[test]
+    fn a_write_waits_for_reads_after_the_last_barrier() {
+        let [a, b] = [1, 2].map(vk::Buffer::from_raw);
+        let mut uses = Uses::default();
+        let mut needs = |coming: &[Use]| uses.add(coming).is_some();
+        assert!(!needs(&[(a, WRITE), (b, WRITE)]));
+        assert!(needs(&[(a, READ), (b, READ)]));
+        // The barrier before this write of b orders the reads of a so far, too.
+        assert!(needs(&[(a, READ), (b, WRITE)]));
+        // The same dispatch has read a again.
+        assert!(needs(&[(a, WRITE)]));
+        // A second read of what a barrier has shown needs none.
+        assert!(needs(&[(a, READ)]));
+        assert!(!needs(&[(a, READ)]));
+    }
 }

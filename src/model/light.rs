@@ -109,6 +109,17 @@ impl Light {
         }
     }
 
+    /// Returns the irradiance on a facet of normal `n`, with the tilt of a sky, which
+    /// [`Light::share`] leaves out.
+    pub fn irradiance(&self, n: DVec3, arrival: &Arrival, transmittance: f64) -> DVec3 {
+        match *self {
+            Light::Sky { irradiance, constant, tilt } => {
+                irradiance * (transmittance * tilt.irradiance(n) + constant)
+            }
+            _ => self.energy() * self.share(n, arrival, transmittance),
+        }
+    }
+
     /// Returns the light's energy, linear RGB: irradiance of directional lights and the sky,
     /// intensity of point and spot lights.
     pub fn energy(&self) -> DVec3 {

@@ -76,6 +76,7 @@ fn wrong_shaders_are_found() {
             "fallen[0] -= 0.5",
         ),
         ("evening", "diffusion", "include/sky.glsl", "of.tilt_x * mean.x", "of.tilt_x * mean.z"),
+        ("evening", "diffusion", "include/sky.glsl", "sky.tilt_x * mean.x", "sky.tilt_x * mean.z"),
         ("evening", "diffusion", "include/sky.glsl", "vec3(0.0, across, 0.0)", "vec3(0.0)"),
         ("evening", "diffusion", "include/sky.glsl", "1.0 - MEAN_UP * light", "1.0 - 0.6 * light"),
         ("evening", "bounces", "include/sky.glsl", "of.tilt_z * w.z", "-of.tilt_z * w.z"),

@@ -110,7 +110,7 @@ impl Sky {
     pub fn new(settings: SkySettings, toward_sun: DVec3) -> Result<Sky, String> {
         let dome = Dome::new(toward_sun, settings.turbidity, settings.albedo)?;
         let dome = Dome { scale: balanced(dome.scale), ..dome };
-        let irradiance = level_irradiance(&dome);
+        let irradiance = irradiance_on(&dome, UP);
         let tilt = tilt_of(&dome, irradiance);
         Ok(Sky { settings, dome, air: ClearAir::new(settings.turbidity), irradiance, tilt })
     }
@@ -154,19 +154,6 @@ const N_HEIGHTS: u32 = 128;
 
 fn azimuth(k: u32) -> (f64, f64) {
     ((f64::from(k) + 0.5) * TAU / f64::from(N_AZIMUTHS)).sin_cos()
-}
-
-/// Returns ∫ L n·up over the upper half of the directions.
-fn level_irradiance(dome: &Dome) -> DVec3 {
-    let at = |(i, k): (u32, u32)| {
-        // Uniform in the square of the sine of the elevation, of which π du is the projected angle.
-        let square = (f64::from(i) + 0.5) / f64::from(N_HEIGHTS);
-        let (up, across) = (square.sqrt(), (1.0 - square).sqrt());
-        let (sin, cos) = azimuth(k);
-        dome.radiance(DVec3::new(across * cos, up, across * sin))
-    };
-    let all = (0..N_HEIGHTS).flat_map(|i| (0..N_AZIMUTHS).map(move |k| (i, k)));
-    all.map(at).sum::<DVec3>() * (PI / f64::from(N_HEIGHTS * N_AZIMUTHS))
 }
 
 /// Returns ∫ L max(0, n·ω) over the upper half of the directions.

@@ -106,6 +106,31 @@ fn exaggerated_heights_count_as_they_are() {
     assert!((a.through - b.through).abs().max_element() < 1e-12);
 }
 
+/// The example of model.md §19: walls toward a low sun and away from it, in red light, and the share
+/// of directions from which the plane is below 0.
+#[test]
+fn a_plane_of_a_low_sun_is_too_dark_high_up_and_on_walls() {
+    let sky = Sky::new(SkySettings::of_turbidity(4.0), toward(10.0)).unwrap();
+    let walls = [DVec3::X, DVec3::NEG_X].map(|n| {
+        let dome = irradiance_on(&sky.dome, n) / sky.of_sky();
+        [dome.x, sky.tilt().irradiance(n).x]
+    });
+    let expected = [[2.22, 1.93], [0.59, 0.30]];
+    for (found, expected) in walls.as_flattened().iter().zip(expected.as_flattened()) {
+        assert!((found - expected).abs() < 5e-3, "{walls:?}");
+    }
+    let n = 100;
+    let is_below = |k: &u32| {
+        let up = (f64::from(k / n) + 0.5) / f64::from(n);
+        let (sin, cos) = (f64::from(k % n) * TAU / f64::from(n)).sin_cos();
+        let across = (1.0 - up * up).sqrt();
+        sky.tilt().radiance(DVec3::new(across * cos, up, across * sin)).x < 0.0
+    };
+    let share = (0..n * n).filter(is_below).count() as f64 / f64::from(n * n);
+    println!("{walls:?}, {share}");
+    assert!((0.2..0.3).contains(&share), "{share}");
+}
+
 #[test]
 fn the_tilt_lights_facets_as_the_dome() {
     // Facets in all directions; the irradiance is over that of a level plane.

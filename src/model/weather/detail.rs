@@ -44,7 +44,7 @@ pub struct Detail {
 /// extinction were even; `shift` in columns; `is_open` tells which columns it may enter. It is
 /// turned back at the face of another. It enters a column across a corner only if those on both
 /// sides are open, too. If those are open and that across is not, it is turned about the corner
-/// into one of the three others. So a shift that changes evenly moves it evenly.
+/// into one of the three others. So its place is continuous in the shift.
 fn displaced(
     even: [f64; 2],
     shift: [f64; 2],
@@ -72,7 +72,7 @@ fn displaced(
 }
 
 /// Turns a place beyond a corner of its column about that corner: the quarter beyond it is spread
-/// over the three others, and its edges stay.
+/// over the three others, and its edges stay. No place comes farther than the next column.
 fn about_corner(to: [f64; 2]) -> [f64; 2] {
     let beyond = to.map(|v| v.abs() - 0.5);
     let (radius, angle) = (beyond[0].hypot(beyond[1]), -3.0 * beyond[1].atan2(beyond[0]));

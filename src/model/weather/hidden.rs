@@ -8,9 +8,9 @@ const CLEAR: f64 = 1e-2;
 /// Least weight of an opaque cell deep inside of a cloud.
 const LEAST_SEEN: f64 = 0.05;
 
-/// Returns the weight of every cell by which it gets blobs: 1 − e^{−τ} of its greatest depth
-/// `depths`, times the share of light that the cells around let through in the moment in which they
-/// hide it least.
+/// Returns the weights by which cells get blobs: 1 − e^{−τ} of the greatest depth, `depths`, times
+/// the share of light that the cells around let through. Of several moments, that counts in which
+/// they hide a cell least.
 pub fn weights(grid: &Grid, moments: &[&[f64]], depths: &[f64]) -> Vec<f64> {
     let mut around = vec![f64::INFINITY; depths.len()];
     for moment in moments {
@@ -23,34 +23,35 @@ pub fn weights(grid: &Grid, moments: &[&[f64]], depths: &[f64]) -> Vec<f64> {
     depths.iter().zip(around).map(|(depth, around)| -(-depth).exp_m1() * seen(around)).collect()
 }
 
-/// Returns the optical depth of cloud around every cell of vertical depths `depths`: the least of
-/// the six directions of the axes, up to a clear cell or the end of the domain. The cell's own does
-/// not count.
+/// Returns the least optical depth around every cell along the six directions of the axes. It ends
+/// at a clear cell or at the end of the domain, and the cell's own depth does not count. `depths`:
+/// vertical depths.
 fn depths_around(grid: &Grid, depths: &[f64]) -> Vec<f64> {
     let Shape { nx, ny, nz } = grid.shape();
     let (n_columns, ground) = (grid.shape().n_columns(), &grid.ground);
     let mut around = vec![f64::INFINITY; depths.len()];
-    let mut along = |cells: &mut dyn Iterator<Item = usize>, widths: Option<&[f64]>| {
-        let mut before = 0.0;
-        for i in cells {
-            around[i] = around[i].min(before);
-            let across = widths.map_or(1.0, |widths| widths[i % n_columns] / grid.thickness_m(i));
-            before = if depths[i] < CLEAR { 0.0 } else { before + depths[i] * across };
+    // A line of `n` cells from `first` on, both ways. Where it is not upward, cells have `widths`.
+    let mut along = |first: usize, stride: usize, n: usize, widths: Option<&[f64]>| {
+        for is_back in [false, true] {
+            let mut before = 0.0;
+            for k in 0..n {
+                let i = first + stride * if is_back { n - 1 - k } else { k };
+                around[i] = around[i].min(before);
+                let across =
+                    widths.map_or(1.0, |widths| widths[i % n_columns] / grid.thickness_m(i));
+                before = if depths[i] < CLEAR { 0.0 } else { before + depths[i] * across };
+            }
         }
     };
     for column in 0..n_columns {
-        along(&mut (0..nz).map(|k| column + n_columns * k), None);
-        along(&mut (0..nz).rev().map(|k| column + n_columns * k), None);
+        along(column, n_columns, nz, None);
     }
-    for k in 0..nz {
-        let level = n_columns * k;
+    for level in (0..nz).map(|k| n_columns * k) {
         for y in 0..ny {
-            along(&mut (0..nx).map(|x| level + nx * y + x), Some(&ground.dx_m));
-            along(&mut (0..nx).rev().map(|x| level + nx * y + x), Some(&ground.dx_m));
+            along(level + nx * y, 1, nx, Some(&ground.dx_m));
         }
         for x in 0..nx {
-            along(&mut (0..ny).map(|y| level + nx * y + x), Some(&ground.dy_m));
-            along(&mut (0..ny).rev().map(|y| level + nx * y + x), Some(&ground.dy_m));
+            along(level + x, nx, ny, Some(&ground.dy_m));
         }
     }
     around
@@ -61,39 +62,40 @@ mod tests {
     use super::*;
     use crate::model::weather::grid::Ground;
 
+    /// Five levels of 5 x 5 columns: cells of 100 x 100 x 50 m.
+    fn cube() -> Grid {
+        let shape = Shape { nx: 5, ny: 5, nz: 5 };
+        let ones = vec![1.0; 25];
+        let ground = Ground::new(shape, (100.0, 100.0), (&ones, &ones), false).unwrap();
+        let heights = (0..150).map(|i| 50.0 * f64::from(i / 25)).collect();
+        Grid::new(ground, heights).unwrap()
+    }
+
+    fn cell(x: usize, y: usize, k: usize) -> usize {
+        x + 5 * y + 25 * k
+    }
+
     #[test]
     fn hidden_cells_have_a_twentieth_of_the_weight() {
-        // A row of three cells of 100 x 100 x 50 m, five rows wide and five levels high.
-        let shape = Shape { nx: 3, ny: 5, nz: 5 };
-        let ones = vec![1.0; 15];
-        let ground = Ground::new(shape, (100.0, 100.0), (&ones, &ones), false).unwrap();
-        let heights = (0..90).map(|i| 50.0 * f64::from(i / 15)).collect();
-        let grid = Grid::new(ground, heights).unwrap();
-        // Depths of 5 upward and 10 across, but in one moment the cell west of the middle is clear.
-        let (middle, west) = (1 + 3 * 2 + 15 * 2, 3 * 2 + 15 * 2);
-        let all = vec![0.1; 75];
+        let (grid, middle) = (cube(), cell(2, 2, 2));
+        // Cells are 5 deep upward and 10 across. In one moment that beside the middle is clear.
+        let all = vec![0.1; 125];
         let mut opened = all.clone();
-        opened[west] = 0.0;
-        let depths = vec![5.0; 75];
+        opened[cell(1, 2, 2)] = 0.0;
+        let depths = vec![5.0; 125];
         let opaque = 1.0 - (-5f64).exp();
         let of = |moments: &[&[f64]]| weights(&grid, moments, &depths)[middle];
         assert!((of(&[&all]) - 0.05 * opaque).abs() < 1e-15);
         assert!((of(&[&all, &opened]) - opaque).abs() < 1e-15);
-        // Thin cells hide as much as they are deep: 0.2 across.
-        let thin = vec![2e-3; 75];
-        let found = weights(&grid, &[&thin], &[0.1; 75])[middle];
+        // Thin cells hide as much as they are deep: two of 0.1 upward.
+        let thin = vec![2e-3; 125];
+        let found = weights(&grid, &[&thin], &[0.1; 125])[middle];
         assert!((found - (1.0 - (-0.1f64).exp()) * (-0.2f64).exp()).abs() < 1e-15, "{found}");
     }
 
     #[test]
     fn depths_end_at_clear_cells() {
-        // Cells of 100 x 100 x 50 m: five levels of 5 x 5 columns.
-        let shape = Shape { nx: 5, ny: 5, nz: 5 };
-        let ones = vec![1.0; 25];
-        let ground = Ground::new(shape, (100.0, 100.0), (&ones, &ones), false).unwrap();
-        let heights = (0..150).map(|i| 50.0 * f64::from(i / 25)).collect();
-        let grid = Grid::new(ground, heights).unwrap();
-        let cell = |x: usize, y: usize, k: usize| x + 5 * y + 25 * k;
+        let grid = cube();
         // A depth of 2 upward is one of 4 across.
         let mut depths = vec![2.0; 125];
         let around = depths_around(&grid, &depths);

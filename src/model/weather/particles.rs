@@ -68,7 +68,7 @@ pub struct Layout {
     n_blobs: Vec<u32>,
     /// For every cell the sum of the squares of its blobs' widths.
     areas: Vec<f64>,
-    /// For every cell with blobs, how its extinction runs.
+    /// For every cell, how its extinction runs.
     courses: Vec<Course>,
     /// For every cell the cell whose blobs hold its mass; itself if it has blobs.
     hosts: Vec<u32>,
@@ -99,7 +99,7 @@ impl Layout {
         }
         ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
         let places = ordered.into_iter().map(|(_, place)| place).collect();
-        let courses = courses(grid, &depths, |i| n_blobs[i] > 0);
+        let courses = courses(grid, &depths);
         let open = open_columns(grid.shape(), &depths);
         Layout { seed, n_blobs, areas, courses, hosts, open, places }
     }
@@ -244,13 +244,12 @@ impl Course {
     const EVEN: Course = Course { across: Plane::EVEN, upward: Profile::EVEN, evenness: 0.0 };
 }
 
-/// Returns how the extinction runs in cells of vertical optical depths `depths`, where `has` says
-/// that a cell's is needed.
-pub fn courses(grid: &Grid, depths: &[f64], has: impl Fn(usize) -> bool) -> Vec<Course> {
+/// Returns how the extinction runs in cells of vertical optical depths `depths`.
+pub fn courses(grid: &Grid, depths: &[f64]) -> Vec<Course> {
     let Shape { nx, ny, nz } = grid.shape();
     let extinction = |i: usize| depths[i] / grid.thickness_m(i);
     let of = |i: usize| {
-        if !has(i) {
+        if depths[i] <= 0.0 {
             return Course::EVEN;
         }
         let (i_column, k) = (i % (nx * ny), i / (nx * ny));

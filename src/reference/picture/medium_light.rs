@@ -9,7 +9,6 @@ use crate::model::parallel::parallel_map;
 use crate::model::scene::{DiffusionSettings, Scene};
 use crate::reference::diffusion::{BoxLight, DiffuseLight, DiffusionMedium, FaceLight, SeenCells};
 use crate::reference::facets::Facet;
-use crate::reference::first;
 use crate::reference::scatter::{self, BARRED};
 use crate::reference::transmit::{Obstacles, Receiver};
 
@@ -41,14 +40,18 @@ impl MediumLight {
         let facets = local.solid_facets();
         let receivers: Vec<Receiver> =
             facets.iter().map(|f| Receiver { position: f.position, i_region: f.region }).collect();
-        let (positions, normals): (Vec<DVec3>, Vec<DVec3>) =
-            facets.iter().map(|f| (f.position, f.normal)).unzip();
         let mut passed = obstacles.transmittance(&receivers, lights);
         let n_before = facets.len() - local.ground.len();
         local.hide_by_ground(&mut passed[n_before * lights.len()..], lights);
-        let arriving = first::irradiance(&positions, &normals, &passed, lights);
+        let arriving = facets.iter().enumerate().map(|(j, f)| {
+            let of = lights.iter().zip(&passed[j * lights.len()..]);
+            let at = |(light, v): (&Light, &f64)| {
+                light.irradiance(f.normal, &light.arrival(f.position), *v)
+            };
+            of.map(at).sum::<DVec3>()
+        });
         let kd = local.kd();
-        let radiosity = facets.iter().zip(&arriving).map(|(f, e)| kd[f.region as usize] * *e);
+        let radiosity = facets.iter().zip(arriving).map(|(f, e)| kd[f.region as usize] * e);
         let radiosity: Vec<DVec3> =
             radiosity.zip(local.solid_colors()).map(|(sent, color)| sent * color).collect();
         let lift = scene.longest_facet_edge();

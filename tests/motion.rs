@@ -120,7 +120,7 @@ fn weather(overrides: &[&str]) -> Scene {
 /// Weather moves evenly, at the steps of a file, too, where all cells change their course. No frame
 /// changes the picture by more than half as much again as the mean one. At 30 s of the storm a
 /// second and 10 frames a second a frame changes 0.0122 of the picture's RMS at most and 0.0085 in
-/// the mean. Depths that are linear between steps make it 2.8 times as much just after a step.
+/// the mean. With depths that are linear between steps, it was 2.8 times as much just after a step.
 #[test]
 fn weather_moves_without_steps() {
     // A wind takes invented detail through the clouds, which changes the picture more: by 0.039 in

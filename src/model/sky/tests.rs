@@ -106,7 +106,7 @@ fn exaggerated_heights_count_as_they_are() {
     assert!((a.through - b.through).abs().max_element() < 1e-12);
 }
 
-/// The example of model.md §19: walls toward a low sun and away from it, in red light, and the share
+/// The example of model.md §19: walls toward a low sun and away from it in red light, and the share
 /// of directions from which the plane is below 0.
 #[test]
 fn a_plane_of_a_low_sun_is_too_dark_high_up_and_on_walls() {

@@ -73,7 +73,8 @@ void main() {
                 int after = c + stride[axis];
                 vec3 other = reach_of(after);
                 next[axis] = 2.0 * own * other / (own + other) * inverse * inverse;
-                right -= 0.5 * inverse * (carried + field_at(4 * after + 1 + axis));
+                vec3 both = other * carried + own * field_at(4 * after + 1 + axis);
+                right -= inverse * both / (own + other);
             } else {
                 sink += through;
                 vec3 outward = vec3(0.0);
@@ -85,7 +86,8 @@ void main() {
                 int prior = c - stride[axis];
                 vec3 other = reach_of(prior);
                 prior_w += 2.0 * own * other / (own + other) * inverse * inverse;
-                right += 0.5 * inverse * (carried + field_at(4 * prior + 1 + axis));
+                vec3 both = other * carried + own * field_at(4 * prior + 1 + axis);
+                right += inverse * both / (own + other);
             } else {
                 sink += through;
                 vec3 outward = vec3(0.0);

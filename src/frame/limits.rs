@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::buffers::{SceneBuffers, diffusion_room, grid_room};
 use super::culling::Culling;
-use super::features::{has_bounces, has_lod, has_second, is_grouped, is_lit};
+use super::features::{has_lod, has_second, is_grouped, is_lit};
 use super::gather::IndirectGather;
 use super::live;
 use super::merging::Merging;
@@ -133,7 +133,7 @@ pub fn n_deposits(scene: &Scene) -> f64 {
 /// Returns sentences about a demanding scene for the user to read before it runs; none for most
 /// scenes.
 pub fn advice(scene: &Scene) -> Vec<String> {
-    let all = [grid_advice(scene), bounce_advice(scene), ground_advice(scene), color_advice(scene)];
+    let all = [grid_advice(scene), ground_advice(scene), color_advice(scene)];
     all.into_iter().flatten().collect()
 }
 
@@ -157,19 +157,6 @@ fn ground_advice(scene: &Scene) -> Option<String> {
         format!(
             "the ground has {n} points, and each receives a second reflection: seconds a frame \
              without a GPU; lighting.mode = \"first\" has its shadows without"
-        )
-    })
-}
-
-fn bounce_advice(scene: &Scene) -> Option<String> {
-    /// On 32 cells so many bring light nearer to transport in all scenes of studies.md.
-    const SAFE: u32 = 2;
-    let n = if has_bounces(scene) { scene.lighting.diffusion.bounces } else { 0 };
-    let is_flat = n > SAFE && start_grid(scene).is_some_and(|grid| grid.aspect < 0.9);
-    is_flat.then(|| {
-        format!(
-            "lighting.bounces = {n}: in cells as flat as these, more than {SAFE} can take light \
-             farther from transport; see docs/explanation/model.md, \"Bounces\""
         )
     })
 }

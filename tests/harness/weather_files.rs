@@ -96,6 +96,25 @@ impl Made {
         Made { version, n_steps, dims, attrs, vars }
     }
 
+    /// Adds U and V of one wind, m/s eastward and northward.
+    pub fn with_wind(mut self, [u, v]: [f32; 2]) -> Self {
+        for (name, (axis, wind)) in [("U", (2, u)), ("V", (3, v))] {
+            let staggered = self.dims.len();
+            let (of, length) = &self.dims[axis];
+            self.dims.push((format!("{of}_stag"), length + 1));
+            let dims: Vec<usize> =
+                [4, 3, 2].map(|d| if d == axis { staggered } else { d }).to_vec();
+            let n = dims.iter().map(|d| self.dims[*d].1 as usize).product();
+            self.vars.push(Var {
+                name: name.to_owned(),
+                dims: [vec![0], dims].concat(),
+                attrs: vec![("units".to_owned(), Attr::Text("m s-1".to_owned()))],
+                data: Data::Floats(vec![wind; n]),
+            });
+        }
+        self
+    }
+
     pub fn without(mut self, name: &str) -> Self {
         self.vars.retain(|v| v.name != name);
         self.attrs.retain(|(n, _)| n != name);

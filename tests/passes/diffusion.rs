@@ -171,6 +171,13 @@ fn wrong_shaders_are_found() {
         (
             "flat",
             "diffusion",
+            "diffusion_system.comp",
+            "other * carried + own * field_at(4 * prior",
+            "own * carried + other * field_at(4 * prior",
+        ),
+        (
+            "flat",
+            "diffusion",
             "diffusion_coarsen.comp",
             "equal(ivec3(x, y, z) - first, halved)",
             "bvec3(true)",

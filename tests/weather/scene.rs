@@ -197,6 +197,96 @@ fn faults_of_a_file_are_reported_with_its_name() {
     assert!(what.contains("`cloud.0.step`: expected an integer from 0 to 3, found 4"), "{what}");
 }
 
+/// Particles of a made file's cloud at 1 s, with a wind of its own and one that takes detail along.
+fn carried(wind: [f32; 2], speed: f64, detail_wind: &str) -> Vec<Particle> {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("a.nc");
+    std::fs::write(&path, Made::wrf(1, 2).with_wind(wind).bytes()).expect("a file");
+    let scene = load(&format!(
+        "[[cloud]]\nfrom = 'weather'\nfile = '{}'\nparticles = 900\nspeed = {speed}\ndetail = 1\n\
+         detail_wind = {detail_wind}\n[threads]\nsimulate = 'cpu'\n",
+        path.display()
+    ))
+    .expect("a scene");
+    if speed == 0.0 { list(&scene).to_vec() } else { at(&scene, 1.0).to_vec() }
+}
+
+/// Returns the mean distance of two sets of particles, in cells of 1000 m.
+fn distance(a: &[Particle], b: &[Particle]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let sum: f64 = a.iter().zip(b).map(|(p, q)| (p.position - q.position).length()).sum();
+    sum / a.len() as f64 / 1000.0
+}
+
+#[test]
+fn winds_of_a_file_take_detail_along() {
+    // A wind that is everywhere the same is as one that the scene gives: eastward and southward.
+    let of_file = carried([12.0, 5.0], 30.0, "'file'");
+    let given = carried([12.0, 5.0], 30.0, "[12, 0, -5]");
+    assert!(distance(&of_file, &given) < 1e-12);
+    for (p, q) in of_file.iter().zip(&given) {
+        assert!((p.kappa - q.kappa).abs() <= 1e-12 * q.kappa);
+    }
+    assert!(distance(&of_file, &carried([12.0, 5.0], 30.0, "[0, 0, 0]")) > 0.1);
+    assert!(distance(&of_file, &carried([12.0, -5.0], 30.0, "'file'")) > 0.05);
+    // Weather that stands still has no time in which an even wind would change anything.
+    let still = carried([12.0, 5.0], 0.0, "'file'");
+    assert_eq!(still, carried([12.0, 5.0], 0.0, "[12, 0, -5]"));
+    // Winds that shear shape the detail of weather that stands still, too.
+    let of = |wind: &str| {
+        load(&format!("{KATRINA}particles = 900\ndetail = 1\ndetail_wind = {wind}"))
+            .expect("a scene")
+    };
+    let (calm, shaped) = (of("[0, 0, 0]"), of("'file'"));
+    assert_ne!(list(&calm), list(&shaped));
+    assert!((mass(list(&calm)) / mass(list(&shaped)) - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn winds_that_are_missing_or_wrong_are_refused_where_they_are_used() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("a.nc");
+    let load = |made: &Made, wind: &str| {
+        std::fs::write(&path, made.bytes()).expect("a file");
+        let file = path.display();
+        load(&format!("[[cloud]]\nfrom = 'weather'\nfile = '{file}'\ndetail = 1\n{wind}\n"))
+    };
+    let told = |made: &Made| {
+        load(made, "").expect("winds are not needed");
+        load(made, "detail_wind = 'file'").unwrap_err().to_string()
+    };
+    let good = || Made::wrf(1, 2).with_wind([3.0, 4.0]);
+    load(&good(), "detail_wind = 'file'").expect("a scene");
+    let what = told(&Made::wrf(1, 2));
+    assert!(
+        what.contains("`cloud.0.detail_wind`: expected three numbers: the file has no U and V"),
+        "{what}"
+    );
+    let what = told(&good().without("V"));
+    assert!(what.contains("the file has no U and V"), "{what}");
+    let what = told(&good().with_units("U", "knots"));
+    assert!(what.contains("variable U: units \"knots\", expected \"m s-1\""), "{what}");
+    // The last of five western and eastern faces, and the last of four southern and northern ones.
+    let what = told(&good().with_floats("U", |all| all[4 + 5 * (2 + 3)] = 1001.0));
+    assert!(
+        what.contains("step 0: U is 1001 m/s at level 1, row 2, column 4, expected -1000 to 1000"),
+        "{what}"
+    );
+    let what = told(&good().with_floats("V", |all| all[1 + 4 * (3 + 4)] = f32::NAN));
+    assert!(what.contains("variable V, step 0: 1 values are NaN or fill values"), "{what}");
+    assert!(what.contains("the first at level 1, row 3, column 1"), "{what}");
+    let mut narrow = good();
+    narrow.var("U").dims[3] = 2;
+    let narrow = narrow.with_floats("U", |all| all.truncate(60));
+    let what = told(&narrow);
+    assert!(
+        what.contains("variable U: it is 2 x 5 x 3 x 4, expected 2 steps of 5 x 3 x 5"),
+        "{what}"
+    );
+    let what = load(&good(), "detail_wind = [1, 2000, 3]").unwrap_err().to_string();
+    assert!(what.contains("expected a number from -1000 to 1000, found 2000"), "{what}");
+}
+
 /// A reference that is kept belongs to all that a scene can show: of moving weather, to steps that
 /// nobody drew yet, too.
 #[test]

@@ -266,16 +266,20 @@ pub fn one_of<T: Copy + 'static, const N: usize>(
     values: [(Value, T); N],
     others: Option<Spec<T>>,
 ) -> Spec<T> {
-    let others_expected = others.iter().map(|others| others.expected.clone());
+    let others_expected = others.iter().map(|others| others.expected.clone() + &others.each);
     let mut names: Vec<String> =
         others_expected.chain(values.iter().map(|(value, _)| value.json().to_string())).collect();
     let last = names.pop().unwrap_or_default();
     let expected = format!("{} or {last}", names.join(", "));
     Spec::new(expected.clone(), default, move |value| {
         let found = values.iter().find(|(known, _)| known.is_same(value));
-        let found = found.map(|(known, of)| (*of, known.json()));
-        let others = || others.as_ref().and_then(|others| (others.parse)(value).ok());
-        found.or_else(others).ok_or_else(|| unexpected(&expected, value))
+        match (found, others.as_ref().map(|others| (others.parse)(value))) {
+            (Some((known, of)), _) => Ok((*of, known.json())),
+            (None, Some(Ok(parsed))) => Ok(parsed),
+            // One of several numbers is wrong: that says more.
+            (None, Some(Err(item @ Wrong::Item(..)))) => Err(item),
+            (None, _) => Err(unexpected(&expected, value)),
+        }
     })
 }
 

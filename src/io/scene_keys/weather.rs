@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::key::keys;
-use super::spec::{integer, number, vector};
+use super::spec::{Spec, integer, number, one_of, vector};
 use crate::error::Result;
 use crate::io::bounds::{Bounds, GREATEST};
 use crate::io::document::section::Section;
@@ -14,7 +14,7 @@ use crate::io::weather::wrf::WeatherFile;
 use crate::model::hills::MAX_POINTS;
 use crate::model::scene::Simulate;
 use crate::model::terrain::Terrain;
-use crate::model::weather::detail::Detail;
+use crate::model::weather::detail::{Detail, Wind};
 
 /// Most blobs of a file; a blob takes some 48 bytes.
 const MOST_PARTICLES: u32 = 20_000_000;
@@ -25,12 +25,18 @@ const WIND: Bounds = Bounds::Within(-1000.0, 1000.0);
 /// Greatest speed of weather: a day in a second.
 const GREATEST_SPEED: f64 = 86_400.0;
 
+fn wind() -> Spec<Wind> {
+    let given = vector([0.0; 3], WIND).map(Wind::Given);
+    one_of([0.0; 3], [("file".into(), Wind::OfFile)], Some(given))
+}
+
 keys! { DETAIL: pub fn detail(s, seed: u32) -> Detail { Detail;
     /// Strength of clouds' invented detail below the cells, a turbulence that keeps every cell's
     /// mass; 0: none.
     strength ["detail"]: number(0.0, Bounds::Within(0.0, 1.0));
-    /// Velocity at which moving weather takes its detail along: east, up, south.
-    wind ["detail_wind"]: vector([0.0; 3], WIND), "m/s";
+    /// Velocity at which moving weather takes its detail along: east, up, south. "file": the winds
+    /// of the file, U and V, which shape detail where weather stands still, too.
+    wind ["detail_wind"]: wind(), "m/s";
     seed => seed;
 }}
 
@@ -56,6 +62,9 @@ pub fn read_settings(
 ) -> Result<Settings> {
     let last = u32::try_from(file.n_steps.saturating_sub(1)).unwrap_or(u32::MAX);
     let detail = detail(s, seed)?;
+    if detail.wind == Wind::OfFile && !file.has_winds() {
+        return Err(s.fault("detail_wind", "expected three numbers: the file has no U and V"));
+    }
     let settings = settings(s, last, detail)?;
     if settings.speed != 0.0 && simulate == Simulate::Gpu {
         let what = "expected 0 where threads.simulate is \"gpu\", the default: it is the game \

@@ -3,12 +3,13 @@
 use glam::DVec3;
 use sha2::{Digest, Sha256};
 
-use super::wrf::{Clouds, WeatherFile};
+use super::wrf::{Clouds, Step, WeatherFile};
 use crate::error::Result;
 use crate::io::bounds::GREATEST;
 use crate::model::cloud::{MIN_ASPECT, Particle, Shape};
 use crate::model::terrain::Terrain;
-use crate::model::weather::detail::{self, Detail};
+use crate::model::weather::detail::{self, Detail, Wind};
+use crate::model::weather::flow::{Carrier, Flow};
 use crate::model::weather::particles::{Layout, WeatherBlob};
 
 /// How a scene shows a weather file.
@@ -41,12 +42,34 @@ pub fn particles(file: &WeatherFile, settings: &Settings, seed: u32) -> Result<V
     let step = file.step(settings.i_step)?;
     let layout = Layout::new(&step.grid, &[&step.extinction], settings.n_particles as usize, seed);
     let mut blobs = layout.blobs(&step.grid, &step.extinction);
-    detail::apply(&settings.detail.effects(&layout, &step.grid, 0.0), &mut blobs, &layout);
+    let winds = match settings.detail.wind {
+        Wind::OfFile => Some(file.winds(settings.i_step)?),
+        Wind::Given(_) => None,
+    };
+    let carrier = winds.as_ref().map_or(Carrier::NONE, |winds| {
+        let life_s = winds.life_s(&step.grid, &step.extinction);
+        Carrier::Flow(Flow { winds: [winds; 2], weight: 0.0, life_s, time_s: 0.0 })
+    });
+    let spots = settings.detail.spots(&layout, &step.grid);
+    let effects = settings.detail.effects(&spots, &layout, &step.grid, &carrier);
+    detail::apply(&effects, &mut blobs, &layout);
     Ok(blobs
         .iter()
         .filter(|b| b.kappa > 0.0)
         .map(|blob| particle(blob, settings.exaggeration))
         .collect())
+}
+
+/// Returns the life of detail in the winds of the step that time 0 shows, s; infinite where they do
+/// not take it along.
+///
+/// # Errors
+/// When the winds cannot be read.
+pub fn life_s(file: &WeatherFile, settings: &Settings, step: &Step) -> Result<f64> {
+    if settings.detail.wind != Wind::OfFile {
+        return Ok(f64::INFINITY);
+    }
+    Ok(file.winds(settings.i_step)?.life_s(&step.grid, &step.extinction))
 }
 
 /// Returns a blob with heights times `exaggeration` and κ divided by it, so that the optical depth

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::blobs::{Settings, particle};
+use super::blobs::{Settings, life_s, particle};
 use super::spans::{MOST_TOGETHER, Spans};
 use super::wrf::{Step, WeatherFile};
 use crate::error::Result;
@@ -60,7 +60,9 @@ fn moving_by(
     let layout =
         is_small.then(|| Layout::new(&read[0].grid, &all, settings.n_particles as usize, seed));
     let bounds = Bounds::of(&read, settings.exaggeration);
-    let slots = (settings.n_particles as usize, seed, settings.detail);
+    let now = if is_small { &read[settings.i_step] } else { &read[0] };
+    let life_s = life_s(&file, &settings, now)?;
+    let slots = (settings.n_particles as usize, seed, (settings.detail, life_s));
     let spans = Spans::new(file, times_s.clone(), slots, layout, settings.speed < 0.0);
     let steps = Steps { spans, settings, times_s, bounds };
     let first = steps.at(0.0)?;

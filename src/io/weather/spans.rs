@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 use super::wrf::WeatherFile;
 use crate::error::{Error, Result};
-use crate::model::weather::detail::Detail;
+use crate::model::weather::detail::{Detail, Wind};
 use crate::model::weather::interval::{Interval, StepClouds};
 use crate::model::weather::particles::{Layout, WeatherBlob};
 use crate::model::weather::steps::LONGEST_INTERPOLATED_S;
@@ -83,7 +83,8 @@ struct State {
 struct Source {
     file: WeatherFile,
     times_s: Vec<f64>,
-    detail: Detail,
+    /// The detail, and its life in the winds of the file.
+    detail: (Detail, f64),
     seed: u32,
     /// Layout of all steps, in a file of few.
     layout: Option<Layout>,
@@ -98,10 +99,11 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Spans {
     /// Prepares the spans of a file, of `n` slots. `layout` stands for all steps, if given.
+    /// `detail` comes with its life in the winds of the file, s.
     pub fn new(
         file: WeatherFile,
         times_s: Vec<f64>,
-        (n, seed, detail): (usize, u32, Detail),
+        (n, seed, detail): (usize, u32, (Detail, f64)),
         layout: Option<Layout>,
         is_backward: bool,
     ) -> Spans {
@@ -210,7 +212,9 @@ impl Source {
         }
         // The lock is free while the step is read, so that another thread can read another step.
         let step = self.file.step(i)?;
-        let read = Arc::new(StepClouds { grid: step.grid, extinction: step.extinction });
+        let is_carried = self.detail.0.wind == Wind::OfFile;
+        let winds = if is_carried { Some(Arc::new(self.file.winds(i)?)) } else { None };
+        let read = Arc::new(StepClouds { grid: step.grid, extinction: step.extinction, winds });
         let mut held = lock(&self.held);
         held.truncate(MOST_STEPS - 1);
         held.insert(0, (i, read.clone()));

@@ -8,12 +8,13 @@ use sha2::{Digest, Sha256};
 use super::container::{Checked, Variable, number, text};
 use super::netcdf::{self, NetCdf};
 use super::wrf_clock;
-use super::wrf_fields::{Field, place};
+use super::wrf_fields::{Extent, Field};
 use super::wrf_variables::Fields;
 use crate::error::{Error, Place, Result};
 use crate::model::weather::air::{self, PRESSURES_PA, TEMPERATURES_K};
 use crate::model::weather::diagnosed::{self, Air};
 use crate::model::weather::extinction::{InvalidCounts, single_moment_phase};
+use crate::model::weather::flow::Winds;
 use crate::model::weather::grid::{Grid, Ground, Shape};
 
 /// Most cells of a step: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more
@@ -23,6 +24,8 @@ pub const MOST_CELLS: u64 = 1 << 24;
 const SPACINGS_M: (f64, f64) = (1.0, 500_000.0);
 /// Range of the heights of levels, m above sea level.
 const HEIGHTS_M: (f64, f64) = (-1000.0, 200_000.0);
+/// Range of winds, m/s, faster than any on earth.
+const SPEEDS: (f64, f64) = (-1000.0, 1000.0);
 
 const NEEDED: [&str; 5] = ["P", "PB", "T", "PH", "PHB"];
 
@@ -221,11 +224,33 @@ impl WeatherFile {
     pub fn terrain(&self, i_step: usize) -> Result<Option<(Ground, Vec<f64>)>> {
         let read = |field: &Field| {
             let heights_m = field.read_whole(&self.container, self.shape, i_step)?;
-            within(&heights_m, HEIGHTS_M, "HGT", "m", self.shape, i_step)?;
+            let what = (Extent::Columns, "HGT", "m");
+            within(&heights_m, HEIGHTS_M, what, self.shape, i_step)?;
             Ok((self.ground(i_step)?, heights_m))
         };
         self.of_step(i_step, &|| {
             self.fields.terrain.as_ref().map_err(Clone::clone)?.as_ref().map(read).transpose()
+        })
+    }
+
+    /// Returns whether the file has winds that can be read.
+    pub fn has_winds(&self) -> bool {
+        !matches!(self.fields.winds, Ok(None))
+    }
+
+    /// Reads the winds at a step.
+    ///
+    /// # Errors
+    /// As [`WeatherFile::step`], and if the file has none.
+    pub fn winds(&self, i_step: usize) -> Result<Winds> {
+        let read = |field: &Field| {
+            let speeds = field.read_whole(&self.container, self.shape, i_step)?;
+            within(&speeds, SPEEDS, (field.extent, field.name, "m/s"), self.shape, i_step)?;
+            Ok::<_, String>(speeds)
+        };
+        self.of_step(i_step, &|| match self.fields.winds.as_ref().map_err(Clone::clone)? {
+            Some([u, v]) => Ok(Winds::new(self.shape, &read(u)?, &read(v)?)),
+            None => Err("variables U, V are missing: expected the winds of WRF".to_owned()),
         })
     }
 
@@ -246,11 +271,12 @@ impl WeatherFile {
         let grid = self.grid(i_step)?;
         let mut pressure_pa = whole(&fields.p)?;
         pressure_pa.iter_mut().zip(whole(&fields.pb)?).for_each(|(p, base)| *p += base);
-        within(&pressure_pa, PRESSURES_PA, "P + PB", "Pa", shape, i_step)?;
+        let what = (Extent::Cells, "P + PB", "Pa");
+        within(&pressure_pa, PRESSURES_PA, what, shape, i_step)?;
         let mut temperature_k = whole(&fields.t)?;
         temperature_k.iter_mut().zip(&pressure_pa).for_each(|(t, p)| *t = air::temperature(*t, *p));
-        let what = "the temperature of T, P and PB";
-        within(&temperature_k, TEMPERATURES_K, what, "K", shape, i_step)?;
+        let what = (Extent::Cells, "the temperature of T, P and PB", "K");
+        within(&temperature_k, TEMPERATURES_K, what, shape, i_step)?;
         let mut oddities = InvalidCounts::default();
         let mut ratios = |field: &Field| -> Checked<Vec<f64>> {
             let mut ratios = field.read(file, shape, i_step)?;
@@ -317,7 +343,8 @@ impl WeatherFile {
         let mut heights_m = fields.ph.read_whole(file, shape, i_step)?;
         let base = fields.phb.read_whole(file, shape, i_step)?;
         heights_m.iter_mut().zip(base).for_each(|(h, base)| *h = air::height(*h + base));
-        within(&heights_m, HEIGHTS_M, "the height of PH + PHB", "m", shape, i_step)?;
+        let what = (Extent::Levels, "the height of PH + PHB", "m");
+        within(&heights_m, HEIGHTS_M, what, shape, i_step)?;
         Grid::new(ground, heights_m)
             .map_err(|what| format!("variables PH, PHB, step {i_step}: {what}"))
     }
@@ -326,8 +353,7 @@ impl WeatherFile {
 fn within(
     numbers: &[f64],
     (least, greatest): (f64, f64),
-    what: &str,
-    unit: &str,
+    (extent, what, unit): (Extent, &str, &str),
     shape: Shape,
     i_step: usize,
 ) -> Checked<()> {
@@ -336,7 +362,7 @@ fn within(
         Some(i) => Err(format!(
             "step {i_step}: {what} is {} {unit} {}, expected {least} to {greatest}",
             numbers[i],
-            place(shape, numbers.len(), i)
+            extent.place(shape, i)
         )),
     }
 }

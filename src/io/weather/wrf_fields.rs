@@ -17,18 +17,36 @@ pub enum Extent {
     Cells,
     /// A number for each bottom and top of a cell.
     Levels,
+    /// A number for each western and eastern face of a cell.
+    EastFaces,
+    /// A number for each southern and northern face of a cell.
+    NorthFaces,
 }
 
 impl Extent {
     /// Returns the lengths of the dimensions, slowest first.
     pub fn lengths(self, shape: Shape) -> Vec<u64> {
-        let plane = [shape.ny as u64, shape.nx as u64];
-        let levels = match self {
-            Extent::Columns => return plane.to_vec(),
-            Extent::Cells => shape.nz,
-            Extent::Levels => shape.nz + 1,
+        let Shape { nx, ny, nz } = shape;
+        let lengths: &[usize] = match self {
+            Extent::Columns => &[ny, nx],
+            Extent::Cells => &[nz, ny, nx],
+            Extent::Levels => &[nz + 1, ny, nx],
+            Extent::EastFaces => &[nz, ny, nx + 1],
+            Extent::NorthFaces => &[nz, ny + 1, nx],
         };
-        [&[levels as u64], &plane[..]].concat()
+        lengths.iter().map(|length| *length as u64).collect()
+    }
+
+    /// Returns the place of number `i` in words, such as "at level 3, row 2, column 1". The level
+    /// is left out where there is one number for each column.
+    pub fn place(self, shape: Shape, i: usize) -> String {
+        let n_columns = shape.nx + usize::from(self == Extent::EastFaces);
+        let n_rows = shape.ny + usize::from(self == Extent::NorthFaces);
+        let level = match self {
+            Extent::Columns => String::new(),
+            _ => format!("level {}, ", i / (n_columns * n_rows)),
+        };
+        format!("at {level}row {}, column {}", i / n_columns % n_rows, i % n_columns)
     }
 }
 
@@ -111,7 +129,7 @@ impl Field {
         let numbers = self.read(file, shape, i_step)?;
         let Some(first) = numbers.iter().position(|n| n.is_nan()) else { return Ok(numbers) };
         let n_missing = numbers.iter().filter(|n| n.is_nan()).count();
-        let place = place(shape, numbers.len(), first);
+        let place = self.extent.place(shape, first);
         Err(self.at(
             i_step,
             format!(
@@ -125,14 +143,6 @@ impl Field {
     pub fn at(&self, i_step: usize, what: impl std::fmt::Display) -> String {
         format!("variable {}, step {i_step}: {what}", self.name)
     }
-}
-
-/// Returns the place of value `i` of `n_numbers` in words, such as "at level 3, row 2, column 1".
-/// The level is left out where there is one value for each column.
-pub fn place(shape: Shape, n_numbers: usize, i: usize) -> String {
-    let n = shape.n_columns();
-    let level = if n_numbers == n { String::new() } else { format!("level {}, ", i / n) };
-    format!("at {level}row {}, column {}", i % n / shape.nx, i % shape.nx)
 }
 
 /// Returns the factor that converts a variable's unit to the first one of `units`. A variable

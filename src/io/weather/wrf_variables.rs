@@ -28,6 +28,7 @@ const DEGREE: &[(&str, f64)] = &[
     ("degrees_east", 1.0),
     ("degree", 1.0),
 ];
+const SPEED: &[(&str, f64)] = &[("m s-1", 1.0), ("m/s", 1.0), ("m s**-1", 1.0)];
 /// Units of map factors, for which WRF writes none or a blank.
 const NO_UNIT: &[(&str, f64)] = &[("1", 1.0)];
 
@@ -49,6 +50,8 @@ pub struct Fields {
     pub factors: [Option<Field>; 2],
     /// A fault of this variable is reported only when the ground is asked for.
     pub terrain: Checked<Option<Field>>,
+    /// U and V, whose faults are reported only when the winds are asked for.
+    pub winds: Checked<Option<[Field; 2]>>,
     pub latitude: Option<Field>,
     pub longitude: Option<Field>,
     /// Whether cloud water is ice where it is cold: WSM3 without QICE.
@@ -112,6 +115,9 @@ impl Fields {
         if factors.iter().any(Option::is_none) {
             notes.push("map factors are missing: cells are as large as DX and DY".to_owned());
         }
+        let winds = optional("U", Extent::EastFaces, SPEED).and_then(|u| {
+            Ok(u.zip(optional("V", Extent::NorthFaces, SPEED)?).map(<[Field; 2]>::from))
+        });
         Ok(Fields {
             p: needed("P", Extent::Cells, PASCAL)?,
             pb: needed("PB", Extent::Cells, PASCAL)?,
@@ -122,6 +128,7 @@ impl Fields {
             condensates,
             factors,
             terrain: optional("HGT", Extent::Columns, METRE),
+            winds,
             latitude: optional("XLAT", Extent::Columns, DEGREE)?,
             longitude: optional("XLONG", Extent::Columns, DEGREE)?,
             is_single_moment,

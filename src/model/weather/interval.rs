@@ -1,9 +1,12 @@
 //! The blobs between two steps, or of one step alone. They are laid out once; any moment is then
 //! one interpolation a blob.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
-use super::detail::{self, Detail, Effect};
+use super::detail::{self, Detail, Effect, Spot, Wind};
+use super::flow::{Carrier, Flow, Winds};
 use super::grid::Grid;
 use super::particles::{Layout, Place, WeatherBlob};
 
@@ -14,6 +17,8 @@ pub struct StepClouds {
     pub grid: Grid,
     /// Extinction of every cell, m⁻¹.
     pub extinction: Vec<f64>,
+    /// The winds, if they take detail along.
+    pub winds: Option<Arc<Winds>>,
 }
 
 /// Blobs of two neighbouring steps, or of one step.
@@ -23,6 +28,10 @@ pub struct Interval {
     layout: Layout,
     grid: Grid,
     detail: Detail,
+    /// Winds of the file at both steps, if they take detail along, and its life in them, s.
+    flow: Option<([Arc<Winds>; 2], f64)>,
+    /// Where the blobs are without detail.
+    spots: Vec<Spot>,
     /// The effects of the detail, where no wind changes them.
     still: Option<Vec<Effect>>,
     /// `None` for a single step.
@@ -59,22 +68,27 @@ fn deepening([a, b]: [f64; 2], weight: f64) -> f64 {
 
 impl Interval {
     /// Places the blobs of `layout` for a step and the next one on a grid of the same shape, or for
-    /// a step alone.
+    /// a step alone. `life_s` is that of detail in the winds of the file, if they take it along.
     pub fn laid_out(
         layout: &Layout,
         a: &StepClouds,
         b: Option<&StepClouds>,
-        detail: Detail,
+        (detail, life_s): (Detail, f64),
     ) -> Self {
         let blobs = |step: &StepClouds| layout.blobs(&step.grid, &step.extinction);
         let (from, to) = (blobs(a), b.map(blobs));
         let depths = to.as_ref().map(|to| depths(layout, &a.grid, [&from, to]));
-        let is_still = detail.wind == DVec3::ZERO;
+        let is_still = detail.wind == Wind::Given(DVec3::ZERO);
+        let spots = detail.spots(layout, &a.grid);
+        let still = is_still.then(|| detail.effects(&spots, layout, &a.grid, &Carrier::NONE));
+        let winds = a.winds.as_ref().zip(b.unwrap_or(a).winds.as_ref());
         Interval {
             from,
             to,
             depths: depths.unwrap_or_default(),
-            still: is_still.then(|| detail.effects(layout, &a.grid, 0.0)),
+            flow: winds.map(|(from, to)| ([from.clone(), to.clone()], life_s)),
+            spots: if is_still { vec![] } else { spots },
+            still,
             layout: layout.clone(),
             grid: a.grid.clone(),
             detail,
@@ -83,7 +97,7 @@ impl Interval {
 
     /// Returns all blobs at `weight` of the way, with the detail that they have at a time.
     pub fn blobs(&self, weight: f64, time_s: f64) -> Vec<WeatherBlob> {
-        let Interval { layout, grid, detail, still, .. } = self;
+        let Interval { layout, grid, detail, spots, still, .. } = self;
         let deepenings: Vec<f64> = self.depths.iter().map(|of| deepening(*of, weight)).collect();
         let mut all: Vec<WeatherBlob> = match &self.to {
             Some(to) if weight != 0.0 => {
@@ -97,9 +111,23 @@ impl Interval {
         };
         match still {
             Some(effects) => detail::apply(effects, &mut all, layout),
-            None => detail::apply(&detail.effects(layout, grid, time_s), &mut all, layout),
+            None => {
+                let carrier = self.carrier(weight, time_s);
+                detail::apply(&detail.effects(spots, layout, grid, &carrier), &mut all, layout);
+            }
         }
         all
+    }
+
+    /// Returns what has carried the detail at a moment.
+    fn carrier(&self, weight: f64, time_s: f64) -> Carrier<'_> {
+        match (self.detail.wind, &self.flow) {
+            (Wind::Given(wind), _) => Carrier::Evenly(wind * time_s),
+            (Wind::OfFile, Some(([from, to], life_s))) => {
+                Carrier::Flow(Flow { winds: [from, to], weight, life_s: *life_s, time_s })
+            }
+            (Wind::OfFile, None) => Carrier::NONE,
+        }
     }
 }
 

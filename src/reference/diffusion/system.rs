@@ -68,16 +68,21 @@ impl System {
             for axis in 0..3 {
                 let h = h[axis];
                 let carried = |c: usize| sources.carried[c][axis];
+                // At a face q is D times the mean of q/D, as D is the mean of resistances.
+                let at_face = |other: usize| {
+                    let (a, b) = (reach[c], reach[other]);
+                    (b * carried(c) + a * carried(other)) / (a + b)
+                };
                 match next(n, c, axis) {
                     Some(after) => {
                         let (a, b) = (reach[c], reach[after]);
                         system.next[c][axis] = 2.0 * a * b / (a + b) / (h * h);
-                        system.source[c] -= 0.5 * (carried(c) + carried(after)) / h;
+                        system.source[c] -= at_face(after) / h;
                     }
                     None => system.add_face(c, (reach[c], h), arriving(c, axis, 1), carried(c)),
                 }
                 match before(n, c, axis) {
-                    Some(prior) => system.source[c] += 0.5 * (carried(prior) + carried(c)) / h,
+                    Some(prior) => system.source[c] += at_face(prior) / h,
                     None => system.add_face(c, (reach[c], h), arriving(c, axis, 0), -carried(c)),
                 }
             }

@@ -87,6 +87,37 @@ fn cycles_end_at_the_solution_by_elimination() {
     }
 }
 
+/// Where no light flows, φ rises from centre to centre by the mean of q/D, as ∇φ = q/D has it, also
+/// between a nearly clear cell and an opaque one.
+#[test]
+fn fluence_rises_by_the_mean_of_q_over_d() {
+    let grid = spec([2, 1, 1], 1.0);
+    let of = DiffusionMedium::new(MEAN, &grid);
+    let h = grid.cell;
+    for cells in [[1e-9, 1e-9], [1e-9, 30.0], [30.0, 1e-9], [2.0, 5.0]] {
+        let [a, b] = cells.map(|sigma| of.reach(sigma));
+        for over_d in [[1.0, 0.0], [0.0, 1.0], [0.7, -0.2]] {
+            let [p, q] = [a * over_d[0], b * over_d[1]];
+            let zero = vec![DVec3::ZERO; 2];
+            let sources = Sources {
+                scattered: zero,
+                carried: vec![[p, DVec3::ZERO, DVec3::ZERO], [q, DVec3::ZERO, DVec3::ZERO]],
+                of_suns: vec![],
+                direct: vec![],
+            };
+            let system = System::new(&of, &grid, &cells, &sources, &[], None);
+            // The source of the first cell, less that of its face on the box.
+            let half = 0.5 * h / a;
+            let of_face = (2.0 + half).recip() / h * half * p;
+            let at_face = (of_face - system.source[0]) * h;
+            let rise = at_face / (h * system.next[0][0]);
+            let expected = 0.5 * h * (over_d[0] + over_d[1]);
+            let off = (rise / expected - 1.0).abs().max_element();
+            assert!(off < 1e-9, "{cells:?} {over_d:?}: {rise}");
+        }
+    }
+}
+
 #[test]
 fn elimination_solves_the_equations() {
     let (.., system) = system(&spec([9, 7, 5], 1.0), &lights());

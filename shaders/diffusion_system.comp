@@ -18,6 +18,11 @@
 #define SOLIDS 0
 #endif
 
+// 1: the light is the change by a bounce.
+#ifndef CHANGE
+#define CHANGE 0
+#endif
+
 layout(push_constant) uniform Push {
     Grid grid;
     vec3 absorbed;
@@ -44,6 +49,15 @@ READS(6, vec4, faces)
 vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
 
 float extinction_of(int c) { return min(FLOAT(density, c), push.densest); }
+
+// Returns q at the face between two cells of D `reach`.
+vec3 at_face(vec3 q, vec3 reach, vec3 other_q, vec3 other_reach) {
+#if CHANGE
+    return (other_reach * q + reach * other_q) / (reach + other_reach);
+#else
+    return 0.5 * (q + other_q);
+#endif
+}
 
 vec3 reach_of(int c) { return 1.0 / (3.0 * extinction_of(c) * push.kept + push.inverse_chord); }
 
@@ -73,8 +87,7 @@ void main() {
                 int after = c + stride[axis];
                 vec3 other = reach_of(after);
                 next[axis] = 2.0 * own * other / (own + other) * inverse * inverse;
-                vec3 both = other * carried + own * field_at(4 * after + 1 + axis);
-                right -= inverse * both / (own + other);
+                right -= inverse * at_face(carried, own, field_at(4 * after + 1 + axis), other);
             } else {
                 sink += through;
                 vec3 outward = vec3(0.0);
@@ -86,8 +99,7 @@ void main() {
                 int prior = c - stride[axis];
                 vec3 other = reach_of(prior);
                 prior_w += 2.0 * own * other / (own + other) * inverse * inverse;
-                vec3 both = other * carried + own * field_at(4 * prior + 1 + axis);
-                right += inverse * both / (own + other);
+                right += inverse * at_face(carried, own, field_at(4 * prior + 1 + axis), other);
             } else {
                 sink += through;
                 vec3 outward = vec3(0.0);

@@ -177,9 +177,18 @@ impl MeanMedium {
 
     /// Returns the mean over the particles of all clouds, weighted by their greatest mass: the
     /// medium itself where all have the same, and one that scatters nothing without particles.
+    /// Particles count alike if none has mass yet.
     pub fn new(scene: &Scene, groups: &[Group], time_s: f64) -> MeanMedium {
+        MeanMedium::weighted(scene, groups, time_s, true)
+            .or_else(|| MeanMedium::weighted(scene, groups, time_s, false))
+            .unwrap_or(MeanMedium { albedo: DVec3::ZERO, g: 0.0, straight: 0.0 })
+    }
+
+    /// Returns the mean by mass or by number; `None` if that is 0.
+    fn weighted(scene: &Scene, groups: &[Group], time_s: f64, by_mass: bool) -> Option<MeanMedium> {
         let (mut total, mut albedo, mut g) = (0.0, DVec3::ZERO, 0.0);
-        let mut add = |m: f64, medium: &Medium, color: DVec3| {
+        let mut add = |[mass, n]: [f64; 2], medium: &Medium, color: DVec3| {
+            let m = if by_mass { mass } else { n };
             total += m;
             albedo += m * medium.albedo(color);
             g += m * medium.phase.mean_cosine();
@@ -191,19 +200,18 @@ impl MeanMedium {
                 CloudSource::Particles(list) => {
                     let of =
                         list.iter().map(|p| (mass(p.kappa, p.sigma) * p.shape.volume(), p.color));
-                    of.for_each(|(m, color)| add(m, &medium, color));
+                    of.for_each(|(m, color)| add([m, 1.0], &medium, color));
                 }
                 _ => {
-                    let own = groups.iter().filter(|g| g.i_cloud == i);
-                    let m = own.map(|g| f64::from(g.n_particles) * g.mass_max).sum();
-                    add(m, &medium, DVec3::ONE);
+                    for group in groups.iter().filter(|g| g.i_cloud == i) {
+                        let n = f64::from(group.n_particles);
+                        add([n * group.mass_max, n], &medium, DVec3::ONE);
+                    }
                 }
             }
         }
-        if total > 0.0 {
-            (albedo, g) = (albedo / total, g / total);
-        }
-        MeanMedium { albedo, g, straight: g * g }
+        let g = g / total;
+        (total > 0.0).then(|| MeanMedium { albedo: albedo / total, g, straight: g * g })
     }
 }
 

@@ -149,6 +149,11 @@ impl Made {
         self
     }
 
+    /// Returns the number of bytes of a step.
+    pub fn bytes_of_step(&self) -> usize {
+        self.vars.iter().filter(|v| v.has_steps()).map(|v| v.record(0).len()).sum()
+    }
+
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.write(&mut bytes).expect("memory takes it");

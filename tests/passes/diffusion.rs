@@ -170,10 +170,24 @@ fn wrong_shaders_are_found() {
         ("boxes", "diffusion", "diffusion_system.comp", "push.absorbed", "push.absorbed * 0.0"),
         (
             "flat",
+            "bounces",
+            "diffusion_system.comp",
+            "(other_reach * q + reach * other_q)",
+            "(other_reach * q - reach * other_q)",
+        ),
+        (
+            "flat",
             "diffusion",
             "diffusion_system.comp",
-            "other * carried + own * field_at(4 * prior",
-            "own * carried + other * field_at(4 * prior",
+            "0.5 * (q + other_q)",
+            "0.6 * (q + other_q)",
+        ),
+        (
+            "flat",
+            "merged",
+            "diffusion_system.comp",
+            "right -= inverse * at_face(carried, own,",
+            "right -= inverse * at_face(carried, other,",
         ),
         (
             "flat",

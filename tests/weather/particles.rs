@@ -7,7 +7,7 @@ use crate::columns::{at_points, of_blobs, transmittance_rms};
 use glam::DVec3;
 use nimbus::io::weather::wrf::{self, Step, WeatherFile};
 use nimbus::model::weather::detail::{self, Detail};
-use nimbus::model::weather::flow::{Carrier, Flow};
+use nimbus::model::weather::flow::{CarriedStep, Carrier, Flow, life_s};
 use nimbus::model::weather::grid::{Grid, Ground, Shape};
 use nimbus::model::weather::interval::{Interval, StepClouds};
 use nimbus::model::weather::particles::{Layout, THIN, WeatherBlob, courses};
@@ -112,7 +112,8 @@ fn detail_leaves_the_columns_as_they_are() {
         let file = file(name);
         let step = file.step(i_step).expect("a step");
         let winds = file.winds(i_step).expect("winds");
-        let life_s = winds.life_s(&step.grid, &step.extinction);
+        let (grid, extinction) = (&step.grid, &step.extinction[..]);
+        let life_s = life_s(&[CarriedStep { grid, extinction, winds: &winds }]);
         let flow = Flow { winds: [&winds; 2], weight: 0.0, life_s, time_s: 0.2 * life_s };
         println!("{name}: detail lives for {life_s:.0} s");
         let of_file = column_depths(&step.grid, &step.extinction);

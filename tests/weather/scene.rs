@@ -249,21 +249,25 @@ fn winds_that_are_missing_or_wrong_are_refused_where_they_are_used() {
     let load = |made: &Made, wind: &str| {
         std::fs::write(&path, made.bytes()).expect("a file");
         let file = path.display();
-        load(&format!("[[cloud]]\nfrom = 'weather'\nfile = '{file}'\ndetail = 1\n{wind}\n"))
+        load(&format!("[[cloud]]\nfrom = 'weather'\nfile = '{file}'\n{wind}\n"))
     };
     let told = |made: &Made| {
         load(made, "").expect("winds are not needed");
-        load(made, "detail_wind = 'file'").unwrap_err().to_string()
+        // Nor are they without detail.
+        load(made, "detail = 0\ndetail_wind = 'file'").expect("a scene without detail");
+        load(made, "detail = 1\ndetail_wind = 'file'").unwrap_err().to_string()
     };
     let good = || Made::wrf(1, 2).with_wind([3.0, 4.0]);
-    load(&good(), "detail_wind = 'file'").expect("a scene");
+    load(&good(), "detail = 1\ndetail_wind = 'file'").expect("a scene");
     let what = told(&Made::wrf(1, 2));
     assert!(
-        what.contains("`cloud.0.detail_wind`: expected three numbers: the file has no U and V"),
+        what.contains(
+            "`cloud.0.detail_wind`: expected three numbers: \"file\" needs the variables U"
+        ),
         "{what}"
     );
     let what = told(&good().without("V"));
-    assert!(what.contains("the file has no U and V"), "{what}");
+    assert!(what.contains("the file lacks one or both"), "{what}");
     let what = told(&good().with_units("U", "knots"));
     assert!(what.contains("variable U: units \"knots\", expected \"m s-1\""), "{what}");
     // The last of five western and eastern faces, and the last of four southern and northern ones.
@@ -285,6 +289,33 @@ fn winds_that_are_missing_or_wrong_are_refused_where_they_are_used() {
     );
     let what = load(&good(), "detail_wind = [1, 2000, 3]").unwrap_err().to_string();
     assert!(what.contains("expected a number from -1000 to 1000, found 2000"), "{what}");
+}
+
+/// Clouds that come later have the light that they have in a scene that begins with them.
+#[test]
+fn weather_that_begins_clear_is_lit_when_it_comes() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("a.nc");
+    let (made, n) = (Made::wrf(1, 2), NX * NY * NZ);
+    let mut bytes = made.bytes();
+    let loaded = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).expect("a file");
+        load(&format!(
+            "[[cloud]]\nfrom = 'weather'\nfile = '{}'\nparticles = 300\nspeed = 30\n[threads]\n\
+             simulate = 'cpu'\n",
+            path.display()
+        ))
+        .expect("a scene")
+    };
+    let cloudy = loaded(&bytes).groups()[0];
+    // A step ends with QCLOUD, MAPFAC_M and HGT. The first is made clear.
+    let of_step = made.bytes_of_step();
+    let end = bytes.len() - of_step - 4 * 2 * NX * NY;
+    bytes[end - 4 * n..end].fill(0);
+    let clear = loaded(&bytes);
+    assert!(at(&clear, 0.0).iter().all(|p| p.kappa == 0.0));
+    let group = clear.groups()[0];
+    assert_eq!((group.kappa_max, group.mass_max), (cloudy.kappa_max, cloudy.mass_max));
 }
 
 /// A reference that is kept belongs to all that a scene can show: of moving weather, to steps that

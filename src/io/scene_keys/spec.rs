@@ -270,7 +270,8 @@ pub fn one_of<T: Copy + 'static, const N: usize>(
     let mut names: Vec<String> =
         others_expected.chain(values.iter().map(|(value, _)| value.json().to_string())).collect();
     let last = names.pop().unwrap_or_default();
-    let expected = format!("{} or {last}", names.join(", "));
+    let comma = if names.iter().any(|name| name.contains(',')) { "," } else { "" };
+    let expected = format!("{}{comma} or {last}", names.join(", "));
     Spec::new(expected.clone(), default, move |value| {
         let found = values.iter().find(|(known, _)| known.is_same(value));
         match (found, others.as_ref().map(|others| (others.parse)(value))) {

@@ -62,8 +62,10 @@ pub fn read_settings(
 ) -> Result<Settings> {
     let last = u32::try_from(file.n_steps.saturating_sub(1)).unwrap_or(u32::MAX);
     let detail = detail(s, seed)?;
-    if detail.wind == Wind::OfFile && !file.has_winds() {
-        return Err(s.fault("detail_wind", "expected three numbers: the file has no U and V"));
+    if detail.is_in_winds() && !file.has_winds() {
+        let what = "expected three numbers: \"file\" needs the variables U and V, and the file \
+                    lacks one or both";
+        return Err(s.fault("detail_wind", what));
     }
     let settings = settings(s, last, detail)?;
     if settings.speed != 0.0 && simulate == Simulate::Gpu {

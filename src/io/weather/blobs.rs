@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::io::bounds::GREATEST;
 use crate::model::cloud::{MIN_ASPECT, Particle, Shape};
 use crate::model::terrain::Terrain;
-use crate::model::weather::detail::{self, Detail, Wind};
-use crate::model::weather::flow::{Carrier, Flow};
+use crate::model::weather::detail::{self, Detail};
+use crate::model::weather::flow::{self, CarriedStep, Carrier, Flow, Winds};
 use crate::model::weather::particles::{Layout, WeatherBlob};
 
 /// How a scene shows a weather file.
@@ -42,12 +42,9 @@ pub fn particles(file: &WeatherFile, settings: &Settings, seed: u32) -> Result<V
     let step = file.step(settings.i_step)?;
     let layout = Layout::new(&step.grid, &[&step.extinction], settings.n_particles as usize, seed);
     let mut blobs = layout.blobs(&step.grid, &step.extinction);
-    let winds = match settings.detail.wind {
-        Wind::OfFile => Some(file.winds(settings.i_step)?),
-        Wind::Given(_) => None,
-    };
-    let carrier = winds.as_ref().map_or(Carrier::NONE, |winds| {
-        let life_s = winds.life_s(&step.grid, &step.extinction);
+    let winds = winds_of(file, settings, &[settings.i_step])?;
+    let life_s = life_s(std::slice::from_ref(&step), &winds);
+    let carrier = winds.first().map_or(Carrier::NONE, |winds| {
         Carrier::Flow(Flow { winds: [winds; 2], weight: 0.0, life_s, time_s: 0.0 })
     });
     let spots = settings.detail.spots(&layout, &step.grid);
@@ -60,16 +57,23 @@ pub fn particles(file: &WeatherFile, settings: &Settings, seed: u32) -> Result<V
         .collect())
 }
 
-/// Returns the life of detail in the winds of the step that time 0 shows, s; infinite where they do
-/// not take it along.
+/// Reads the winds of some steps; none where they do not carry detail.
 ///
 /// # Errors
-/// When the winds cannot be read.
-pub fn life_s(file: &WeatherFile, settings: &Settings, step: &Step) -> Result<f64> {
-    if settings.detail.wind != Wind::OfFile {
-        return Ok(f64::INFINITY);
-    }
-    Ok(file.winds(settings.i_step)?.life_s(&step.grid, &step.extinction))
+/// When they cannot be read.
+pub fn winds_of(file: &WeatherFile, settings: &Settings, i_steps: &[usize]) -> Result<Vec<Winds>> {
+    let wanted = if settings.detail.is_in_winds() { i_steps } else { &[] };
+    wanted.iter().map(|i| file.winds(*i)).collect()
+}
+
+/// Returns the life of detail in the winds of some steps, s.
+pub fn life_s(steps: &[Step], winds: &[Winds]) -> f64 {
+    let all: Vec<CarriedStep<'_>> = steps
+        .iter()
+        .zip(winds)
+        .map(|(step, winds)| CarriedStep { grid: &step.grid, extinction: &step.extinction, winds })
+        .collect();
+    flow::life_s(&all)
 }
 
 /// Returns a blob with heights times `exaggeration` and κ divided by it, so that the optical depth

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::blobs::{Settings, life_s, particle};
+use super::blobs::{Settings, life_s, particle, winds_of};
 use super::spans::{MOST_TOGETHER, Spans};
 use super::wrf::{Step, WeatherFile};
 use crate::error::Result;
@@ -50,7 +50,7 @@ fn moving_by(
 ) -> Result<AnimatedParticles> {
     let times_s = file.times_s.clone().unwrap_or_else(|| vec![0.0]);
     let is_small = file.n_steps <= most_together;
-    let wanted = if is_small {
+    let wanted: Vec<usize> = if is_small {
         (0..file.n_steps).collect()
     } else {
         vec![settings.i_step, file.n_steps - 1]
@@ -60,16 +60,22 @@ fn moving_by(
     let layout =
         is_small.then(|| Layout::new(&read[0].grid, &all, settings.n_particles as usize, seed));
     let bounds = Bounds::of(&read, settings.exaggeration);
-    let now = if is_small { &read[settings.i_step] } else { &read[0] };
-    let life_s = life_s(&file, &settings, now)?;
+    let life_s = life_s(&read, &winds_of(&file, &settings, &wanted)?);
     let slots = (settings.n_particles as usize, seed, (settings.detail, life_s));
     let spans = Spans::new(file, times_s.clone(), slots, layout, settings.speed < 0.0);
     let steps = Steps { spans, settings, times_s, bounds };
     let first = steps.at(0.0)?;
+    // Clouds may come later: the densest of all steps that were read count.
+    let time_of = |i: &usize| (steps.times_s[*i] - steps.times_s[settings.i_step]) / settings.speed;
+    let others = wanted.iter().filter(|i| **i != settings.i_step && settings.speed != 0.0);
+    let others: Vec<_> = others.map(|i| steps.at(time_of(i))).collect::<Result<_>>()?;
     let mean = |of: &dyn Fn(&Particle) -> f64| {
         first.iter().map(of).sum::<f64>() / first.len().max(1) as f64
     };
-    let greatest = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).fold(0.0, f64::max);
+    let greatest = |of: &dyn Fn(&Particle) -> f64| {
+        let all = std::iter::once(&first).chain(&others);
+        all.flat_map(|moment| moment.iter()).map(of).fold(0.0, f64::max)
+    };
     Ok(AnimatedParticles {
         n_particles: settings.n_particles,
         low: bounds.low,
@@ -177,7 +183,7 @@ mod tests {
 
     use super::*;
     use crate::io::weather::wrf;
-    use crate::model::weather::detail::Detail;
+    use crate::model::weather::detail::{Detail, Wind};
 
     /// Two layouts that fade into each other have the mass of one layout, stay in the bounds, and
     /// no visible particle jumps.
@@ -233,5 +239,34 @@ mod tests {
         let [late, early] = [3.0, 1.0].map(|t| c.animation.at(t).unwrap());
         assert!(d.animation.at(1.0).unwrap() == early && d.animation.at(3.0).unwrap() == late);
         assert!(many.animation.at(3.0).unwrap() == late);
+    }
+
+    /// Detail in the winds of the file goes on without a step, forward and backward, with one
+    /// layout and with several. It does not depend on the order in which times are asked for.
+    #[test]
+    fn winds_carry_detail_in_both_directions() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/weather/supercell.nc");
+        let detail = Detail { strength: 1.0, wind: Wind::OfFile, seed: 5 };
+        for (i_step, speed) in [(0, 60.0), (2, -60.0)] {
+            let settings = Settings { i_step, n_particles: 2001, exaggeration: 2.0, speed, detail };
+            for most_together in [0, MOST_TOGETHER] {
+                let of =
+                    || moving_by(wrf::open(&path).unwrap(), settings, 3, most_together).unwrap();
+                let (one, other) = (of(), of());
+                let [late, early] = [3.1, 0.9].map(|t| one.animation.at(t).unwrap());
+                assert!(other.animation.at(0.9).unwrap() == early);
+                assert!(other.animation.at(3.1).unwrap() == late);
+                let soon = one.animation.at(0.9 + 1e-4).unwrap();
+                let moved = |a: &[Particle], b: &[Particle]| {
+                    let seen = a.iter().zip(b).filter(|(p, q)| p.kappa.min(q.kappa) > 0.0);
+                    let all: Vec<f64> =
+                        seen.map(|(p, q)| p.position.distance(q.position)).collect();
+                    all.iter().sum::<f64>() / all.len() as f64
+                };
+                // 6 ms of the file, and 132 s.
+                assert!(moved(&early, &soon) < 2.0, "{speed} {most_together}");
+                assert!(moved(&early, &late) > 50.0, "{speed} {most_together}");
+            }
+        }
     }
 }

@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 
 use super::wrf::WeatherFile;
 use crate::error::{Error, Result};
-use crate::model::weather::detail::{Detail, Wind};
+use crate::model::weather::detail::Detail;
 use crate::model::weather::interval::{Interval, StepClouds};
 use crate::model::weather::particles::{Layout, WeatherBlob};
 use crate::model::weather::steps::LONGEST_INTERPOLATED_S;
@@ -212,7 +212,7 @@ impl Source {
         }
         // The lock is free while the step is read, so that another thread can read another step.
         let step = self.file.step(i)?;
-        let is_carried = self.detail.0.wind == Wind::OfFile;
+        let is_carried = self.detail.0.is_in_winds();
         let winds = if is_carried { Some(Arc::new(self.file.winds(i)?)) } else { None };
         let read = Arc::new(StepClouds { grid: step.grid, extinction: step.extinction, winds });
         let mut held = lock(&self.held);

@@ -18,7 +18,7 @@ use crate::model::weather::flow::Winds;
 use crate::model::weather::grid::{Grid, Ground, Shape};
 
 /// Most cells of a step: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more
-/// while it is read: less than 1 GiB.
+/// while it is read: less than 1 GiB. Winds take 16 bytes a cell, and 16 more while they are read.
 pub const MOST_CELLS: u64 = 1 << 24;
 /// Range of the sizes of cells, m: from large-eddy simulation to a degree of the globe.
 const SPACINGS_M: (f64, f64) = (1.0, 500_000.0);
@@ -233,12 +233,13 @@ impl WeatherFile {
         })
     }
 
-    /// Returns whether the file has winds that can be read.
+    /// Returns whether the file has U and V, even if they are faulty: [`winds`](Self::winds) says
+    /// why.
     pub fn has_winds(&self) -> bool {
         !matches!(self.fields.winds, Ok(None))
     }
 
-    /// Reads the winds at a step.
+    /// Reads the winds at a step, a velocity for each cell.
     ///
     /// # Errors
     /// As [`WeatherFile::step`], and if the file has none.

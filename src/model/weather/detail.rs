@@ -90,6 +90,11 @@ impl Detail {
     /// No detail.
     pub const NONE: Detail = Detail { strength: 0.0, wind: Wind::Given(DVec3::ZERO), seed: 0 };
 
+    /// Returns whether the winds of the file carry it.
+    pub fn is_in_winds(&self) -> bool {
+        self.strength > 0.0 && self.wind == Wind::OfFile
+    }
+
     /// Returns where the blobs of a layout are without detail; nothing if there is none.
     pub fn spots(&self, layout: &Layout, grid: &Grid) -> Vec<Spot> {
         if self.strength == 0.0 {
@@ -124,7 +129,7 @@ impl Detail {
         let (space, noises) = (NoiseSpace::new(grid), carrier.noises());
         of_blobs(spots.len(), |i| {
             let Spot { i_cell, at, in_noise, fray, even, room } = spots[i];
-            let velocity = space.moved(carrier.velocity(i_cell, at));
+            let velocity = space.in_units(carrier.velocity(i_cell, at));
             let of = |noise: &Noise| {
                 let from = in_noise - noise.age_s * velocity;
                 noise.factor * DVec3::from(turbulences([self.seed, STREAM], noise.number, from))
@@ -240,7 +245,7 @@ mod tests {
         let wind = DVec3::X * 7.0;
         let of = |detail: &Detail, time_s: f64| {
             let mut all = plain.clone();
-            let carrier = Carrier::Evenly(wind * time_s);
+            let carrier = Carrier::Evenly(wind, time_s);
             let spots = detail.spots(&layout, &grid);
             let effects = detail.effects(&spots, &layout, &grid, &carrier);
             apply(&effects, &mut all, &layout);
@@ -269,7 +274,7 @@ mod tests {
             assert!(b.position.x.abs() < 400.0 && b.position.z.abs() < 50.0, "{}", b.position);
         }
         // A wind takes it along, steadily; 21 m in 3 s are 0.105 units of 200 m.
-        assert!((NoiseSpace::new(&grid).moved(wind * 3.0).x - 0.105).abs() < 1e-12);
+        assert!((NoiseSpace::new(&grid).in_units(wind * 3.0).x - 0.105).abs() < 1e-12);
         let (soon, later) = (of(&detail, 0.001), of(&detail, 9.0));
         let change = |all: &[WeatherBlob]| {
             let off = found.iter().zip(all).map(|(a, b)| (a.kappa - b.kappa).abs() / most);

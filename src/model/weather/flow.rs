@@ -7,9 +7,9 @@ use glam::DVec3;
 use super::grid::{Grid, Shape};
 use super::noise_space::NoiseSpace;
 
-/// Deformation of detail, as a number, in the time between its birth and its death: the mean
-/// square of the wind's gradient times that time. An eddy of turbulence lives for about the time
-/// in which it is deformed by 1, and ages are half of that in the mean.
+/// Deformation of detail from its birth to its death: the root mean square of the wind's gradient
+/// times that time. Ages are half of it in the mean, and so detail that is seen is deformed by 1.5.
+/// An eddy of turbulence lives for about a deformation of 1. 3 is a choice.
 const DEFORMATION: f64 = 3.0;
 /// Numbers of noises before the first one comes again.
 const N_NOISES: i64 = 1 << 20;
@@ -42,7 +42,7 @@ impl Winds {
         Winds { shape, cells: (0..shape.n_cells()).map(of).collect() }
     }
 
-    /// Returns the velocity at a place of a cell, which is from −½ to ½ eastward, upward and
+    /// Returns the velocity, m/s, at a place of a cell, which is from −½ to ½ eastward, upward and
     /// southward. It is trilinear between the middles of cells, and even beyond the outermost.
     pub fn at(&self, i_cell: usize, at: DVec3) -> DVec3 {
         let Shape { nx, ny, nz } = self.shape;
@@ -74,37 +74,57 @@ impl Winds {
         DVec3::new(sum[0], 0.0, sum[1])
     }
 
-    /// Returns the life of detail in these winds, s: infinite where they are the same in all cells
-    /// with a cloud.
-    ///
-    /// The gradient is that of the velocity in the units of the noise. Its square is the sum of
-    /// those of its entries, in the mean over the cells that have extinction.
-    pub fn life_s(&self, grid: &Grid, extinction: &[f64]) -> f64 {
-        let space = NoiseSpace::new(grid);
-        let Shape { nx, ny, .. } = self.shape;
+    /// Returns the square of the gradient of the velocity in a cell, s⁻²: the sum of the squares of
+    /// its entries, with velocities and lengths in the units of the noise.
+    fn gradient_squared(&self, grid: &Grid, space: &NoiseSpace, i_cell: usize) -> f64 {
+        let i_column = i_cell % grid.shape().n_columns();
+        let (dx, dy) = (grid.ground.dx_m[i_column], grid.ground.dy_m[i_column]);
+        let lengths = DVec3::new(dx / space.unit_m.x, 1.0 / space.levels, dy / space.unit_m.z);
+        // Half a cell to both sides.
+        let of = |axis: DVec3| {
+            let change = self.at(i_cell, 0.5 * axis) - self.at(i_cell, -0.5 * axis);
+            (space.in_units(change) / axis.dot(lengths)).length_squared()
+        };
+        DVec3::AXES.into_iter().map(of).sum()
+    }
+}
+
+/// A step whose winds carry detail.
+#[derive(Debug, Clone, Copy)]
+pub struct CarriedStep<'a> {
+    /// Grid of the step.
+    pub grid: &'a Grid,
+    /// Extinction of every cell, m⁻¹.
+    pub extinction: &'a [f64],
+    /// Its winds.
+    pub winds: &'a Winds,
+}
+
+/// Returns the life of detail in the winds of some steps, s. It goes by the mean over the cells
+/// with extinction, or over all cells where none has any. It is infinite in even winds.
+pub fn life_s(steps: &[CarriedStep]) -> f64 {
+    let mean_square = |of_all: bool| {
         let (mut sum, mut n) = (0.0, 0.0);
-        for i in (0..extinction.len()).filter(|&i| extinction[i] > 0.0) {
-            let i_column = i % (nx * ny);
-            let (dx, dy) = (grid.ground.dx_m[i_column], grid.ground.dy_m[i_column]);
-            // Half a cell to both sides, in units of the noise.
-            let steps = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| {
-                let change = self.at(i, 0.5 * axis) - self.at(i, -0.5 * axis);
-                let units = [dx / space.unit_m.x, 1.0 / space.levels, dy / space.unit_m.z];
-                let length = axis.dot(DVec3::from(units));
-                (space.moved(change) / length).length_squared()
-            });
-            sum += steps.iter().sum::<f64>();
-            n += 1.0;
+        for CarriedStep { grid, extinction, winds } in steps {
+            let space = NoiseSpace::new(grid);
+            for i in (0..extinction.len()).filter(|&i| of_all || extinction[i] > 0.0) {
+                sum += winds.gradient_squared(grid, &space, i);
+                n += 1.0;
+            }
         }
-        if sum > 0.0 { DEFORMATION / f64::sqrt(sum / n) } else { f64::INFINITY }
+        (n > 0.0).then(|| sum / n)
+    };
+    match mean_square(false).or_else(|| mean_square(true)) {
+        Some(square) if square > 0.0 => DEFORMATION / square.sqrt(),
+        _ => f64::INFINITY,
     }
 }
 
 /// What carries the noise of a detail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Carrier<'a> {
-    /// All of it has come this way, m.
-    Evenly(DVec3),
+    /// One velocity, m/s, for a time, s.
+    Evenly(DVec3, f64),
     /// Winds of two moments.
     Flow(Flow<'a>),
 }
@@ -116,7 +136,7 @@ pub struct Flow<'a> {
     pub winds: [&'a Winds; 2],
     /// Part of the way to the second step.
     pub weight: f64,
-    /// Life of the detail, s ([`Winds::life_s`]).
+    /// Life of the detail, s ([`life_s`]).
     pub life_s: f64,
     /// The moment, s from any beginning.
     pub time_s: f64,
@@ -135,20 +155,20 @@ pub(super) struct Noise {
 
 impl Carrier<'_> {
     /// No wind.
-    pub const NONE: Carrier<'static> = Carrier::Evenly(DVec3::ZERO);
+    pub const NONE: Carrier<'static> = Carrier::Evenly(DVec3::ZERO, 0.0);
 
     /// Returns the noises of this moment.
     pub(super) fn noises(&self) -> Vec<Noise> {
         match self {
-            Carrier::Evenly(_) => vec![Noise { number: 0, factor: 1.0, age_s: 1.0 }],
+            Carrier::Evenly(_, time_s) => noises(*time_s, f64::INFINITY),
             Carrier::Flow(flow) => noises(flow.time_s, flow.life_s),
         }
     }
 
-    /// Returns the velocity at a place of a cell, m/s; for a common way, the way itself.
+    /// Returns the velocity at a place of a cell ([`Winds::at`]), m/s.
     pub(super) fn velocity(&self, i_cell: usize, at: DVec3) -> DVec3 {
         match self {
-            Carrier::Evenly(way) => *way,
+            Carrier::Evenly(velocity, _) => *velocity,
             Carrier::Flow(Flow { winds: [from, to], weight, .. }) => {
                 from.at(i_cell, at).lerp(to.at(i_cell, at), *weight)
             }
@@ -217,7 +237,7 @@ mod tests {
     fn the_life_of_detail_by_hand() {
         // A unit is two cells wide, and two cells' width over their height, 2 or 4 of them, high.
         let grid = grid();
-        let mut extinction = vec![0.0; 12];
+        let mut extinction = [0.0; 12];
         extinction[1] = 1.0;
         let space = NoiseSpace::new(&grid);
         assert_eq!((space.unit_m, space.levels), (DVec3::new(200.0, 200.0, 400.0), 4.0));
@@ -225,10 +245,17 @@ mod tests {
         // in half of one, up: 50 m/s in a quarter, as below there is no level.
         let squares = [10.0 / 100.0, 0.5 / 100.0, 3.5 / 200.0, 50.0 / 50.0].map(|v: f64| v * v);
         let expected = 3.0 / squares.iter().sum::<f64>().sqrt();
-        assert!((winds().life_s(&grid, &extinction) / expected - 1.0).abs() < 1e-12);
+        let (winds, clear) = (winds(), vec![0.0; 12]);
+        let step = |extinction, winds| CarriedStep { grid: &grid, extinction, winds };
+        let cloudy = step(&extinction[..], &winds);
+        assert!((life_s(&[cloudy]) / expected - 1.0).abs() < 1e-12);
         let even = Winds { shape: SHAPE, cells: vec![[30.0, -4.0]; 12] };
-        assert_eq!(even.life_s(&grid, &extinction), f64::INFINITY);
-        assert_eq!(winds().life_s(&grid, &[0.0; 12]), f64::INFINITY);
+        assert_eq!(life_s(&[step(&extinction[..], &even)]), f64::INFINITY);
+        // A clear step says nothing, unless all are clear, and an even one half.
+        assert_eq!(life_s(&[step(&clear[..], &winds), cloudy]), life_s(&[cloudy]));
+        assert!(life_s(&[step(&clear[..], &winds)]).is_finite());
+        let both = life_s(&[step(&extinction[..], &even), cloudy]);
+        assert!((both / (expected * 2f64.sqrt()) - 1.0).abs() < 1e-12);
     }
 
     #[test]

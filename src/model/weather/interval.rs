@@ -78,7 +78,7 @@ impl Interval {
         let blobs = |step: &StepClouds| layout.blobs(&step.grid, &step.extinction);
         let (from, to) = (blobs(a), b.map(blobs));
         let depths = to.as_ref().map(|to| depths(layout, &a.grid, [&from, to]));
-        let is_still = detail.wind == Wind::Given(DVec3::ZERO);
+        let is_still = detail.wind == Wind::Given(DVec3::ZERO) || detail.strength == 0.0;
         let spots = detail.spots(layout, &a.grid);
         let still = is_still.then(|| detail.effects(&spots, layout, &a.grid, &Carrier::NONE));
         let winds = a.winds.as_ref().zip(b.unwrap_or(a).winds.as_ref());
@@ -121,12 +121,13 @@ impl Interval {
 
     /// Returns what has carried the detail at a moment.
     fn carrier(&self, weight: f64, time_s: f64) -> Carrier<'_> {
-        match (self.detail.wind, &self.flow) {
-            (Wind::Given(wind), _) => Carrier::Evenly(wind * time_s),
-            (Wind::OfFile, Some(([from, to], life_s))) => {
+        match (&self.flow, self.detail.wind) {
+            (Some(([from, to], life_s)), _) => {
                 Carrier::Flow(Flow { winds: [from, to], weight, life_s: *life_s, time_s })
             }
-            (Wind::OfFile, None) => Carrier::NONE,
+            (None, Wind::Given(wind)) => Carrier::Evenly(wind, time_s),
+            // No detail is there to be carried.
+            (None, Wind::OfFile) => Carrier::NONE,
         }
     }
 }

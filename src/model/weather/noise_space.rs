@@ -21,6 +21,7 @@ pub struct NoiseSpace {
 }
 
 impl NoiseSpace {
+    /// Returns the space of a grid's mean cell.
     pub fn new(grid: &Grid) -> NoiseSpace {
         let cell = grid.mean_cell();
         let levels = (cell.x / cell.y).round().clamp(1.0, FLATTEST) * LONGEST;
@@ -28,7 +29,7 @@ impl NoiseSpace {
         NoiseSpace { unit_m, levels }
     }
 
-    /// Returns the place of a blob.
+    /// Returns the place of a blob, in units of the noise.
     pub fn of(&self, layout: &Layout, grid: &Grid, place: Place) -> DVec3 {
         let (ground, n_columns) = (&grid.ground, grid.shape().n_columns());
         let (column, level) =
@@ -41,8 +42,8 @@ impl NoiseSpace {
         )
     }
 
-    /// Returns a way of metres.
-    pub fn moved(&self, way_m: DVec3) -> DVec3 {
-        way_m / self.unit_m
+    /// Returns a way in m, or a velocity in m/s, in units of the noise.
+    pub fn in_units(&self, way: DVec3) -> DVec3 {
+        way / self.unit_m
     }
 }

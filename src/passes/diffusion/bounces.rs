@@ -106,12 +106,12 @@ impl Bounces {
         let kernel = |name: &str, fields: &_, macros: &[(&str, u32)]| {
             Kernel::with_macros(device, compiler, name, fields, &[], macros)
         };
-        let alone = [("N_SETS", room.n_sets), ("SOLIDS", 0)];
+        let of_change = [("N_SETS", room.n_sets), ("SOLIDS", 0), ("CHANGE", 1)];
         let is_merged = room.bounce_cells > 1;
         Ok(Bounces {
             flux: kernel("diffusion.flux", FluxPush::FIELDS, &[("BOUNCES", 1)])?,
             bounce: kernel("diffusion.bounce", BouncePush::FIELDS, &solids)?,
-            system: kernel("diffusion.system", SystemPush::FIELDS, &alone)?,
+            system: kernel("diffusion.system", SystemPush::FIELDS, &of_change)?,
             correct: kernel(
                 "diffusion.flux",
                 FluxPush::FIELDS,

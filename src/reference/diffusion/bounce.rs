@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::moments::flux_of;
 use super::multigrid::Multigrid;
 use super::sources::{DiffusionMedium, Moments, Sources};
-use super::system::System;
+use super::system::{AtFaces, System};
 use super::ways::Ways;
 use crate::model::grid::GridSpec;
 use crate::model::medium::MeanMedium;
@@ -97,7 +97,8 @@ impl Bounces<'_> {
             of_suns: vec![],
             direct: vec![],
         };
-        let system = System::new(self.of, self.grid, self.cells, &sources, &[], None);
+        let series = AtFaces::InSeries;
+        let system = System::new(self.of, self.grid, self.cells, &sources, &[], None, series);
         let phi = Multigrid::new(system, self.grid.edges()).solve(CYCLES_OF_CHANGE);
         let more = flux_of(self.of, self.grid, self.cells, &sources, &phi);
         let all = found.iter().zip(more);

@@ -11,7 +11,7 @@ use super::moments::{corners, flux_of};
 use super::multigrid::Multigrid;
 use super::seen::SeenCells;
 use super::sources::{DiffusionMedium, Moments, Sources};
-use super::system::System;
+use super::system::{AtFaces, System};
 use super::ways::Ways;
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
@@ -57,7 +57,8 @@ impl DiffuseLight {
         let cells = &counted[..];
         let sources = Sources::new(of, obstacles, lights, of_solids.is_some());
         let solved = |of, grid: &GridSpec, cells: &[f64], sources: &Sources| {
-            let system = System::new(of, grid, cells, sources, lights, of_solids);
+            let mean = AtFaces::Mean;
+            let system = System::new(of, grid, cells, sources, lights, of_solids, mean);
             let phi = Multigrid::new(system, grid.edges()).solve(n_cycles);
             flux_of(of, grid, cells, sources, &phi)
         };

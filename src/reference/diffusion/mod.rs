@@ -38,4 +38,4 @@ pub use field::DiffuseLight;
 pub use multigrid::Multigrid;
 pub use seen::{SeenBlob, SeenCells};
 pub use sources::{DiffusionMedium, Sources};
-pub use system::System;
+pub use system::{AtFaces, System};

@@ -21,6 +21,15 @@ pub struct System {
     pub source: Vec<DVec3>,
 }
 
+/// q at the face between two cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AtFaces {
+    /// Their mean.
+    Mean,
+    /// D times the mean of q/D, with the D of the way from centre to centre.
+    InSeries,
+}
+
 /// Returns the index of the next cell along an axis, if there is one.
 pub(super) fn next(n: USizeVec3, c: usize, axis: usize) -> Option<usize> {
     let stride = [1, n.x, n.x * n.y][axis];
@@ -43,6 +52,7 @@ impl System {
         sources: &Sources,
         lights: &[Light],
         of_solids: Option<&FaceLight>,
+        at_faces: AtFaces,
     ) -> System {
         let n = grid.n_cells.as_usizevec3();
         let reach: Vec<DVec3> = cells.iter().map(|sigma| of.reach(*sigma)).collect();
@@ -68,10 +78,12 @@ impl System {
             for axis in 0..3 {
                 let h = h[axis];
                 let carried = |c: usize| sources.carried[c][axis];
-                // At a face q is D times the mean of q/D, as D is the mean of resistances.
-                let at_face = |other: usize| {
-                    let (a, b) = (reach[c], reach[other]);
-                    (b * carried(c) + a * carried(other)) / (a + b)
+                let at_face = |other: usize| match at_faces {
+                    AtFaces::Mean => 0.5 * (carried(c) + carried(other)),
+                    AtFaces::InSeries => {
+                        let (a, b) = (reach[c], reach[other]);
+                        (b * carried(c) + a * carried(other)) / (a + b)
+                    }
                 };
                 match next(n, c, axis) {
                     Some(after) => {

@@ -1,6 +1,6 @@
 use glam::{DVec3, UVec3};
 
-use super::{DiffuseLight, DiffusionMedium, Multigrid, Sources, System, solve};
+use super::{AtFaces, DiffuseLight, DiffusionMedium, Multigrid, Sources, System, solve};
 use crate::model::cloud::Shape;
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
@@ -60,7 +60,7 @@ fn system_of(
     let obstacles =
         Obstacles { spec: grid, cells: &cells, rectangles: &[], step: 0.5, forward: 0.0 };
     let sources = Sources::new(&of, &obstacles, lights, false);
-    let system = System::new(&of, grid, &cells, &sources, lights, None);
+    let system = System::new(&of, grid, &cells, &sources, lights, None, AtFaces::Mean);
     (of, cells, sources, system)
 }
 
@@ -105,7 +105,8 @@ fn fluence_rises_by_the_mean_of_q_over_d() {
                 of_suns: vec![],
                 direct: vec![],
             };
-            let system = System::new(&of, &grid, &cells, &sources, &[], None);
+            let series = AtFaces::InSeries;
+            let system = System::new(&of, &grid, &cells, &sources, &[], None, series);
             // The source of the first cell, less that of its face on the box.
             let half = 0.5 * h / a;
             let of_face = (2.0 + half).recip() / h * half * p;
@@ -189,7 +190,7 @@ fn an_empty_box_lets_the_sky_through() {
     let obstacles =
         Obstacles { spec: &grid, cells: &cells, rectangles: &[], step: 0.5, forward: 0.0 };
     let sources = Sources::new(&of, &obstacles, &[sky], true);
-    let system = System::new(&of, &grid, &cells, &sources, &[sky], None);
+    let system = System::new(&of, &grid, &cells, &sources, &[sky], None, AtFaces::Mean);
     let phi = solve(&system);
     let light = DiffuseLight::of_fluence(&of, &grid, &cells, &sources, &phi);
     for [phi, x, y, z] in &light.cells {

@@ -74,8 +74,8 @@ impl Winds {
         DVec3::new(sum[0], 0.0, sum[1])
     }
 
-    /// Returns the square of the gradient of the velocity in a cell, s⁻²: the sum of the squares of
-    /// its entries, with velocities and lengths in the units of the noise.
+    /// Returns the square of the gradient of the velocity in a cell, s⁻². Velocities and lengths
+    /// are in the units of the noise, and the squares of the gradient's entries add up.
     fn gradient_squared(&self, grid: &Grid, space: &NoiseSpace, i_cell: usize) -> f64 {
         let i_column = i_cell % grid.shape().n_columns();
         let (dx, dy) = (grid.ground.dx_m[i_column], grid.ground.dy_m[i_column]);

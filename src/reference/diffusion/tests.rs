@@ -87,8 +87,8 @@ fn cycles_end_at_the_solution_by_elimination() {
     }
 }
 
-/// Where no light flows, φ rises from centre to centre by the mean of q/D, as ∇φ = q/D has it, also
-/// between a nearly clear cell and an opaque one.
+/// Where no light flows, ∇φ is q/D. φ rises from centre to centre by the mean of that, also between
+/// a nearly clear cell and an opaque one.
 #[test]
 fn fluence_rises_by_the_mean_of_q_over_d() {
     let grid = spec([2, 1, 1], 1.0);

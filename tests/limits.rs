@@ -30,18 +30,6 @@ fn blobs_much_larger_than_cells_give_advice() {
 }
 
 #[test]
-fn many_bounces_in_flat_cells_give_advice() {
-    let said = |name: &str, bounces: u32| {
-        let set = ["lighting.mode=diffusion".to_owned(), format!("lighting.bounces={bounces}")];
-        let scene = scene_file::load(format!("scenes/{name}.toml").as_ref(), &set, None).unwrap();
-        advice(&scene.scene).iter().any(|text| text.contains("lighting.bounces ="))
-    };
-    let found = [("supercell", 2), ("supercell", 3), ("cubes-554", 8)].map(|(n, b)| said(n, b));
-    // The cells of cubes-554 are cubes.
-    assert_eq!(found, [false, true, false]);
-}
-
-#[test]
 fn a_device_of_few_texels_refuses_nothing_for_them() {
     let mut limits = *Gpu::new().device.limits();
     let mut scene = scene(500, 64, "first");

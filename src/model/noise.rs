@@ -21,7 +21,7 @@ pub fn turbulence(key: [u32; 2], field: u32, place: DVec3) -> f64 {
     })[0]
 }
 
-/// Returns three independent noises like [`turbulence`] in less than twice the time of one.
+/// Returns three independent noises like [`turbulence`], each from a word of the same random ones.
 pub fn turbulences(key: [u32; 2], field: u32, place: DVec3) -> [f64; 3] {
     octaves(field, place, |counter| {
         let [a, b, c, _] = philox4x32_10(key, counter);

@@ -11,6 +11,7 @@ use nimbus::io::scene_file::{self, LoadedScene};
 use nimbus::io::weather::wrf;
 use nimbus::model::cloud::{CloudSource, Facing, Particle, Shapes};
 use nimbus::model::light::Light;
+use nimbus::model::medium::MeanMedium;
 use nimbus::model::scene::Scene;
 
 const KATRINA: &str = "
@@ -253,7 +254,7 @@ fn winds_that_are_missing_or_wrong_are_refused_where_they_are_used() {
     };
     let told = |made: &Made| {
         load(made, "").expect("winds are not needed");
-        // Nor are they without detail.
+        // Without detail, "file" needs no winds either.
         load(made, "detail = 0\ndetail_wind = 'file'").expect("a scene without detail");
         load(made, "detail = 1\ndetail_wind = 'file'").unwrap_err().to_string()
     };
@@ -316,6 +317,12 @@ fn weather_that_begins_clear_is_lit_when_it_comes() {
     assert!(at(&clear, 0.0).iter().all(|p| p.kappa == 0.0));
     let group = clear.groups()[0];
     assert_eq!((group.kappa_max, group.mass_max), (cloudy.kappa_max, cloudy.mass_max));
+    // Clouds between steps that were read may have mass that no bound tells of: they scatter, too.
+    let mut groups = clear.groups();
+    let known = MeanMedium::new(&clear, &groups, 0.0);
+    groups.iter_mut().for_each(|group| group.mass_max = 0.0);
+    assert_eq!(MeanMedium::new(&clear, &groups, 0.0), known);
+    assert!(known.albedo.min_element() > 0.9);
 }
 
 /// A reference that is kept belongs to all that a scene can show: of moving weather, to steps that

@@ -65,7 +65,7 @@ fn moving_by(
     let spans = Spans::new(file, times_s.clone(), slots, layout, settings.speed < 0.0);
     let steps = Steps { spans, settings, times_s, bounds };
     let first = steps.at(0.0)?;
-    // Clouds may come later: the densest of all steps that were read count.
+    // Clouds may come later: the densest blobs of all steps that were read count.
     let time_of = |i: &usize| (steps.times_s[*i] - steps.times_s[settings.i_step]) / settings.speed;
     let others = wanted.iter().filter(|i| **i != settings.i_step && settings.speed != 0.0);
     let others: Vec<_> = others.map(|i| steps.at(time_of(i))).collect::<Result<_>>()?;

@@ -25,7 +25,7 @@ const STREAM: u32 = 0x6465_7461;
 /// Blobs of one piece of work.
 const BLOBS_A_JOB: usize = 4096;
 
-/// What takes detail along in moving weather.
+/// The wind that takes detail along.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Wind {
     /// A velocity: m/s, x east, y up, z south.
@@ -39,7 +39,7 @@ pub enum Wind {
 pub struct Detail {
     /// Strength: 0 is none, 1 much.
     pub strength: f64,
-    /// What takes it along.
+    /// The wind that takes it along.
     pub wind: Wind,
     /// Seed.
     pub seed: u32,
@@ -262,7 +262,8 @@ mod tests {
             assert!((a - b).abs() <= 1e-12 * b);
         }
         // Some of it is gone, some is several times as dense, and some has changed its column, but
-        // none is where it was clear.
+        // none is where it was clear. A quarter would be gone of a large field; the row is four
+        // units of the noise long, and has more or less of it.
         let n_gone = found.iter().filter(|b| b.kappa == 0.0).count();
         assert!((200..2400).contains(&n_gone), "{n_gone}");
         let most = plain.iter().map(|b| b.kappa).fold(0.0, f64::max);

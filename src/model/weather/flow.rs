@@ -120,7 +120,7 @@ pub fn life_s(steps: &[CarriedStep]) -> f64 {
     }
 }
 
-/// What carries the noise of a detail.
+/// The wind that carries the noise of a detail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Carrier<'a> {
     /// One velocity, m/s, for a time, s.
@@ -241,8 +241,9 @@ mod tests {
         extinction[1] = 1.0;
         let space = NoiseSpace::new(&grid);
         assert_eq!((space.unit_m, space.levels), (DVec3::new(200.0, 200.0, 400.0), 4.0));
-        // East over half a cell to both sides: 10 m/s in half a unit, south: 3.5 m/s and −0.5 m/s
-        // in half of one, up: 50 m/s in a quarter, as below there is no level.
+        // Changes over half a cell to both sides. Eastward they are 10 m/s in half a unit, and
+        // southward 3.5 m/s and −0.5 m/s in half of one. Upward they are 50 m/s in a quarter, as
+        // there is no level below.
         let squares = [10.0 / 100.0, 0.5 / 100.0, 3.5 / 200.0, 50.0 / 50.0].map(|v: f64| v * v);
         let expected = 3.0 / squares.iter().sum::<f64>().sqrt();
         let (winds, clear) = (winds(), vec![0.0; 12]);

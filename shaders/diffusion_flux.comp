@@ -3,12 +3,19 @@
 #include "records.glsl"
 #include "each.glsl"
 #include "diffusion.glsl"
+#include "at_face.glsl"
 
 // Writes fluence and flux of the diffuse light (model.md §18, passes.md "diffusion").
 // In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi; what
 // stands beside Q0 stays. The slope is that between the cells on both sides. At the faces of the
-// box it is one-sided. With BOUNCES also what each cell sends out, beside its extinction. With
-// CORRECTS phi and F, of the change by a bounce, are added to those of the bounce.
+// box it is one-sided. With FACES F is the mean of what flows through the two faces along an axis;
+// those on the box do not count. With BOUNCES also what each cell sends out, beside its
+// extinction. With CORRECTS phi and F, of the change by a bounce, are added to those of the bounce.
+
+// 1: F is what flows through the faces.
+#ifndef FACES
+#define FACES 0
+#endif
 
 // 1: bounces follow.
 #ifndef BOUNCES
@@ -34,16 +41,32 @@ FLOATS(0, density)
 // Texels, which llvmpipe fetches for all invocations at once.
 TEXELS(1, phi)
 UPDATES(2, vec4, field)
-#if BOUNCES
-TEXELS(3, arrived)
-WRITES(4, vec4, sent)
+#if FACES
+// Q0 and q, also of a change.
+TEXELS(3, carried)
 #endif
-#if CORRECTS
-// Q0 and q of the change.
-TEXELS(5, change)
+#if BOUNCES
+TEXELS(4, arrived)
+WRITES(5, vec4, sent)
 #endif
 
 vec3 phi_at(int c) { return uintBitsToFloat(TEXEL(phi, c).rgb); }
+
+float extinction_of(int c) { return min(FLOAT(density, c), push.densest); }
+
+vec3 reach_of(int c) { return 1.0 / (3.0 * extinction_of(c) * push.kept + push.inverse_chord); }
+
+#if FACES
+vec3 carried_at(int c, int axis) { return uintBitsToFloat(TEXEL(carried, 4 * c + 1 + axis).rgb); }
+
+// Returns what flows along an axis from cell c to the next one, `edge` away.
+vec3 flow(int c, int next, int axis, float edge) {
+    vec3 own = reach_of(c), other = reach_of(next);
+    vec3 q = carried_at(c, axis), next_q = carried_at(next, axis);
+    vec3 slope = (phi_at(next) - phi_at(c)) / edge;
+    return at_face(q, own, next_q, other) - 2.0 * own * other / (own + other) * slope;
+}
+#endif
 
 #if BOUNCES
 vec3 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k).rgb); }
@@ -55,26 +78,34 @@ void main() {
         int c = int(i);
         ivec3 at = place_of(level, i), stride = strides_of(level);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
-        float sigma = min(FLOAT(density, c), push.densest);
-        vec3 reach = 1.0 / (3.0 * sigma * push.kept + push.inverse_chord);
         vec3 fluence = phi_at(c);
 #if CORRECTS
         fluence += field[4 * c].rgb;
 #endif
         field[4 * c].rgb = fluence;
 #if BOUNCES
-        sent[4 * c] = vec4(arrived_at(4 * c) + push.even * fluence, sigma);
+        sent[4 * c] = vec4(arrived_at(4 * c) + push.even * fluence, extinction_of(c));
 #endif
         for (int axis = 0; axis < 3; ++axis) {
             int after = at[axis] + 1 < int(level.n_cells[axis]) ? c + stride[axis] : c;
             int prior = at[axis] > 0 ? c - stride[axis] : c;
             int n_steps = (after - prior) / stride[axis];
+            int k = 4 * c + 1 + axis;
+#if FACES
+            vec3 flux = n_steps > 0 ? vec3(0.0) : carried_at(c, axis);
+            if (after > c) {
+                flux += flow(c, after, axis, edges[axis]) / float(n_steps);
+            }
+            if (prior < c) {
+                flux += flow(prior, c, axis, edges[axis]) / float(n_steps);
+            }
+#else
             vec3 rise = phi_at(after) - phi_at(prior);
             vec3 slope = n_steps > 0 ? rise / (float(n_steps) * edges[axis]) : vec3(0.0);
-            int k = 4 * c + 1 + axis;
-            vec3 flux = field[k].rgb - reach * slope;
+            vec3 flux = field[k].rgb - reach_of(c) * slope;
+#endif
 #if CORRECTS
-            flux += uintBitsToFloat(TEXEL(change, k).rgb);
+            flux += field[k].rgb;
 #endif
             field[k].rgb = flux;
 #if BOUNCES

@@ -6,6 +6,7 @@
 #include "light.glsl"
 #include "diffusion.glsl"
 #include "patches.glsl"
+#include "at_face.glsl"
 
 // Writes the equations of the finest cells (model.md §18, passes.md "diffusion").
 // In: lights, the density grid, sources of "diffusion_sources". Out: operators, the right-hand
@@ -16,11 +17,6 @@
 // 1: the scene has surfaces or ground.
 #ifndef SOLIDS
 #define SOLIDS 0
-#endif
-
-// 1: the light is the change by a bounce.
-#ifndef CHANGE
-#define CHANGE 0
 #endif
 
 layout(push_constant) uniform Push {
@@ -49,15 +45,6 @@ READS(6, vec4, faces)
 vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
 
 float extinction_of(int c) { return min(FLOAT(density, c), push.densest); }
-
-// Returns q at the face between two cells of D `reach`.
-vec3 at_face(vec3 q, vec3 reach, vec3 other_q, vec3 other_reach) {
-#if CHANGE
-    return (other_reach * q + reach * other_q) / (reach + other_reach);
-#else
-    return 0.5 * (q + other_q);
-#endif
-}
 
 vec3 reach_of(int c) { return 1.0 / (3.0 * extinction_of(c) * push.kept + push.inverse_chord); }
 

@@ -56,6 +56,15 @@ pub fn aspects_of(groups: &[Group]) -> Option<[f64; 2]> {
     filled().all(|g| g.shapes() < Shapes::Turned).then_some(ends)
 }
 
+/// Returns the mean aspect of all particles; `None` if all blobs are balls.
+pub(super) fn mean_aspect_of(groups: &[Group]) -> Option<f64> {
+    if groups.iter().all(|g| g.shapes() == Shapes::Balls) {
+        return None;
+    }
+    let n: f64 = groups.iter().map(|g| f64::from(g.n_particles)).sum();
+    Some(groups.iter().map(|g| f64::from(g.n_particles) * g.aspects[1]).sum::<f64>() / n)
+}
+
 impl Group {
     /// Returns the group with particles from `low` to `high`.
     pub(super) fn between(self, low: DVec3, high: DVec3) -> Group {

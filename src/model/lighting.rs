@@ -184,6 +184,8 @@ pub struct Lighting {
     pub theta: f64,
     /// Number of facets of each cloud.
     pub facets_per_cloud: FacetCount,
+    /// Layers of the grid's cells; `None`: by the clouds and their blobs.
+    pub layers: Option<u32>,
     /// Accuracy of pairs of facets.
     pub pairs: Pairs,
     /// Formation of long sums.

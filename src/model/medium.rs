@@ -238,6 +238,7 @@ mod tests {
         gather: crate::model::scene::Gather::Exact,
         theta: 0.4,
         facets_per_cloud: crate::model::scene::FacetCount::Every,
+        layers: None,
         pairs: crate::model::scene::Pairs { size: 0.5, levels: 1, steps: 1 },
         sums: crate::model::sums::Sums {
             summation: crate::model::sums::Summation::Plain,

@@ -9,6 +9,7 @@ pub mod backdrop;
 pub mod basis;
 pub mod boxes;
 pub mod camera;
+mod cell_aspect;
 pub mod cloud;
 pub mod count;
 pub mod cover;

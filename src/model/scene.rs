@@ -7,11 +7,13 @@ use glam::{DVec2, DVec3};
 
 use super::air::Air;
 use super::camera::Camera;
-use super::cloud::{Cloud, CloudSource, Group, MIN_ASPECT, Shapes, runs};
+use super::cell_aspect::cell_aspect;
+use super::cloud::{Cloud, CloudSource, Group, Shapes, runs};
 use super::cover::Sea;
 pub use super::draw::{Chunks, Cull, Draw, DrawPath, Impostors, MAX_CHUNKS};
 use super::film::Film;
 use super::grid::GridSpec;
+use super::group::mean_aspect_of;
 use super::light::Light;
 pub use super::lighting::{
     DiffusionSettings, FacetCount, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCE_CELLS,
@@ -199,20 +201,9 @@ impl Scene {
 
     /// Returns the density grid over ± `half` about the lighting origin.
     pub fn density_grid(&self, groups: &[Group], half: DVec3) -> GridSpec {
-        GridSpec::fit(-half, half, self.lighting.grid, Scene::cell_aspect(groups, 2.0 * half))
-    }
-
-    /// Returns the cells' heights over their widths: 1 if all blobs of `groups` are balls.
-    /// Otherwise it is the blobs' mean aspect or that of the bounds of the given extent, whichever
-    /// is flatter.
-    fn cell_aspect(groups: &[Group], extent: DVec3) -> f64 {
-        if groups.iter().all(|g| g.shapes() == Shapes::Balls) {
-            return 1.0;
-        }
-        let n: f64 = groups.iter().map(|g| f64::from(g.n_particles)).sum();
-        let mean = groups.iter().map(|g| f64::from(g.n_particles) * g.aspects[1]).sum::<f64>() / n;
-        let flat = extent.y / extent.x.max(extent.z);
-        if flat > 0.0 { mean.min(flat) } else { mean }.clamp(MIN_ASPECT, 1.0 / MIN_ASPECT)
+        let Lighting { grid, layers, .. } = self.lighting;
+        let aspect = cell_aspect(mean_aspect_of(groups), 2.0 * half, grid, layers);
+        GridSpec::fit(-half, half, grid, aspect)
     }
 
     /// Returns whether slices of clouds have the light of the cells where they are, and not that

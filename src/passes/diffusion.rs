@@ -232,7 +232,11 @@ impl Diffusion {
         work: &DiffusionWork,
     ) -> Result<()> {
         self.record_fluence(rec, lights, cells, work)?;
-        let buffers = [cells.density, &self.scratch.next_phi, cells.field];
+        let next_phi = &self.scratch.next_phi;
+        if let Some(bounces) = &self.bounces {
+            return bounces.record_light(rec, cells, next_phi);
+        }
+        let buffers = [cells.density, next_phi, cells.field];
         rec.dispatch(&self.flux, &buffers, &cells.flux_push(), cells.n_total())
     }
 

@@ -103,6 +103,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "impostors_part.comp",
     "include/angle.glsl",
     "include/arriving.glsl",
+    "include/at_face.glsl",
     "include/behind.glsl",
     "include/blob.glsl",
     "include/buffers.glsl",

@@ -62,6 +62,7 @@ fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
     let Lighting {
         mode,
         grid,
+        layers,
         step,
         forward,
         facets_per_cloud,
@@ -74,11 +75,15 @@ fn relevant(scene: &Scene, against: ReferenceKind) -> Scene {
         against,
         ReferenceKind::Model | ReferenceKind::Reflections(_) | ReferenceKind::Transport
     );
-    let (grid, step, facets_per_cloud) =
-        if by_model { (1, 1.0, FacetCount::Every) } else { (grid, step, facets_per_cloud) };
+    let (grid, layers, step, facets_per_cloud) = if by_model {
+        (1, None, 1.0, FacetCount::Every)
+    } else {
+        (grid, layers, step, facets_per_cloud)
+    };
     let lighting = Lighting {
         mode,
         grid,
+        layers,
         step,
         forward,
         facets_per_cloud,

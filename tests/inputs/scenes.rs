@@ -242,8 +242,8 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             "up": [0.0, 1.0, 0.0], "fov_y_deg": 45.0, "near": 0.01 },
             "time": { "start_s": 0.0, "step_s": 0.0333, "frames": 300 },
             "lighting": {
-                "mode": "two-reflection", "grid": 64, "step": 1.0, "forward": 0.85, "bases": 8,
-                "sampling": "log",
+                "mode": "two-reflection", "grid": 64, "layers": "auto", "step": 1.0,
+                "forward": 0.85, "bases": 8, "sampling": "log",
                 "exponents": [1.0, 256.0], "gather": "auto", "theta": 0.4, "facets_per_cloud": "auto",
                 "pair_size": 0.5, "pair_levels": 6, "pair_steps": 16, "summation": "plain",
                 "precision": "f32",

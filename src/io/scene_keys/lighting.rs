@@ -16,6 +16,11 @@ use crate::model::sums::{Precision, Summation, Sums};
 /// Cutoff cells of the density grid: with fewer the margins leave next to no grid.
 const MIN_CELLS: u32 = 8;
 
+fn layers() -> Spec<Option<u32>> {
+    let numbers = integer(MIN_CELLS, MIN_CELLS, MAX_CELLS).map(Some);
+    one_of("auto", [("auto".into(), None)], Some(numbers))
+}
+
 fn facet_count() -> Spec<FacetCount> {
     let numbers = integer(0, 0, u32::MAX).map(|n| match n {
         0 => FacetCount::Every,
@@ -34,6 +39,9 @@ keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
     mode: choice("two-reflection", &LightingMode::NAMES);
     /// Cells along the longest axis of the density grid.
     grid: integer(64, MIN_CELLS, MAX_CELLS);
+    /// Layers of the grid's cells, at most `grid`; odd where that is odd, else even. With "auto"
+    /// cells are as wide as high, or as flat as the blobs, and the clouds lie in 12 layers or more.
+    layers: layers();
     /// Step of the march through the density grid toward a light.
     step: number(1.0, Bounds::Within(0.05, 16.0)), "cell";
     /// Share g of the optical depth that does not weaken light on its way through a cloud.

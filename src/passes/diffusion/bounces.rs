@@ -70,11 +70,15 @@ buffers! {
     struct Arrived(n_cells: u64) {
         /// That of suns and lamps.
         arrived: Buffer => [[f32; 4]; 4], n_cells, "diffusion.arrived", Texels;
+        /// Q0 and q.
+        carried: Buffer => [[f32; 4]; 4], n_cells, "diffusion.carried", Texels;
     }
 }
 
 /// The kernels, and their scratch.
 pub(super) struct Bounces {
+    /// φ and F, of cells between which no bounces lead.
+    light: Kernel,
     flux: Kernel,
     bounce: Kernel,
     /// The equations of a change.
@@ -109,13 +113,14 @@ impl Bounces {
         let of_change = [("N_SETS", room.n_sets), ("SOLIDS", 0), ("CHANGE", 1)];
         let is_merged = room.bounce_cells > 1;
         Ok(Bounces {
-            flux: kernel("diffusion.flux", FluxPush::FIELDS, &[("BOUNCES", 1)])?,
+            light: kernel("diffusion.flux", FluxPush::FIELDS, &[("FACES", 1)])?,
+            flux: kernel("diffusion.flux", FluxPush::FIELDS, &[("FACES", 1), ("BOUNCES", 1)])?,
             bounce: kernel("diffusion.bounce", BouncePush::FIELDS, &solids)?,
             system: kernel("diffusion.system", SystemPush::FIELDS, &of_change)?,
             correct: kernel(
                 "diffusion.flux",
                 FluxPush::FIELDS,
-                &[("BOUNCES", 1), ("CORRECTS", 1)],
+                &[("FACES", 1), ("BOUNCES", 1), ("CORRECTS", 1), ("CHANGE", 1)],
             )?,
             seen: kernel("diffusion.seen", SeenPush::FIELDS, &solids)?,
             arrived: Arrived::new(device, room.n_grid_cells())?,
@@ -135,6 +140,18 @@ impl Bounces {
         &self.scratch.change
     }
 
+    /// Writes φ and F.
+    pub fn record_light(
+        &self,
+        rec: &mut Recorder<'_>,
+        cells: &Cells<'_>,
+        phi: &Buffer,
+    ) -> Result<()> {
+        rec.copy(cells.field, &self.arrived.carried);
+        let all = [cells.density, phi, cells.field, &self.arrived.carried];
+        rec.dispatch(&self.light, &all, &cells.flux_push(), cells.n_total())
+    }
+
     /// Writes φ and F, and what each cell sends out.
     pub fn record_flux(
         &self,
@@ -142,7 +159,9 @@ impl Bounces {
         cells: &Cells<'_>,
         [phi, arrived]: [&Buffer; 2],
     ) -> Result<()> {
-        let all = [cells.density, phi, cells.field, arrived, &self.scratch.sent];
+        let carried = &self.arrived.carried;
+        rec.copy(cells.field, carried);
+        let all = [cells.density, phi, cells.field, carried, arrived, &self.scratch.sent];
         rec.dispatch(&self.flux, &all, &cells.flux_push(), cells.n_total())
     }
 
@@ -179,7 +198,7 @@ impl Bounces {
         [phi, arrived]: [&Buffer; 2],
     ) -> Result<()> {
         let Scratch { sent, change } = &self.scratch;
-        let buffers = [cells.density, phi, cells.field, arrived, sent, change];
+        let buffers = [cells.density, phi, cells.field, change, arrived, sent];
         rec.dispatch(&self.correct, &buffers, &cells.flux_push(), cells.n_total())
     }
 

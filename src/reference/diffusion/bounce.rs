@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::moments::flux_of;
+use super::moments::flux_through_faces;
 use super::multigrid::Multigrid;
 use super::sources::{DiffusionMedium, Moments, Sources};
 use super::system::{AtFaces, System};
@@ -100,7 +100,7 @@ impl Bounces<'_> {
         let series = AtFaces::InSeries;
         let system = System::new(self.of, self.grid, self.cells, &sources, &[], None, series);
         let phi = Multigrid::new(system, self.grid.edges()).solve(CYCLES_OF_CHANGE);
-        let more = flux_of(self.of, self.grid, self.cells, &sources, &phi);
+        let more = flux_through_faces(self.of, self.grid, self.cells, (&sources, series), &phi);
         let all = found.iter().zip(more);
         all.map(|(a, b)| std::array::from_fn(|k| a[k] + b[k])).collect()
     }

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::bounce::Bounces;
 use super::faces::FaceLight;
 use super::merged::Merged;
-use super::moments::{corners, flux_of};
+use super::moments::{corners, flux_of, flux_through_faces};
 use super::multigrid::Multigrid;
 use super::seen::SeenCells;
 use super::sources::{DiffusionMedium, Moments, Sources};
@@ -60,7 +60,10 @@ impl DiffuseLight {
             let mean = AtFaces::Mean;
             let system = System::new(of, grid, cells, sources, lights, of_solids, mean);
             let phi = Multigrid::new(system, grid.edges()).solve(n_cycles);
-            flux_of(of, grid, cells, sources, &phi)
+            match n_bounces {
+                0 => flux_of(of, grid, cells, sources, &phi),
+                _ => flux_through_faces(of, grid, cells, (sources, mean), &phi),
+            }
         };
         let mut light = solved(of, grid, cells, &sources);
         let direct = sources.direct.clone();

@@ -30,6 +30,16 @@ pub enum AtFaces {
     InSeries,
 }
 
+impl AtFaces {
+    /// Returns it between two cells of which q and D are given.
+    pub(super) fn q(self, [a, b]: [DVec3; 2], [reach_a, reach_b]: [DVec3; 2]) -> DVec3 {
+        match self {
+            AtFaces::Mean => 0.5 * (a + b),
+            AtFaces::InSeries => (reach_b * a + reach_a * b) / (reach_a + reach_b),
+        }
+    }
+}
+
 /// Returns the index of the next cell along an axis, if there is one.
 pub(super) fn next(n: USizeVec3, c: usize, axis: usize) -> Option<usize> {
     let stride = [1, n.x, n.x * n.y][axis];
@@ -78,12 +88,8 @@ impl System {
             for axis in 0..3 {
                 let h = h[axis];
                 let carried = |c: usize| sources.carried[c][axis];
-                let at_face = |other: usize| match at_faces {
-                    AtFaces::Mean => 0.5 * (carried(c) + carried(other)),
-                    AtFaces::InSeries => {
-                        let (a, b) = (reach[c], reach[other]);
-                        (b * carried(c) + a * carried(other)) / (a + b)
-                    }
+                let at_face = |other: usize| {
+                    at_faces.q([carried(c), carried(other)], [reach[c], reach[other]])
                 };
                 match next(n, c, axis) {
                     Some(after) => {

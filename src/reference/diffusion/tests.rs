@@ -1,5 +1,6 @@
 use glam::{DVec3, UVec3};
 
+use super::moments::flux_through_faces;
 use super::{AtFaces, DiffuseLight, DiffusionMedium, Multigrid, Sources, System, solve};
 use crate::model::cloud::Shape;
 use crate::model::grid::GridSpec;
@@ -200,6 +201,37 @@ fn an_empty_box_lets_the_sky_through() {
     }
 }
 
+/// Between unlike cells: D is 1/c, that is 3/7, and the 1/(3σ + c) of σ = 7/9, 3/14.
+#[test]
+fn what_flows_through_faces_by_hand() {
+    let grid = GridSpec { n_cells: UVec3::new(3, 1, 1), cell: 0.5, aspect: 1.0, low: DVec3::ZERO };
+    let mean = MeanMedium { albedo: DVec3::ZERO, g: 0.0, straight: 0.0 };
+    let of = DiffusionMedium { densest: f64::INFINITY, ..DiffusionMedium::new(mean, &grid) };
+    let cells = [0.0, 7.0 / 9.0, 0.0];
+    let phi = [1.0, 3.0, 4.0].map(DVec3::splat);
+    let of_axis = |x: f64| [DVec3::splat(x), DVec3::Y, DVec3::Z];
+    let sources = Sources {
+        of_suns: vec![],
+        scattered: vec![DVec3::ZERO; 3],
+        carried: [1.0, 4.0, -2.0].map(of_axis).into(),
+        direct: vec![],
+    };
+    // D of a face is 2/(7/3 + 14/3) = 2/7, slopes are 4 and 2.
+    for (at_faces, [first, second]) in [
+        (AtFaces::Mean, [2.5 - 8.0 / 7.0, 1.0 - 4.0 / 7.0]),
+        // q of a third of its first cell and two thirds of the second, and the other way about.
+        (AtFaces::InSeries, [3.0 - 8.0 / 7.0, 2.0 - 4.0 / 7.0]),
+    ] {
+        let found = flux_through_faces(&of, &grid, &cells, (&sources, at_faces), &phi);
+        let expected = [first, 0.5 * (first + second), second];
+        for (k, (found, x)) in found.iter().zip(expected).enumerate() {
+            assert!((found[1].x - x).abs() < 1e-14, "{at_faces:?} {k}: {} {x}", found[1].x);
+            // One cell across: q alone.
+            assert_eq!([found[2], found[3]], [DVec3::Y, DVec3::Z]);
+        }
+    }
+}
+
 #[test]
 fn a_flux_by_hand() {
     // φ rises by 2 along x in cells of edge 0.5 without extinction: F = −D·4, D = 1/c.
@@ -215,7 +247,9 @@ fn a_flux_by_hand() {
         direct: vec![1.0, 2.0, 4.0],
     };
     let light = DiffuseLight::of_fluence(&of, &grid, &[0.0; 3], &nothing, &phi);
-    for [_, x, y, z] in &light.cells {
+    // All faces have the same flow.
+    let by_faces = flux_through_faces(&of, &grid, &[0.0; 3], (&nothing, AtFaces::Mean), &phi);
+    for [_, x, y, z] in light.cells.iter().chain(&by_faces) {
         assert!((x.x + 4.0 * 3.0 / 7.0).abs() < 1e-14 && y.x == 0.0 && z.x == 0.0);
     }
     assert_eq!(light.at(DVec3::new(0.5, 9.0, -9.0)).0[0], DVec3::splat(2.0));

@@ -78,6 +78,7 @@ pub fn tables() -> Vec<(&'static str, Vec<Key>)> {
             vec![
                 ("mode", quoted(&["none", "first", "two-reflection"])),
                 ("grid", integer(8, 512)),
+                ("layers", integer(8, 512)),
                 ("step", number(0.3, 16.0)),
                 ("forward", number(0.0, 1.0)),
                 ("bases", integer(1, 32)),

@@ -12,7 +12,7 @@
 // those on the box do not count. With BOUNCES also what each cell sends out, beside its
 // extinction. With CORRECTS phi and F, of the change by a bounce, are added to those of the bounce.
 
-// 1: F is what flows through the faces.
+// 1: F is the mean of what flows through the faces of a cell.
 #ifndef FACES
 #define FACES 0
 #endif

@@ -277,6 +277,27 @@ fn the_density_grid_grows_for_other_proportions() {
     bed.close().expect("no validation message");
 }
 
+/// Light by diffusion has buffers by cell, which do not grow in place.
+#[test]
+fn more_cells_recreate_light_by_diffusion() {
+    let bed = bed();
+    let base = scene("[lighting]\nmode = 'diffusion'\ngrid = 16\nbounces = 1", "");
+    let round = document(&base);
+    let mut long = round.clone();
+    long.boxes[0].center.x += 80.0;
+    let [long, round] = [long, round].map(|document| with(&base, &document));
+    let mut player = bed.player(long.clone(), true).expect("a player");
+    contents(&bed, &mut player);
+    for (scene, way) in
+        [(&round, Reshaped::Anew), (&long, Reshaped::InPlace), (&round, Reshaped::InPlace)]
+    {
+        assert_eq!(player.reshape(&bed, scene.clone(), &[]).expect("reshaped"), way);
+        assert!(contents(&bed, &mut player).0 == fresh(&bed, scene));
+    }
+    drop(player);
+    bed.close().expect("no validation message");
+}
+
 #[test]
 fn a_cloud_may_begin_without_boxes_and_lose_its_last_box() {
     let bed = bed();

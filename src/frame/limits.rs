@@ -168,7 +168,7 @@ fn grid_advice(scene: &Scene) -> Option<String> {
     (is_lit(scene) && n >= MANY).then(|| {
         format!(
             "lighting.grid = {grid} makes its cells smaller than the blobs: {n:.1e} cell updates \
-             each time they move; half the cells a side take an eighth of that, or somewhat more"
+             each time they move; half the cells a side take an eighth to a quarter of that"
         )
     })
 }

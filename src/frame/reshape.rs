@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::buffers::n_cells;
-use super::features::is_thin;
+use super::features::{has_diffusion, is_thin};
 use super::limits;
 use super::player::Player;
 use super::records::upload_groups;
@@ -22,8 +22,8 @@ use crate::model::scene::{LightingMode, Scene, Simulate};
 pub enum Reshaped {
     /// They were kept.
     InPlace,
-    /// They were replaced, because the number of boxes or of their particles has changed. Unchanged
-    /// particles were copied.
+    /// They were replaced, because the number of boxes or of their particles has changed, or
+    /// because light by diffusion needs more cells. Unchanged particles were copied.
     Anew,
 }
 
@@ -78,7 +78,10 @@ impl Player {
         let old_groups = self.scene.groups();
         let size = |g: &Group| (g.i_cloud, g.n_particles);
         let is_same_size = old_groups.iter().map(size).eq(groups.iter().map(size));
-        let reshaped = if is_same_size && is_thin(&self.scene) == is_thin(&scene) {
+        // Only the grid itself can grow in place, and not the light in its cells.
+        let is_wider = n_cells(&scene) > self.renderer.passes.grid.capacity();
+        let is_kept = is_same_size && is_thin(&self.scene) == is_thin(&scene);
+        let reshaped = if is_kept && !(is_wider && has_diffusion(&scene)) {
             self.renderer.grow_grid(device, &scene)?;
             self.renderer.replace_groups(device, &scene, &groups, touched)?;
             Reshaped::InPlace

@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::grid::MARGIN_CELLS;
 use super::shape::MIN_ASPECT;
 
-/// The fewest layers of cells for flat clouds. In light by diffusion, fewer cost more error than as
-/// many cells across gain (model.md §18, "Cells").
+/// The fewest layers of cells within the margins. Fewer layers raise the error of diffuse light by
+/// more than the same number of cells saves across (model.md §18, "Layers").
 const LEAST_LAYERS: u32 = 12;
 
 /// Returns the height over the width of cells for clouds in a box of the given extent.
@@ -22,13 +22,13 @@ pub(super) fn cell_aspect(
     layers: Option<u32>,
 ) -> f64 {
     let flat = extent.y / extent.x.max(extent.z);
-    let is_flat = flat > 0.0 && flat.is_finite();
+    let has_shape = flat > 0.0 && flat.is_finite();
     // The aspect with so many layers within the margins.
     let with_layers = |n: u32| flat * f64::from(inner(grid)) / f64::from(n);
     let aspect = match (layers, mean_aspect) {
-        (Some(layers), _) if is_flat => with_layers(inner(layers.min(grid))),
+        (Some(layers), _) if has_shape => with_layers(inner(layers.min(grid))),
         (_, None) => return 1.0,
-        (None, Some(mean)) if is_flat => {
+        (None, Some(mean)) if has_shape => {
             let most = mean.min(1.0);
             most.min(with_layers(LEAST_LAYERS)).max(most.min(flat))
         }

@@ -1,6 +1,6 @@
 //! The density grid of model.md §8: cells over everything that attenuates light, relative to the
-//! lighting origin. Cells are cubes for round blobs, otherwise as flat as the mean blob
-//! (model.md §14).
+//! lighting origin. Cells of balls are cubes; others are at most as high as wide, unless
+//! the number of layers is given (model.md §14).
 
 use glam::{DVec3, UVec3};
 

@@ -173,7 +173,9 @@ impl Diffusion {
         work: &DiffusionWork,
     ) -> Result<()> {
         let (_, n_all) = levels(grid);
-        if u64::from(n_all) > self.room.n_cells {
+        if u64::from(n_all) > self.room.n_cells
+            || u64::from(grid.n_cells.iter().product::<u32>()) > self.room.n_grid_cells()
+        {
             return Err(Error::limit(format!(
                 "diffusion on {n_all} cells of all levels, where there is room for {}",
                 self.room.n_cells

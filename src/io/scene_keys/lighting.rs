@@ -39,8 +39,9 @@ keys! { LIGHTING: fn lighting(s, of_materials: &[f64]) -> Lighting { Lighting;
     mode: choice("two-reflection", &LightingMode::NAMES);
     /// Cells along the longest axis of the density grid.
     grid: integer(64, MIN_CELLS, MAX_CELLS);
-    /// Layers of the grid's cells, at most `grid`; odd where that is odd, else even. With "auto"
-    /// cells are as wide as high, or as flat as the blobs, and the clouds lie in 12 layers or more.
+    /// Layers of the grid's cells, two at each end being margin: at most `grid`, odd where that is
+    /// odd, else even. With "auto" balls have cubes. Other blobs have cells that are at most as
+    /// high as wide and as flat as the blobs are, in 16 layers or more.
     layers: layers();
     /// Step of the march through the density grid toward a light.
     step: number(1.0, Bounds::Within(0.05, 16.0)), "cell";

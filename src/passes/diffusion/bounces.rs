@@ -140,16 +140,22 @@ impl Bounces {
         &self.scratch.change
     }
 
-    /// Writes φ and F.
+    /// Writes φ, and F by what flows through the cells' faces.
     pub fn record_light(
         &self,
         rec: &mut Recorder<'_>,
         cells: &Cells<'_>,
         phi: &Buffer,
     ) -> Result<()> {
-        rec.copy(cells.field, &self.arrived.carried);
+        self.record_carried(rec, cells);
         let all = [cells.density, phi, cells.field, &self.arrived.carried];
         rec.dispatch(&self.light, &all, &cells.flux_push(), cells.n_total())
+    }
+
+    /// Copies Q0 and q, which "flux" overwrites and reads in the cells beside its own.
+    fn record_carried(&self, rec: &mut Recorder<'_>, cells: &Cells<'_>) {
+        let n_bytes = u64::from(cells.n_total()) * size_of::<[[f32; 4]; 4]>() as u64;
+        rec.copy_runs(cells.field, &self.arrived.carried, &[[0, 0, n_bytes]]);
     }
 
     /// Writes φ and F, and what each cell sends out.
@@ -159,8 +165,8 @@ impl Bounces {
         cells: &Cells<'_>,
         [phi, arrived]: [&Buffer; 2],
     ) -> Result<()> {
+        self.record_carried(rec, cells);
         let carried = &self.arrived.carried;
-        rec.copy(cells.field, carried);
         let all = [cells.density, phi, cells.field, carried, arrived, &self.scratch.sent];
         rec.dispatch(&self.flux, &all, &cells.flux_push(), cells.n_total())
     }

@@ -31,7 +31,7 @@ pub enum AtFaces {
 }
 
 impl AtFaces {
-    /// Returns it between two cells of which q and D are given.
+    /// Returns q at the face between two cells of which q and D are given.
     pub(super) fn q(self, [a, b]: [DVec3; 2], [reach_a, reach_b]: [DVec3; 2]) -> DVec3 {
         match self {
             AtFaces::Mean => 0.5 * (a + b),

@@ -35,6 +35,26 @@ fn bounces_have_the_same_light_without_slopes() {
     }
 }
 
+/// Cells that are higher than wide, and flat ones, of balls.
+#[test]
+fn layers_that_are_given_have_the_light_of_the_twin() {
+    let gpu = Gpu::new();
+    for (name, layers) in [("boxes", 8), ("floors", 8), ("coloured", 20)] {
+        for mode in ["diffusion", "bounces", "merged"] {
+            let scene = scene(name, mode, &[&format!("lighting.layers={layers}")]);
+            let groups = scene.groups();
+            let (low, high) = scene.bounds(&groups, 0.0, 3.0).expect("clouds");
+            let grid = scene.density_grid(&groups, 0.5 * (high - low));
+            assert!(grid.n_cells.y == layers && grid.aspect != 1.0, "{grid:?}");
+            let (found, truth) =
+                (media::on_device(&gpu, &gpu.compiler, &scene), media::by_twin(&scene));
+            let off = media::apart(&found.radiance, &truth.radiance);
+            println!("{name}, {mode}, {layers} layers: {off:e}");
+            assert!(off < media::bound(&scene), "{name}, {mode}: {off:e}");
+        }
+    }
+}
+
 #[test]
 fn wrong_shaders_are_found() {
     let wrong = [

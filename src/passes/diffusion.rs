@@ -153,7 +153,14 @@ impl Diffusion {
             )?,
             coarsest: kernel("diffusion.coarsest", CoarsestPush::FIELDS)?,
             restrict: kernel("diffusion.restrict", PairPush::FIELDS)?,
-            flux: kernel("diffusion.flux", FluxPush::FIELDS)?,
+            flux: Kernel::with_macros(
+                device,
+                compiler,
+                "diffusion.flux",
+                FluxPush::FIELDS,
+                &[],
+                &[("FACES", u32::from(has_bounces))],
+            )?,
             bounces: has_bounces.then(|| Bounces::new(device, compiler, room)).transpose()?,
             scratch: Scratch::new(device, room)?,
             room,
@@ -234,11 +241,9 @@ impl Diffusion {
         work: &DiffusionWork,
     ) -> Result<()> {
         self.record_fluence(rec, lights, cells, work)?;
-        let next_phi = &self.scratch.next_phi;
-        if let Some(bounces) = &self.bounces {
-            return bounces.record_light(rec, cells, next_phi);
-        }
-        let buffers = [cells.density, next_phi, cells.field];
+        let carried = self.bounces.as_ref().map(|bounces| bounces.record_carried(rec, cells));
+        let buffers = [cells.density, &self.scratch.next_phi, cells.field];
+        let buffers: Vec<&Buffer> = buffers.into_iter().chain(carried).collect();
         rec.dispatch(&self.flux, &buffers, &cells.flux_push(), cells.n_total())
     }
 

@@ -77,8 +77,6 @@ buffers! {
 
 /// The kernels, and their scratch.
 pub(super) struct Bounces {
-    /// φ and F, of cells between which no bounces lead.
-    light: Kernel,
     flux: Kernel,
     bounce: Kernel,
     /// The equations of a change.
@@ -113,7 +111,6 @@ impl Bounces {
         let of_change = [("N_SETS", room.n_sets), ("SOLIDS", 0), ("CHANGE", 1)];
         let is_merged = room.bounce_cells > 1;
         Ok(Bounces {
-            light: kernel("diffusion.flux", FluxPush::FIELDS, &[("FACES", 1)])?,
             flux: kernel("diffusion.flux", FluxPush::FIELDS, &[("FACES", 1), ("BOUNCES", 1)])?,
             bounce: kernel("diffusion.bounce", BouncePush::FIELDS, &solids)?,
             system: kernel("diffusion.system", SystemPush::FIELDS, &of_change)?,
@@ -140,22 +137,11 @@ impl Bounces {
         &self.scratch.change
     }
 
-    /// Writes φ, and F by what flows through the cells' faces.
-    pub fn record_light(
-        &self,
-        rec: &mut Recorder<'_>,
-        cells: &Cells<'_>,
-        phi: &Buffer,
-    ) -> Result<()> {
-        self.record_carried(rec, cells);
-        let all = [cells.density, phi, cells.field, &self.arrived.carried];
-        rec.dispatch(&self.light, &all, &cells.flux_push(), cells.n_total())
-    }
-
-    /// Copies Q0 and q, which "flux" overwrites and reads in the cells beside its own.
-    fn record_carried(&self, rec: &mut Recorder<'_>, cells: &Cells<'_>) {
+    /// Returns a copy of Q0 and q, which "flux" overwrites and reads in the cells beside its own.
+    pub fn record_carried(&self, rec: &mut Recorder<'_>, cells: &Cells<'_>) -> &Buffer {
         let n_bytes = u64::from(cells.n_total()) * size_of::<[[f32; 4]; 4]>() as u64;
         rec.copy_runs(cells.field, &self.arrived.carried, &[[0, 0, n_bytes]]);
+        &self.arrived.carried
     }
 
     /// Writes φ and F, and what each cell sends out.
@@ -165,8 +151,7 @@ impl Bounces {
         cells: &Cells<'_>,
         [phi, arrived]: [&Buffer; 2],
     ) -> Result<()> {
-        self.record_carried(rec, cells);
-        let carried = &self.arrived.carried;
+        let carried = self.record_carried(rec, cells);
         let all = [cells.density, phi, cells.field, carried, arrived, &self.scratch.sent];
         rec.dispatch(&self.flux, &all, &cells.flux_push(), cells.n_total())
     }

@@ -3,14 +3,13 @@
 #include "records.glsl"
 #include "each.glsl"
 #include "diffusion.glsl"
-#include "at_face.glsl"
 
 // Writes fluence and flux of the diffuse light (model.md §18, passes.md "diffusion").
 // In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi; what
 // stands beside Q0 stays. The slope is that between the cells on both sides. At the faces of the
 // box it is one-sided. With FACES F is the mean of what flows through the two faces along an axis;
 // those on the box do not count. With BOUNCES also what each cell sends out, beside its
-// extinction. With CORRECTS phi and F, of the change by a bounce, are added to those of the bounce.
+// extinction. With CHANGE phi and F, of the change by a bounce, are added to those of the bounce.
 
 // 1: F is the mean of what flows through the faces of a cell.
 #ifndef FACES
@@ -20,11 +19,6 @@
 // 1: bounces follow.
 #ifndef BOUNCES
 #define BOUNCES 0
-#endif
-
-// 1: phi is that of a change.
-#ifndef CORRECTS
-#define CORRECTS 0
 #endif
 
 layout(push_constant) uniform Push {
@@ -52,9 +46,7 @@ WRITES(5, vec4, sent)
 
 vec3 phi_at(int c) { return uintBitsToFloat(TEXEL(phi, c).rgb); }
 
-float extinction_of(int c) { return min(FLOAT(density, c), push.densest); }
-
-vec3 reach_of(int c) { return 1.0 / (3.0 * extinction_of(c) * push.kept + push.inverse_chord); }
+#include "diffusivity.glsl"
 
 #if FACES
 vec3 carried_at(int c, int axis) { return uintBitsToFloat(TEXEL(carried, 4 * c + 1 + axis).rgb); }
@@ -79,7 +71,7 @@ void main() {
         ivec3 at = place_of(level, i), stride = strides_of(level);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 fluence = phi_at(c);
-#if CORRECTS
+#if CHANGE
         fluence += field[4 * c].rgb;
 #endif
         field[4 * c].rgb = fluence;
@@ -104,7 +96,7 @@ void main() {
             vec3 slope = n_steps > 0 ? rise / (float(n_steps) * edges[axis]) : vec3(0.0);
             vec3 flux = field[k].rgb - reach_of(c) * slope;
 #endif
-#if CORRECTS
+#if CHANGE
             flux += field[k].rgb;
 #endif
             field[k].rgb = flux;

@@ -6,7 +6,6 @@
 #include "light.glsl"
 #include "diffusion.glsl"
 #include "patches.glsl"
-#include "at_face.glsl"
 
 // Writes the equations of the finest cells (model.md §18, passes.md "diffusion").
 // In: lights, the density grid, sources of "diffusion_sources". Out: operators, the right-hand
@@ -44,10 +43,7 @@ READS(6, vec4, faces)
 
 vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
 
-float extinction_of(int c) { return min(FLOAT(density, c), push.densest); }
-
-vec3 reach_of(int c) { return 1.0 / (3.0 * extinction_of(c) * push.kept + push.inverse_chord); }
-
+#include "diffusivity.glsl"
 #include "faces.glsl"
 #include "angle.glsl"
 #include "sky.glsl"

@@ -110,14 +110,7 @@ fn wrong_shaders_are_found() {
         (
             "opaque",
             "bounces",
-            "diffusion_system.comp",
-            "min(FLOAT(density, c), push.densest)",
-            "FLOAT(density, c)",
-        ),
-        (
-            "opaque",
-            "bounces",
-            "diffusion_flux.comp",
+            "include/diffusivity.glsl",
             "min(FLOAT(density, c), push.densest)",
             "FLOAT(density, c)",
         ),
@@ -194,11 +187,17 @@ fn wrong_shaders_are_found() {
         (
             "flat",
             "bounces",
-            "include/at_face.glsl",
+            "include/diffusivity.glsl",
             "(other_reach * q + reach * other_q)",
             "(other_reach * q - reach * other_q)",
         ),
-        ("flat", "diffusion", "include/at_face.glsl", "0.5 * (q + other_q)", "0.6 * (q + other_q)"),
+        (
+            "flat",
+            "diffusion",
+            "include/diffusivity.glsl",
+            "0.5 * (q + other_q)",
+            "0.6 * (q + other_q)",
+        ),
         (
             "flat",
             "merged",

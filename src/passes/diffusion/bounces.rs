@@ -117,7 +117,7 @@ impl Bounces {
             correct: kernel(
                 "diffusion.flux",
                 FluxPush::FIELDS,
-                &[("FACES", 1), ("BOUNCES", 1), ("CORRECTS", 1), ("CHANGE", 1)],
+                &[("FACES", 1), ("BOUNCES", 1), ("CHANGE", 1)],
             )?,
             seen: kernel("diffusion.seen", SeenPush::FIELDS, &solids)?,
             arrived: Arrived::new(device, room.n_grid_cells())?,

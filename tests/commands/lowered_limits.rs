@@ -65,21 +65,20 @@ fn every_scene_draws_the_same_picture_under_the_limits_of_other_devices() {
     let whole = open(None);
     let others: Vec<_> = CAPABLE.map(|name| (name, open(Some(limits(name))))).into();
     for (i, path) in program::scenes().iter().enumerate() {
-        for (k, draw) in [DrawPath::Sprites, DrawPath::Tiles].into_iter().enumerate() {
-            let scene = scene(path, draw);
-            let expected = picture(&whole, &scene).expect("a picture");
-            // Scenes and devices take turns: a scene meets two devices, and a device draws scenes
-            // of all kinds by both paths.
-            let (name, context) = &others[(i + 3 * k) % others.len()];
-            let what = format!("{} by {draw:?} on {name}", path.display());
-            let found = picture(context, &scene).unwrap_or_else(|e| panic!("{what}: {e}"));
-            if found != expected {
-                // A picture that differs by chance is another fault than one of a limit.
-                let again = |of: &GpuContext| picture(of, &scene).expect("a picture");
-                let same = [again(context) == found, again(&whole) == expected];
-                let difference = difference(&found, &expected);
-                panic!("{what}: {difference}; drawn again, each is the same: {same:?}");
-            }
+        // Scenes, devices and paths take turns: a device draws scenes of all kinds by both paths.
+        let (k, n) = (i % 2, others.len());
+        let draw = [DrawPath::Sprites, DrawPath::Tiles][k];
+        let (name, context) = &others[(i / 2 + n / 2 * k) % n];
+        let scene = scene(path, draw);
+        let expected = picture(&whole, &scene).expect("a picture");
+        let what = format!("{} by {draw:?} on {name}", path.display());
+        let found = picture(context, &scene).unwrap_or_else(|e| panic!("{what}: {e}"));
+        if found != expected {
+            // A picture that differs by chance is another fault than one of a limit.
+            let again = |of: &GpuContext| picture(of, &scene).expect("a picture");
+            let same = [again(context) == found, again(&whole) == expected];
+            let difference = difference(&found, &expected);
+            panic!("{what}: {difference}; drawn again, each is the same: {same:?}");
         }
     }
     whole.close().expect("no messages");

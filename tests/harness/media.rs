@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -217,12 +218,13 @@ pub type Wrong = (&'static str, &'static str, &'static str, &'static str, &'stat
 
 /// Checks that wrong shaders are beyond the bound.
 pub fn check_found(gpu: &Gpu, wrong: &[Wrong]) {
+    let mut truths = BTreeMap::new();
     for (name, mode, file, from, to) in wrong {
         let scene = scene(name, mode, &[]);
-        let wrong = Gpu::wrong_compiler(file, from, to);
-        let (found, truth) = (on_device(gpu, &wrong, &scene), by_twin(&scene));
+        let truth = truths.entry((name, mode)).or_insert_with(|| by_twin(&scene));
+        let found = on_device(gpu, &Gpu::wrong_compiler(file, from, to), &scene);
         let off = apart(&found.radiance, &truth.radiance);
-        let off = off.max(slopes_apart(&scene, &found, &truth));
+        let off = off.max(slopes_apart(&scene, &found, truth));
         let off = match *name {
             "opaque" => off,
             _ => off.max(apart(&found.direct, &truth.direct)),

@@ -9,10 +9,10 @@
 
 // Gathers the light that arrives in each cell from all others (model.md §18, passes.md
 // "diffusion").
-// In: lights, by cell what it sends out beside its extinction; with SOLIDS the light of surfaces
-// and ground on the box. In, out: phi and F by cell. Out: the sources Q0 and q that their change is
-// in diffusion. Law: phi and F are the means over 24 directions w of 4 pi L and 4 pi L w, L being
-// the radiance along w. Error: some ulp.
+// In: lights, by direction and cell what the cell sends out there, beside its extinction; with
+// SOLIDS the light of surfaces and ground on the box. In, out: phi and F by cell. Out: the sources
+// Q0 and q that their change is in diffusion. Law: phi and F are the means over 24 directions w of
+// 4 pi L and 4 pi L w, L being the radiance along w. Error: some ulp.
 
 // 1: the scene has surfaces or ground.
 #ifndef SOLIDS
@@ -45,25 +45,11 @@ READS(4, vec4, faces)
 #include "angle.glsl"
 #include "sky.glsl"
 
-// Parts of a direction, in each order and with each sign. The means of 1, of a cosine over its half
-// and of its square over these directions are those over the sphere.
-const float LONG_PART = 0.908248290463863, SHORT_PART = 0.295875854768068;
-const uint N_DIRECTIONS = 24u;
+#include "directions.glsl"
 
-vec4 sent_at(int k) { return uintBitsToFloat(TEXEL(sent, k)); }
-
-vec3 direction(uint i) {
-    vec3 d = vec3(SHORT_PART);
-    d[i >> 3] = LONG_PART;
-    return d * (1.0 - 2.0 * vec3(i & 1u, i >> 1 & 1u, i >> 2 & 1u));
-}
-
-float extinction_of(int c) { return sent_at(4 * c).w; }
-
-vec3 sent_along(int c, vec3 w) {
-    return sent_at(4 * c).rgb + w.x * sent_at(4 * c + 1).rgb + w.y * sent_at(4 * c + 2).rgb
-           + w.z * sent_at(4 * c + 3).rgb;
-}
+// Where what all cells send in the direction begins that is being summed.
+int first_sent = 0;
+vec4 sent_along(int c, vec3 w) { return uintBitsToFloat(TEXEL(sent, first_sent + c)); }
 
 // Sums over directions keep its flux.
 #define OUTSIDE(radiance) (radiance)
@@ -72,12 +58,13 @@ vec3 sent_along(int c, vec3 w) {
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
     Skies skies = all_skies();
-    FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
+    FOR_EACH(i, n_total(level)) {
         int c = int(i);
         ivec3 at = place_of(level, i);
         vec3 phi = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
         for (uint k = 0; k < N_DIRECTIONS; ++k) {
             vec3 w = direction(k);
+            first_sent = int(k * n_total(level));
             vec3 l = radiance_along(level, at, w, w.y < 0.0 ? 1.0 : 0.0, skies);
             phi += l;
             x += l * w.x;
@@ -85,7 +72,7 @@ void main() {
             z += l * w.z;
         }
         vec3 new[4] = vec3[](phi, x, y, z);
-        float sigma = sent_at(4 * c).w;
+        float sigma = uintBitsToFloat(TEXEL(sent, c)).w;
         vec3 reach = 1.0 / (3.0 * sigma * push.kept + push.inverse_chord);
         // Where cells are opaque, diffusion is right and the change is rounding.
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);

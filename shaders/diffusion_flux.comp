@@ -8,8 +8,9 @@
 // In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi; what
 // stands beside Q0 stays. The slope is that between the cells on both sides. At the faces of the
 // box it is one-sided. With FACES F is the mean of what flows through the two faces along an axis;
-// those on the box do not count. With BOUNCES also what each cell sends out, beside its
-// extinction. With CHANGE phi and F, of the change by a bounce, are added to those of the bounce.
+// those on the box do not count. With BOUNCES also what each cell sends out in each direction,
+// beside its extinction. With CHANGE phi and F, of the change by a bounce, are added to those of
+// the bounce.
 
 // 1: F is the mean of what flows through the faces of a cell.
 #ifndef FACES
@@ -41,7 +42,8 @@ TEXELS(3, carried)
 #endif
 #if BOUNCES
 TEXELS(4, arrived)
-WRITES(5, vec4, sent)
+// [direction][cell]
+TEXEL_STORES(5, sent)
 #endif
 
 vec3 phi_at(int c) { return uintBitsToFloat(TEXEL(phi, c).rgb); }
@@ -61,12 +63,14 @@ vec3 flow(int c, int next, int axis, float edge) {
 #endif
 
 #if BOUNCES
+#include "directions.glsl"
+
 vec3 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k).rgb); }
 #endif
 
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
-    FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
+    FOR_EACH(i, n_total(level)) {
         int c = int(i);
         ivec3 at = place_of(level, i), stride = strides_of(level);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
@@ -76,7 +80,7 @@ void main() {
 #endif
         field[4 * c].rgb = fluence;
 #if BOUNCES
-        sent[4 * c] = vec4(arrived_at(4 * c) + push.even * fluence, extinction_of(c));
+        vec3 even = arrived_at(4 * c) + push.even * fluence, forward[3];
 #endif
         for (int axis = 0; axis < 3; ++axis) {
             int after = at[axis] + 1 < int(level.n_cells[axis]) ? c + stride[axis] : c;
@@ -101,8 +105,16 @@ void main() {
 #endif
             field[k].rgb = flux;
 #if BOUNCES
-            sent[k] = vec4(arrived_at(k) + push.forward * flux, 0.0);
+            forward[axis] = arrived_at(k) + push.forward * flux;
 #endif
         }
+#if BOUNCES
+        for (uint k = 0; k < N_DIRECTIONS; ++k) {
+            vec3 w = direction(k);
+            vec3 all = even + w.x * forward[0] + w.y * forward[1] + w.z * forward[2];
+            uvec4 words = floatBitsToUint(vec4(all, extinction_of(c)));
+            STORE_TEXEL(sent, int(k * n_total(level) + i), words);
+        }
+#endif
     }
 }

@@ -96,7 +96,7 @@ InCell in_cell(float front, float own, float counted, vec3 weakened, vec3 kept) 
 
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
-    FOR_EACH(c, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
+    FOR_EACH(c, n_total(level)) {
         vec3 at = vec3(place_of(level, c)) + 0.5;
         vec3 p = push.grid.low + push.grid.cell * vec3(1.0, push.grid.aspect, 1.0) * at;
         float whole = cell_at(int(c)), sigma = min(whole, push.densest);

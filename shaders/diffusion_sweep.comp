@@ -6,7 +6,7 @@
 
 // Moves every phi toward the solution of its own equation (passes.md "diffusion").
 // In: operators, right-hand sides, phi; with CORRECTED phi of the coarser grid, which is added to
-// it first. Out: phi. Law: Jacobi's, phi + step (source - A phi)/diagonal.
+// it first. Out: phi.
 
 #ifndef CORRECTED
 #define CORRECTED 0
@@ -24,26 +24,23 @@ TEXELS(0, operators)
 TEXELS(1, source)
 TEXELS(2, before)
 WRITES(3, vec4, after)
+#define OPERATOR(k) uintBitsToFloat(TEXEL(operators, k))
+#define SOURCE(k) uintBitsToFloat(TEXEL(source, k)).rgb
+#define phi_of(level, at) uintBitsToFloat(TEXEL(before, index_of(level, at))).rgb
 #if CORRECTED
-// Phi of the coarser grid.
-#define PHI(at) (phi_of(before, push.level, at) + phi_of(before, push.coarse, (at) >> halved()))
+#define PHI(level, at) (phi_of(level, at) + phi_of(push.coarse, (at) >> added_axes()))
 #else
-#define PHI(at) phi_of(before, push.level, at)
+#define PHI(level, at) phi_of(level, at)
 #endif
-#define phi_of(name, level, at) uintBitsToFloat(TEXEL(name, index_of(level, at))).rgb
-ivec3 halved() { return ivec3(push.halved); }
+ivec3 added_axes() { return ivec3(push.halved); }
 
 #include "equations.glsl"
 
 void main() {
     Level level = push.level;
-    FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
+    FOR_EACH(i, n_total(level)) {
         ivec3 at = place_of(level, i);
-        int c = index_of(level, at);
-        vec3 own = PHI(at), flows, all;
-        around(level, at, own, flows, all);
-        vec3 right = uintBitsToFloat(TEXEL(source, c)).rgb;
         float step = push.is_long != 0u ? LONG_STEP : SHORT_STEP;
-        after[c] = vec4(own + step * (right + flows) / all, 0.0);
+        after[index_of(level, at)] = vec4(swept(level, at, step), 0.0);
     }
 }

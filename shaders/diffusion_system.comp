@@ -51,7 +51,7 @@ vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
     Skies skies = all_skies();
-    FOR_EACH(i, level.n_cells.x * level.n_cells.y * level.n_cells.z) {
+    FOR_EACH(i, n_total(level)) {
         int c = int(i);
         ivec3 at = place_of(level, i), stride = strides_of(level);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);

@@ -16,6 +16,8 @@ const float SHORT_STEP = 0.6;
 #define N_SETS 1
 #endif
 
+uint n_total(Level level) { return level.n_cells.x * level.n_cells.y * level.n_cells.z; }
+
 // Steps between cells along each axis.
 ivec3 strides_of(Level level) {
     return ivec3(1, level.n_cells.x, level.n_cells.x * level.n_cells.y);

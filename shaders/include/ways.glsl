@@ -1,6 +1,6 @@
 // Straight ways through the cells, which are even inside (model.md §18). Needs faces.glsl,
-// sky.glsl, medium.glsl, push.grid and push.weakened. Of each cell it needs extinction_of(c), and
-// sent_along(c, w): 4 pi times what it sends out along w. OUTSIDE(l) is what a bounce or an eye
+// sky.glsl, medium.glsl, push.grid and push.weakened. Of each cell it needs sent_along(c, w): 4 pi
+// times what it sends out along w, beside its extinction. OUTSIDE(l) is what a bounce or an eye
 // takes of the sky's radiance l, which is below 0 high up under a low sun.
 
 // Returns the share of light that passes a depth, by channel where channels differ.
@@ -32,8 +32,9 @@ vec3 radiance_along(Level level, ivec3 at, vec3 w, float above, Skies skies) {
     for (bool is_inside = true; is_inside;) {
         axis = face.x <= face.y && face.x <= face.z ? 0u : face.y <= face.z ? 1u : 2u;
         float to = face[axis];
-        KEPT kept = kept_by(extinction_of(c) * (to - done));
-        sum += passed * (1.0 - kept) * sent_along(c, w);
+        vec4 sent = sent_along(c, w);
+        KEPT kept = kept_by(sent.w * (to - done));
+        sum += passed * (1.0 - kept) * sent.rgb;
         passed *= kept;
         done = to;
         face[axis] += across[axis];

@@ -270,7 +270,7 @@ impl Reader<'_> {
             binding: self.binding(id),
             kind,
             name: self.name(id, None),
-            reads: !is_stored,
+            reads: self.decoration(id, None, Decoration::NonReadable).is_none(),
             writes: is_stored,
             stride: kind.texel_bytes(),
             element: None,

@@ -22,13 +22,17 @@ use bounces::Bounces;
 pub use bounces::{BouncePush, SeenPush};
 use cells::Cells;
 pub use merged::{MergePush, SpreadPush};
-pub use push::{CoarsestPush, FluxPush, PairPush, SourcesPush, SweepPush, SystemPush};
+pub use push::{CyclePush, FluxPush, PairPush, SourcesPush, SweepPush, SystemPush};
 pub use room::Room;
 use solids::Solids;
 pub use solids::{FacesPush, PatchesPush, SolidsPush, SolidsWork};
 
 /// Sweeps of the coarsest grid.
 const COARSEST_SWEEPS: u32 = 16;
+
+/// Most cells of a level that one workgroup sweeps. Fewer dispatches save more there than the other
+/// cores would.
+const SMALL_CELLS: u32 = 2048;
 
 bindings! {
     /// The buffers of the pass that others share.
@@ -102,7 +106,7 @@ pub struct Diffusion {
     coarsen: Kernel,
     sweep: Kernel,
     corrected: Kernel,
-    coarsest: Kernel,
+    cycle: Kernel,
     restrict: Kernel,
     flux: Kernel,
     /// Light from and to surfaces and ground, where a scene has them.
@@ -151,7 +155,14 @@ impl Diffusion {
                 &[],
                 &[("N_SETS", room.n_sets), ("CORRECTED", 1)],
             )?,
-            coarsest: kernel("diffusion.coarsest", CoarsestPush::FIELDS)?,
+            cycle: Kernel::with_macros(
+                device,
+                compiler,
+                "diffusion.cycle",
+                CyclePush::FIELDS,
+                &[],
+                &[("N_SETS", room.n_sets), ("WORKGROUP", cycle_invocations(device))],
+            )?,
             restrict: kernel("diffusion.restrict", PairPush::FIELDS)?,
             flux: Kernel::with_macros(
                 device,
@@ -273,7 +284,7 @@ impl Diffusion {
             let system = [lights, density, bounces.change(), operators, phi, source];
             rec.dispatch(&bounces.system, &system, &push, cells.n_total())?;
             // One cycle: the next bounce finds what is left.
-            self.record_cycle(rec, &steps, n_all, true)?;
+            self.record_cycle(rec, &steps, n_all, [true, false])?;
             bounces.record_correction(rec, cells, [next_phi, arrived])?;
         }
         Ok(())
@@ -293,27 +304,29 @@ impl Diffusion {
         let n_buffers = 6 + usize::from(self.solids.is_some());
         let push = cells.system_push(work.n_lights);
         rec.dispatch(&self.system, &system[..n_buffers], &push, cells.n_total())?;
-        for pair in steps.windows(2) {
+        for pair in steps[..=n_large(&steps)].windows(2) {
             let push = pair_push(pair, n_all);
             rec.dispatch(&self.coarsen, &[operators], &push, pair[1].level.n_total())?;
         }
         for i in 0..work.n_cycles {
-            self.record_cycle(rec, &steps, n_all, i == 0)?;
+            let is_first = i == 0;
+            self.record_cycle(rec, &steps, n_all, [is_first, is_first])?;
         }
         Ok(())
     }
 
     /// Two sweeps on every level on the way down, and two on the way up. The first sweep from φ = 0
-    /// is part of what makes the right-hand sides.
+    /// is part of what makes the right-hand sides. `is_new`: small levels have no operators yet.
     fn record_cycle(
         &self,
         rec: &mut Recorder<'_>,
         steps: &[LevelStep],
         n_all: u32,
-        is_first: bool,
+        [is_first, is_new]: [bool; 2],
     ) -> Result<()> {
         let Scratch { operators, phi, next_phi, source, .. } = &self.scratch;
-        for (i, pair) in steps.windows(2).enumerate() {
+        let n_large = n_large(steps);
+        for (i, pair) in steps[..=n_large].windows(2).enumerate() {
             let push = pair_push(pair, n_all);
             if i == 0 && !is_first {
                 self.record_sweep(rec, &self.sweep, [next_phi, phi], &push, true)?;
@@ -322,10 +335,10 @@ impl Diffusion {
             let buffers = [operators, source, next_phi, phi];
             rec.dispatch(&self.restrict, &buffers, &push, pair[1].level.n_total())?;
         }
-        let level = steps[steps.len() - 1].level;
-        let push = CoarsestPush { level, n_all, n_sweeps: COARSEST_SWEEPS };
-        rec.dispatch_groups(&self.coarsest, &[operators, source, next_phi], &push, 1)?;
-        for pair in steps.windows(2).rev() {
+        let is_first = is_first || n_large > 0;
+        let push = CyclePush::new(&steps[n_large..], n_all, COARSEST_SWEEPS, [is_first, is_new]);
+        rec.dispatch_groups(&self.cycle, &[operators, source, phi, next_phi], &push, 1)?;
+        for pair in steps[..=n_large].windows(2).rev() {
             let push = pair_push(pair, n_all);
             self.record_sweep(rec, &self.corrected, [next_phi, phi], &push, true)?;
             self.record_sweep(rec, &self.sweep, [phi, next_phi], &push, false)?;
@@ -362,6 +375,22 @@ impl Diffusion {
         let push = SweepPush { level: fine, coarse, halved, n_all, is_long: u32::from(is_long) };
         rec.dispatch(kernel, &[operators, source, from, to], &push, fine.n_total())
     }
+}
+
+/// Returns the invocations of the workgroup that sweeps small levels. One core of a CPU runs it
+/// whatever its size, and changes from invocation to invocation at every barrier.
+fn cycle_invocations(device: &Device) -> u32 {
+    if device.info().kind == "cpu" {
+        64
+    } else {
+        device.limits().max_workgroup_invocations.min(512)
+    }
+}
+
+/// Returns the number of levels that are swept in many workgroups. The coarsest is never one.
+fn n_large(steps: &[LevelStep]) -> usize {
+    let small = steps.iter().position(|step| step.level.n_total() <= SMALL_CELLS);
+    small.unwrap_or(steps.len() - 1)
 }
 
 fn pair_push(pair: &[LevelStep], n_all: u32) -> PairPush {

@@ -73,7 +73,7 @@ pub const INTERFACES: &[(&str, &[Field], &str)] = &[
     ("cull_write.comp", blobs::KeyPush::FIELDS, "T 8 4 8"),
     ("diffusion_bounce.comp", diffusion::BouncePush::FIELDS, "Light T 16 16"),
     ("diffusion_coarsen.comp", diffusion::PairPush::FIELDS, "16"),
-    ("diffusion_coarsest.comp", diffusion::CoarsestPush::FIELDS, "T 16 16"),
+    ("diffusion_cycle.comp", diffusion::CyclePush::FIELDS, "S S S S"),
     ("diffusion_faces.comp", diffusion::FacesPush::FIELDS, "Light T 16"),
     ("diffusion_flux.comp", diffusion::FluxPush::FIELDS, "F T 16"),
     ("diffusion_merge.comp", diffusion::MergePush::FIELDS, "T T 4 16 16"),

@@ -10,6 +10,9 @@ use crate::layout::diffusion::DiffusionParams;
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
+/// Directions over which a bounce sums.
+const N_DIRECTIONS: usize = 24;
+
 record! {
     /// Push constants of `diffusion_bounce.comp`.
     pub struct BouncePush {
@@ -55,20 +58,20 @@ record! {
 }
 
 buffers! {
-    /// Light that cells send out, four `[f32; 4]` by cell: evenly, beside the extinction, and three
-    /// times the flux along each axis.
+    /// Scratch by cell that bounces lead between.
     struct Scratch(n_cells: u64) {
-        /// All of it.
-        sent: Buffer => [[f32; 4]; 4], n_cells, "diffusion.sent", Texels;
+        /// Light that cells send out, by direction and cell, beside the extinction.
+        sent: Buffer => [[f32; 4]; N_DIRECTIONS], n_cells, "diffusion.sent", Texels;
         /// Q0 and q of what a bounce has changed.
         change: Buffer => [[f32; 4]; 4], n_cells, "diffusion.change", Texels;
     }
 }
 
 buffers! {
-    /// The same by cell of the grid.
+    /// Scratch by cell of the grid.
     struct Arrived(n_cells: u64) {
-        /// That of suns and lamps.
+        /// Light that suns and lamps make it send out: evenly, beside the extinction, and three
+        /// times the flux along each axis.
         arrived: Buffer => [[f32; 4]; 4], n_cells, "diffusion.arrived", Texels;
         /// Q0 and q.
         carried: Buffer => [[f32; 4]; 4], n_cells, "diffusion.carried", Texels;

@@ -1,6 +1,6 @@
 //! Push constants of the kernels that solve for φ.
 
-use crate::layout::diffusion::LevelRecord;
+use crate::layout::diffusion::{LevelRecord, LevelStep};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
@@ -81,14 +81,43 @@ record! {
 }
 
 record! {
-    /// Push constants of `diffusion_coarsest.comp`.
-    pub struct CoarsestPush {
-        /// The level.
+    /// Push constants of `diffusion_cycle.comp`.
+    pub struct CyclePush {
+        /// The finest of the levels.
         level: LevelRecord,
+        /// From level to level, three bits that are 1 where an axis is halved; the finest lowest.
+        halvings: u32,
+        /// Number of levels.
+        n_levels: u32,
         /// Cells of all levels.
         n_all: u32,
-        /// Number of sweeps.
+        /// Sweeps of the coarsest level.
         n_sweeps: u32,
+        /// 1: operators of the coarser levels are to be made.
+        is_new: u32,
+        /// 1: φ is after the first sweep, from φ = 0.
+        is_first: u32,
+    }
+}
+
+impl CyclePush {
+    /// Returns those of a cycle through some levels, the finest first: ten at most.
+    pub fn new(
+        steps: &[LevelStep],
+        n_all: u32,
+        n_sweeps: u32,
+        [is_first, is_new]: [bool; 2],
+    ) -> CyclePush {
+        let bits = |step: &LevelStep| (0..3).map(|axis| step.halved[axis] << axis).sum::<u32>();
+        CyclePush {
+            level: steps[0].level,
+            halvings: steps.iter().rev().fold(0, |all, step| all << 3 | bits(step)),
+            n_levels: steps.len() as u32,
+            n_all,
+            n_sweeps,
+            is_new: u32::from(is_new),
+            is_first: u32::from(is_first),
+        }
     }
 }
 

@@ -58,7 +58,7 @@ vec3 phi_at(Level level, ivec3 at) {
 // Runs its body for each of n cells. All must be done before other cells read what it wrote.
 #define FOR_CELLS(i, n) for (uint i = gl_LocalInvocationID.x; i < (n); i += WORKGROUP)
 void all_done() {
-    memoryBarrier();
+    groupMemoryBarrier();
     barrier();
 }
 

@@ -3,7 +3,7 @@
 // Parts of a direction, in each order and with each sign. The means of 1, of a cosine over its half
 // and of its square over these directions are those over the sphere.
 const float LONG_PART = 0.908248290463863, SHORT_PART = 0.295875854768068;
-const uint N_DIRECTIONS = 24u;
+const uint N_DIRECTIONS = 24;
 
 vec3 direction(uint i) {
     vec3 d = vec3(SHORT_PART);

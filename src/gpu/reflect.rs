@@ -48,7 +48,7 @@ pub enum BindingKind {
     Storage,
     /// `usamplerBuffer`: reads four words at a time.
     Texels,
-    /// `uimageBuffer`: writes four words at a time.
+    /// `uimageBuffer`: writes four words at a time, and may read them.
     TexelStores,
     /// `samplerBuffer`: reads single floats.
     Floats,

@@ -19,7 +19,7 @@ use crate::layout::diffusion::{DiffusionParams, LevelStep, levels};
 use crate::layout::frame::GridRecord;
 
 use bounces::Bounces;
-pub use bounces::{BouncePush, SeenPush};
+pub use bounces::{BouncePush, N_DIRECTIONS, SeenPush};
 use cells::Cells;
 pub use merged::{MergePush, SpreadPush};
 pub use push::{CyclePush, FluxPush, PairPush, SourcesPush, SweepPush, SystemPush};

@@ -11,7 +11,7 @@ use nimbus::error::Error;
 use nimbus::frame::{DeviceChoice, GpuContext, open_sides};
 use nimbus::gpu::{DeviceOptions, LoweredLimits};
 use nimbus::io::scene_file;
-use nimbus::model::scene::{DrawPath, Scene};
+use nimbus::model::scene::{DrawPath, LightingMode, Scene};
 
 /// Devices on which every scene is drawn.
 const CAPABLE: [&str; 6] =
@@ -64,12 +64,16 @@ fn difference(found: &[u8], expected: &[u8]) -> String {
 fn every_scene_draws_the_same_picture_under_the_limits_of_other_devices() {
     let whole = open(None);
     let others: Vec<_> = CAPABLE.map(|name| (name, open(Some(limits(name))))).into();
-    for (i, path) in program::scenes().iter().enumerate() {
-        // Scenes, devices and paths take turns: a device draws scenes of all kinds by both paths.
-        let (k, n) = (i % 2, others.len());
-        let draw = [DrawPath::Sprites, DrawPath::Tiles][k];
-        let (name, context) = &others[(i / 2 + n / 2 * k) % n];
-        let scene = scene(path, draw);
+    // Scenes drawn with and without diffuse light.
+    let mut n_drawn = [0, 0];
+    for path in program::scenes() {
+        // Devices and paths take turns, so that each device draws both kinds.
+        let is_diffuse = scene(&path, DrawPath::Tiles).lighting.mode == LightingMode::Diffusion;
+        let i = n_drawn[usize::from(is_diffuse)];
+        n_drawn[usize::from(is_diffuse)] += 1;
+        let draw = [DrawPath::Sprites, DrawPath::Tiles][(i + i / others.len()) % 2];
+        let (name, context) = &others[i % others.len()];
+        let scene = scene(&path, draw);
         let expected = picture(&whole, &scene).expect("a picture");
         let what = format!("{} by {draw:?} on {name}", path.display());
         let found = picture(context, &scene).unwrap_or_else(|e| panic!("{what}: {e}"));
@@ -81,6 +85,7 @@ fn every_scene_draws_the_same_picture_under_the_limits_of_other_devices() {
             panic!("{what}: {difference}; drawn again, each is the same: {same:?}");
         }
     }
+    assert!(n_drawn.iter().all(|n| *n >= others.len()), "{n_drawn:?}");
     whole.close().expect("no messages");
     for (_, context) in others {
         context.close().expect("no messages");

@@ -225,14 +225,10 @@ fn wrong_shaders_are_found() {
         ("boxes", "diffusion", "diffusion_restrict.comp", "LONG_STEP * left", "left"),
         ("boxes", "diffusion", "diffusion_coarsen.comp", "merged;", "1.1 * merged;"),
         ("coloured", "diffusion", "diffusion_cycle.comp", "at >> halved)", "at)"),
+        ("coloured", "diffusion", "diffusion_cycle.comp", "push.is_new != 0u", "false"),
+        ("boxes", "merged", "diffusion_cycle.comp", "push.is_first == 0u", "false"),
         ("coloured", "diffusion", "diffusion_cycle.comp", "words_of(left)", "words_of(0.5 * left)"),
-        (
-            "coloured",
-            "diffusion",
-            "diffusion_cycle.comp",
-            "is_corrected = true",
-            "is_corrected = false",
-        ),
+        ("coloured", "diffusion", "diffusion_cycle.comp", "if (is_corrected)", "if (false)"),
         (
             "flat",
             "diffusion",

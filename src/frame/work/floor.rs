@@ -75,11 +75,11 @@ pub fn floor(pass: Pass, of: &Amounts) -> Option<Work> {
         Pass::First => Some(first(of)),
         // Reads the density, writes φ and the flux along each axis. A cycle solves each cell's
         // equation three times and forms what is left once: six neighbours of three channels, a
-        // multiply-add each, and a quotient. A way of a bounce weighs four numbers of three
-        // channels in each cell, with an exponent each, and adds them up (12 multiply-adds).
+        // multiply-add each, and a quotient. A way of a bounce takes in each cell a
+        // depth, an exponent, a share (6 operations) and three multiply-adds.
         Pass::Diffusion => {
             let of_cycle = 4.0 * (6.0 * 3.0 * 2.0 + 3.0);
-            let sums = of.cells * of.cycles * of_cycle + 27.0 * of.gathered;
+            let sums = of.cells * of.cycles * of_cycle + 12.0 * of.gathered;
             work(of.cells * (NUMBER + 4.0 * VECTOR), sums)
         }
         // As "first"; a light takes three exponents and a phase function (8), too.

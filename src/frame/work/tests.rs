@@ -97,9 +97,9 @@ fn other_ways_of_a_pass_have_floors_of_their_own() {
     assert_eq!(of(Pass::Live, &Amounts { is_moved_by_host: false, ..by_host }), [80.0, 88.0]);
     // Three waves a particle.
     assert_eq!(of(Pass::Place, &Amounts { waves: 30.0, ..SMALL }), [320.0, 30.0 + 390.0]);
-    // Two cycles: 4 × 39 sums each by cell. 100 visits of cells by bounces: 27 each.
+    // Two cycles: 4 × 39 sums each by cell. 100 visits of cells by bounces: 12 each.
     let bounces = Amounts { cycles: 2.0, gathered: 100.0, ..SMALL };
-    assert_eq!(of(Pass::Diffusion, &bounces), [120.0 * 52.0, 120.0 * 312.0 + 2700.0]);
+    assert_eq!(of(Pass::Diffusion, &bounces), [120.0 * 52.0, 120.0 * 312.0 + 1200.0]);
     // Without culling the sort computes the depths itself.
     let all = Amounts { culls: false, kept: 10.0, ..SMALL };
     assert_eq!(of(Pass::Sort, &all), [160.0, 50.0]);

@@ -11,7 +11,7 @@ use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
 /// Directions over which a bounce sums.
-const N_DIRECTIONS: usize = 24;
+pub const N_DIRECTIONS: usize = 24;
 
 record! {
     /// Push constants of `diffusion_bounce.comp`.
@@ -61,7 +61,7 @@ buffers! {
     /// Scratch by cell that bounces lead between.
     struct Scratch(n_cells: u64) {
         /// Light that cells send out, by direction and cell, beside the extinction.
-        sent: Buffer => [[f32; 4]; N_DIRECTIONS], n_cells, "diffusion.sent", Texels;
+        sent: Buffer => [[f32; 4]; N_DIRECTIONS], n_cells, "diffusion.sent", TexelStores;
         /// Q0 and q of what a bounce has changed.
         change: Buffer => [[f32; 4]; 4], n_cells, "diffusion.change", Texels;
     }

@@ -44,10 +44,9 @@ READS(4, vec4, faces)
 #include "faces.glsl"
 #include "angle.glsl"
 #include "sky.glsl"
-
 #include "directions.glsl"
 
-// Where what all cells send in the direction begins that is being summed.
+// The first cell's texel of the direction that is being summed.
 int first_sent = 0;
 vec4 sent_along(int c, vec3 w) { return uintBitsToFloat(TEXEL(sent, first_sent + c)); }
 

@@ -9,7 +9,8 @@
 // sweep from phi = 0, later `next_phi`. In, out: operators; where they are new, those of the
 // coarser grids are made. Out: `next_phi` of the finest grid. The rest is scratch. Law: two sweeps,
 // a correction by the coarser grid, and two sweeps. The coarsest grid has sweeps of Gauss and
-// Seidel from phi = 0, the cells of one colour of a chessboard at once.
+// Seidel, the cells of one colour of a chessboard at once. They begin from phi = 0; where it is the
+// only grid, later cycles go on from its phi.
 
 #ifndef WORKGROUP
 #define WORKGROUP 64
@@ -120,7 +121,7 @@ void solve_coarsest(Level level) {
     ivec3 at = place_of(level, c);
     int k = index_of(level, at);
     is_next = true;
-    if (is_cell) {
+    if (is_cell && (push.n_levels > 1u || push.is_first != 0u)) {
         STORE_TEXEL(next_phi, k, uvec4(0u));
     }
     all_done();

@@ -13,7 +13,7 @@ pub struct Limits {
     pub max_texels: u64,
     /// Workgroups along x of one dispatch.
     pub max_workgroups_x: u32,
-    /// Invocations of one workgroup.
+    /// Invocations of one workgroup along x.
     pub max_workgroup_invocations: u32,
     /// Bytes of memory that a workgroup shares.
     pub max_shared_memory_bytes: u32,

@@ -35,6 +35,14 @@ fn bounces_have_the_same_light_without_slopes() {
     }
 }
 
+#[test]
+fn merged_cells_without_a_coarser_grid_have_the_light_of_the_twin() {
+    let gpu = Gpu::new();
+    for name in ["boxes", "flat"] {
+        media::check(&gpu, name, "few");
+    }
+}
+
 /// Cells that are higher than wide, and flat ones, of balls.
 #[test]
 fn layers_that_are_given_have_the_light_of_the_twin() {
@@ -227,6 +235,7 @@ fn wrong_shaders_are_found() {
         ("coloured", "diffusion", "diffusion_cycle.comp", "at >> halved)", "at)"),
         ("coloured", "diffusion", "diffusion_cycle.comp", "push.is_new != 0u", "false"),
         ("boxes", "merged", "diffusion_cycle.comp", "push.is_first == 0u", "false"),
+        ("boxes", "few", "diffusion_cycle.comp", "push.is_first != 0u", "true"),
         ("coloured", "diffusion", "diffusion_cycle.comp", "words_of(left)", "words_of(0.5 * left)"),
         ("coloured", "diffusion", "diffusion_cycle.comp", "if (is_corrected)", "if (false)"),
         (

@@ -75,8 +75,8 @@ pub fn floor(pass: Pass, of: &Amounts) -> Option<Work> {
         Pass::First => Some(first(of)),
         // Reads the density, writes φ and the flux along each axis. A cycle solves each cell's
         // equation three times and forms what is left once: six neighbours of three channels, a
-        // multiply-add each, and a quotient. A way of a bounce takes in each cell a
-        // depth, an exponent, a share (6 operations) and three multiply-adds.
+        // multiply-add each, and a quotient. A way of a bounce takes a depth, an
+        // exponent and a share (6 operations) in each cell, and three multiply-adds.
         Pass::Diffusion => {
             let of_cycle = 4.0 * (6.0 * 3.0 * 2.0 + 3.0);
             let sums = of.cells * of.cycles * of_cycle + 12.0 * of.gathered;

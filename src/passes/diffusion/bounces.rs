@@ -85,6 +85,8 @@ pub(super) struct Bounces {
     /// The equations of a change.
     pub system: Kernel,
     correct: Kernel,
+    /// Corrects after the last bounce, when no cell sends light to another any more.
+    correct_last: Kernel,
     seen: Kernel,
     arrived: Arrived,
     scratch: Scratch,
@@ -121,6 +123,11 @@ impl Bounces {
                 "diffusion.flux",
                 FluxPush::FIELDS,
                 &[("FACES", 1), ("BOUNCES", 1), ("CHANGE", 1)],
+            )?,
+            correct_last: kernel(
+                "diffusion.flux",
+                FluxPush::FIELDS,
+                &[("FACES", 1), ("CHANGE", 1)],
             )?,
             seen: kernel("diffusion.seen", SeenPush::FIELDS, &solids)?,
             arrived: Arrived::new(device, room.n_grid_cells())?,
@@ -190,10 +197,13 @@ impl Bounces {
         rec: &mut Recorder<'_>,
         cells: &Cells<'_>,
         [phi, arrived]: [&Buffer; 2],
+        is_last: bool,
     ) -> Result<()> {
         let Scratch { sent, change } = &self.scratch;
-        let buffers = [cells.density, phi, cells.field, change, arrived, sent];
-        rec.dispatch(&self.correct, &buffers, &cells.flux_push(), cells.n_total())
+        let all = [cells.density, phi, cells.field, change, arrived, sent];
+        let (kernel, buffers) =
+            if is_last { (&self.correct_last, &all[..4]) } else { (&self.correct, &all[..]) };
+        rec.dispatch(kernel, buffers, &cells.flux_push(), cells.n_total())
     }
 
     /// Writes the radiance that each cell scatters toward the eye.

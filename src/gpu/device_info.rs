@@ -172,10 +172,7 @@ impl DeviceInfo {
                 max_storage_buffers: features::max_storage_buffers(&limits),
                 max_texels: u64::from(limits.max_texel_buffer_elements),
                 max_workgroups_x: limits.max_compute_work_group_count[0],
-                // Kernels use no other axis.
-                max_workgroup_invocations: limits
-                    .max_compute_work_group_invocations
-                    .min(limits.max_compute_work_group_size[0]),
+                max_workgroup_invocations: features::max_workgroup_invocations(&limits),
                 max_shared_memory_bytes: limits.max_compute_shared_memory_size,
                 max_push_constant_bytes: limits.max_push_constants_size,
                 max_image_extent: limits

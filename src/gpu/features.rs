@@ -58,6 +58,11 @@ pub(super) fn has_present_wait(instance: &ash::Instance, physical: vk::PhysicalD
     [id.present_id, wait.present_wait] == [vk::TRUE; 2]
 }
 
+/// Returns the invocations that a workgroup may have along x, the only axis that kernels use.
+pub(super) fn max_workgroup_invocations(limits: &vk::PhysicalDeviceLimits) -> u32 {
+    limits.max_compute_work_group_invocations.min(limits.max_compute_work_group_size[0])
+}
+
 /// Returns the most storage buffers that one stage of a pipeline with one set can bind.
 pub(super) fn max_storage_buffers(limits: &vk::PhysicalDeviceLimits) -> u32 {
     limits.max_per_stage_descriptor_storage_buffers.min(limits.max_descriptor_set_storage_buffers)

@@ -30,8 +30,8 @@ pub use solids::{FacesPush, PatchesPush, SolidsPush, SolidsWork};
 /// Sweeps of the coarsest grid.
 const COARSEST_SWEEPS: u32 = 16;
 
-/// Most cells of a level that one workgroup sweeps: four an invocation on a GPU. llvmpipe takes the
-/// same time with 300 and 20 000 within its noise (cubes-554, 2 cores).
+/// Most cells of a level that one workgroup sweeps, which are four an invocation on a GPU. On 2
+/// cores of llvmpipe, limits of 300 and 20 000 take the same time within the noise (cubes-554).
 const SMALL_CELLS: u32 = 2048;
 
 bindings! {

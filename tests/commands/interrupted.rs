@@ -102,11 +102,13 @@ fn check(threading: &str) {
         let out = path(&format!("part{attempt}"));
         let Output { status, stdout, stderr } = interrupted(threading, &out, after);
         let (stdout, stderr) = (String::from_utf8_lossy(&stdout), String::from_utf8_lossy(&stderr));
-        if status.success() {
+        let n = n_timed(&out);
+        // Whole, too, if the signal came between the last frame and the end.
+        if status.success() || n == n_all(threading) {
             after /= 2;
             continue;
         }
-        if n_timed(&out) < N_COMPARED {
+        if n < N_COMPARED {
             after = after * 3 / 2;
             continue;
         }
@@ -117,6 +119,11 @@ fn check(threading: &str) {
         return;
     }
     panic!("{threading}: no run was interrupted in the midst of its timed frames");
+}
+
+/// Returns the number of timed frames of a whole run.
+fn n_all(threading: &str) -> usize {
+    if threading == "both" { 2 * N_FRAMES as usize } else { N_FRAMES as usize }
 }
 
 /// Returns the number of timed frames in the results.
@@ -145,7 +152,7 @@ fn check_results(threading: &str, out: &str, whole: &str) {
     assert_eq!(counted, begun, "{threading}");
     assert_eq!(counted.len(), modes.len());
     let n: usize = counted.iter().map(|(_, n, _)| n).sum();
-    let n_all = if threading == "both" { 2 * N_FRAMES } else { N_FRAMES } as usize;
+    let n_all = n_all(threading);
     println!("{threading}: {n} of {n_all} frames");
     assert!(n > 0 && n < n_all, "{n} of {n_all}");
     // Whole against part, and part against itself.

@@ -133,7 +133,8 @@ impl Scene {
 
     /// The blobs that are deposited narrower than they are, and the others.
     fn parts(&self) -> [Vec<Blob>; 2] {
-        let is_narrow = |b: &Blob| self.n_blurs() > 0 && is_narrowed(&self.spec, b);
+        let has_narrow = self.n_blurs() > 0;
+        let is_narrow = |b: &Blob| has_narrow && is_narrowed(&self.spec, b);
         let (narrowed, others) = self.blobs.iter().partition(|b| is_narrow(b));
         [narrowed, others]
     }

@@ -51,6 +51,24 @@ fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
 }
 
 #[test]
+fn a_kernel_that_is_made_again_shares_its_pipeline() {
+    let gpu = Gpu::new();
+    let make = |compiler: &Compiler, n_sets: u32| {
+        let push = passes::diffusion::PairPush::FIELDS;
+        let macros = [("N_SETS", n_sets)];
+        let name = "diffusion.coarsen";
+        let made = Kernel::with_macros(&gpu.device, compiler, name, push, &[], &macros);
+        made.unwrap();
+        gpu.device.n_kept_pipelines()
+    };
+    // Each is dropped at once.
+    assert_eq!([1, 1, 3, 1].map(|n_sets| make(&gpu.compiler, n_sets)), [1, 1, 2, 2]);
+    // Another text of the same file is another kernel.
+    let other = Gpu::wrong_compiler("diffusion_coarsen.comp", "merged;", "1.1 * merged;");
+    assert_eq!([1, 1].map(|n_sets| make(&other, n_sets)), [3, 3]);
+}
+
+#[test]
 fn a_missing_barrier_between_dispatches_is_reported() {
     let mut gpu = Gpu::new();
     let without = hazards_of_two_dispatches(&mut gpu, Barriers::OmittedIn(""));

@@ -18,6 +18,7 @@ use super::fault;
 use super::features;
 use super::guard::Guards;
 use super::instance::Instance;
+use super::kept_pipelines::KeptPipelines;
 use super::limits::Limits;
 use super::memory_count::MemoryCount;
 use super::over_limit::OverLimit;
@@ -66,6 +67,8 @@ pub(super) struct SharedDevice {
     pub counts_invocations: bool,
     /// The frame to capture, if one is to be captured.
     pub capture: Option<Capture>,
+    /// Compute pipelines for kernels that are made again.
+    pub pipelines: KeptPipelines,
     /// Reports on new pipelines, where they are wanted.
     pub reports: Option<Reports>,
     /// Where the driver says why the device was lost, if it does.
@@ -148,6 +151,7 @@ impl Device {
             tells_shown: presents(instance, &info) && info.tells_shown,
             counts_invocations,
             capture,
+            pipelines: KeptPipelines::default(),
             reports: options.reports_pipelines.then(|| Reports::new(statistics)),
             faults,
             instance: instance.clone(),
@@ -169,6 +173,11 @@ impl Device {
     /// Returns the limits of the device.
     pub fn limits(&self) -> &Limits {
         &self.info.limits
+    }
+
+    /// Returns the number of compute pipelines that are kept for kernels that are made again.
+    pub fn n_kept_pipelines(&self) -> usize {
+        self.shared.pipelines.len()
     }
 
     /// Takes the reports on pipelines that were made since the last call; none without
@@ -210,6 +219,8 @@ impl Drop for Device {
         }
         // An error here is a lost device, which the call that lost it has reported.
         let _ = unsafe { self.shared.raw.device_wait_idle() };
+        // They hold on to the device.
+        self.shared.pipelines.clear();
         let report = self.shared.lock_allocator().generate_report();
         let messages = self.shared.instance.messages();
         for leak in &report.allocations {

@@ -1,11 +1,14 @@
 //! Graphics pipelines without vertex buffers: the vertex shader pulls from storage buffers.
 
+use std::sync::Arc;
+
 use ash::vk;
 
 use super::call::Call;
 use super::device::Device;
 use super::image::{TargetFormat, depth_format};
 use super::interface::{Constants, Field, Interface, Pipeline, Stage};
+use super::kept_pipelines::MadePipeline;
 use super::shader::Compiler;
 use crate::error::Result;
 
@@ -117,7 +120,9 @@ impl DrawPipeline {
         (format, mode): (TargetFormat, BlendMode),
     ) -> Result<DrawPipeline> {
         let stage = |extension, flags| {
-            Stage::new(device, compiler, format!("{name}.{extension}"), flags, &[])
+            let file = format!("{name}.{extension}");
+            let words = Stage::compile(device, compiler, &file, &[])?;
+            Stage::new(device, file, &words, flags)
         };
         let stages = [
             stage("vert", vk::ShaderStageFlags::VERTEX)?,
@@ -140,7 +145,8 @@ impl DrawPipeline {
         let point = vk::PipelineBindPoint::GRAPHICS;
         let (rate, indirect_rate) = Default::default();
         let name = name.to_owned();
-        let pipeline = Pipeline { handle, point, interface, name, rate, indirect_rate };
+        let made = Arc::new(MadePipeline { handle, interface, local_size_x: 0 });
+        let pipeline = Pipeline { made, point, name, rate, indirect_rate };
         Ok(DrawPipeline { pipeline, primitives, has_depth: mode.has_depth() })
     }
 }

@@ -6,6 +6,7 @@ use ash::vk;
 
 use super::call::Call;
 use super::device::{Device, Owned, SharedDevice};
+use super::kept_pipelines::MadePipeline;
 use super::limits::Limits;
 use super::rate::Rate;
 use super::reflect::{Binding, BindingKind, Reflection, reflect};
@@ -43,19 +44,27 @@ pub(super) struct Stage {
 
 impl Stage {
     /// Compiles `file` with `macros` defined.
-    pub fn new(
+    pub fn compile(
         device: &Device,
         compiler: &Compiler,
-        file: String,
-        flags: vk::ShaderStageFlags,
+        file: &str,
         macros: &[(&str, u32)],
-    ) -> Result<Stage> {
+    ) -> Result<Vec<u32>> {
         let no_texels = (!device.limits().has_texel_buffers()).then_some(("TEXEL_BUFFERS", 0));
         let macros: Vec<_> = macros.iter().copied().chain(no_texels).collect();
-        let words = compiler.compile(&file, Optimize::Yes, &macros)?;
-        let reflection = reflect(&file, &words)?;
+        compiler.compile(file, Optimize::Yes, &macros)
+    }
+
+    /// Makes the stage of the SPIR-V `words` of `file`.
+    pub fn new(
+        device: &Device,
+        file: String,
+        words: &[u32],
+        flags: vk::ShaderStageFlags,
+    ) -> Result<Stage> {
+        let reflection = reflect(&file, words)?;
         let shared = device.shared();
-        let info = vk::ShaderModuleCreateInfo::default().code(&words);
+        let info = vk::ShaderModuleCreateInfo::default().code(words);
         let module = unsafe { shared.raw.create_shader_module(&info, None) }
             .of_call("vkCreateShaderModule", &file)?;
         let module = shared.own(module, &file, ash::Device::destroy_shader_module);
@@ -186,11 +195,9 @@ fn set_layout(
 }
 
 /// A pipeline, as the recorder binds it.
-// Fields drop in order: the pipeline before its layouts.
 pub(super) struct Pipeline {
-    pub handle: Owned<vk::Pipeline>,
+    pub made: Arc<MadePipeline>,
     pub point: vk::PipelineBindPoint,
-    pub interface: Interface,
     pub name: String,
     /// The time that a workgroup takes, or a row of the picture.
     pub rate: Rate,

@@ -5,6 +5,7 @@ use ash::vk;
 use super::call::Call;
 use super::device::Device;
 use super::interface::{Constants, Field, Interface, Pipeline, Stage};
+use super::kept_pipelines::{Key, MadePipeline};
 use super::reflect::Reflection;
 use super::shader::Compiler;
 use crate::error::{Error, Result};
@@ -12,7 +13,6 @@ use crate::error::{Error, Result};
 /// A compute pipeline.
 pub struct Kernel {
     pub(super) pipeline: Pipeline,
-    local_size_x: u32,
 }
 
 impl Kernel {
@@ -41,45 +41,60 @@ impl Kernel {
         macros: &[(&str, u32)],
     ) -> Result<Kernel> {
         let file = format!("{}.comp", name.replace('.', "_"));
-        let flags = vk::ShaderStageFlags::COMPUTE;
-        let stages = [Stage::new(device, compiler, file.clone(), flags, macros)?];
-        let [Stage { reflection, .. }] = &stages;
-        let local_size_x = reflection.local_size[0];
-        check_limits(device, &file, reflection)?;
-        let interface = Interface::new(device, name, &stages, push)?;
-        let constants = Constants::new(constants);
-        let specialization = constants.info();
-        let mut stage = stages[0].info(&specialization);
-        let mut size = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
-            .required_subgroup_size(device.limits().subgroup_size);
+        let words = Stage::compile(device, compiler, &file, macros)?;
         // A kernel that takes its workgroup for one subgroup must get exactly one.
         let is_one_subgroup = macros.contains(&("ONE_SUBGROUP", 1));
-        if is_one_subgroup && device.limits().can_choose_subgroup_size {
-            stage = stage
-                .flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS)
-                .push_next(&mut size);
-        }
-        let layout = interface.layout.raw;
-        let (shared, cache) = (device.shared(), vk::PipelineCache::null());
-        let info = [vk::ComputePipelineCreateInfo::default()
-            .stage(stage)
-            .layout(layout)
-            .flags(shared.kernel_flags())];
-        let made = unsafe { shared.raw.create_compute_pipelines(cache, &info, None) };
-        let raw = made.map_err(|(_, e)| e).of_call("vkCreateComputePipelines", name)?[0];
-        let handle = shared.own(raw, name, ash::Device::destroy_pipeline);
-        shared.report(raw, name, macros)?;
+        let key = Key::new(name, &words, push, constants, is_one_subgroup);
+        let shared = device.shared();
+        let made = shared.pipelines.get(key, || {
+            let made = make(device, (name, file, &words), push, constants, is_one_subgroup)?;
+            shared.report(made.handle.raw, name, macros)?;
+            Ok(made)
+        })?;
         let point = vk::PipelineBindPoint::COMPUTE;
         let (rate, indirect_rate) = Default::default();
-        let name = name.to_owned();
-        let pipeline = Pipeline { handle, point, interface, name, rate, indirect_rate };
-        Ok(Kernel { pipeline, local_size_x })
+        let pipeline = Pipeline { made, point, name: name.to_owned(), rate, indirect_rate };
+        Ok(Kernel { pipeline })
     }
 
     /// Returns the invocations of one workgroup along x, the only axis that nimbus's kernels use.
     pub fn local_size_x(&self) -> u32 {
-        self.local_size_x
+        self.pipeline.made.local_size_x
     }
+}
+
+/// Makes the pipeline of a kernel from the SPIR-V of its file.
+fn make(
+    device: &Device,
+    (name, file, words): (&str, String, &[u32]),
+    push: &[Field],
+    constants: &[(u32, u32)],
+    is_one_subgroup: bool,
+) -> Result<MadePipeline> {
+    let stages = [Stage::new(device, file.clone(), words, vk::ShaderStageFlags::COMPUTE)?];
+    let [Stage { reflection, .. }] = &stages;
+    let local_size_x = reflection.local_size[0];
+    check_limits(device, &file, reflection)?;
+    let interface = Interface::new(device, name, &stages, push)?;
+    let constants = Constants::new(constants);
+    let specialization = constants.info();
+    let mut stage = stages[0].info(&specialization);
+    let mut size = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
+        .required_subgroup_size(device.limits().subgroup_size);
+    if is_one_subgroup && device.limits().can_choose_subgroup_size {
+        stage = stage
+            .flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS)
+            .push_next(&mut size);
+    }
+    let (shared, cache) = (device.shared(), vk::PipelineCache::null());
+    let info = [vk::ComputePipelineCreateInfo::default()
+        .stage(stage)
+        .layout(interface.layout.raw)
+        .flags(shared.kernel_flags())];
+    let made = unsafe { shared.raw.create_compute_pipelines(cache, &info, None) };
+    let raw = made.map_err(|(_, e)| e).of_call("vkCreateComputePipelines", name)?[0];
+    let handle = shared.own(raw, name, ash::Device::destroy_pipeline);
+    Ok(MadePipeline { handle, interface, local_size_x })
 }
 
 fn check_limits(device: &Device, file: &str, found: &Reflection) -> Result<()> {

@@ -31,6 +31,7 @@ mod host_clock;
 mod image;
 mod instance;
 mod interface;
+mod kept_pipelines;
 mod kernel;
 mod labels;
 mod limits;

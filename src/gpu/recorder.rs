@@ -293,7 +293,7 @@ impl Recorder<'_> {
         push: &P,
         counts: Option<&Buffer>,
     ) -> Result<()> {
-        let Pipeline { interface, point, .. } = pipeline;
+        let (interface, point) = (&pipeline.made.interface, &pipeline.point);
         let bytes = bytemuck::bytes_of(push);
         let mismatch = |n_shader: usize, what, n_host: usize| {
             let what = format!("has {n_shader} {what}, the host gives {n_host}");
@@ -338,7 +338,7 @@ impl Recorder<'_> {
         let layout = interface.layout.raw;
         unsafe {
             device.update_descriptor_sets(&writes, &[]);
-            device.cmd_bind_pipeline(commands, *point, pipeline.handle.raw);
+            device.cmd_bind_pipeline(commands, *point, pipeline.made.handle.raw);
             device.cmd_bind_descriptor_sets(commands, *point, layout, 0, &[set], &[]);
             if !bytes.is_empty() {
                 device.cmd_push_constants(commands, layout, interface.stages, 0, bytes);

@@ -1,11 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 #include "each.glsl"
 #include "light.glsl"
 #include "diffusion.glsl"
 #include "medium.glsl"
 #include "patches.glsl"
+#include "orders.glsl"
 
 // Gathers the light that arrives in each cell from all others (model.md §18, passes.md
 // "diffusion").
@@ -28,9 +30,11 @@ layout(push_constant) uniform Push {
     vec3 even;
     float inverse_chord;
     vec3 forward;
-    float unused;
+    // 5 (g^2-f)/(1-f), and 7 (g^3-f)/(1-f)
+    float second;
     // 1 - albedo g
     vec3 kept;
+    float third;
 } push;
 READS(0, Light, lights)
 // Texels, which llvmpipe fetches for all invocations at once.
@@ -39,6 +43,11 @@ UPDATES(2, vec4, field)
 WRITES(3, vec4, change)
 #if SOLIDS
 READS(4, vec4, faces)
+#endif
+#if HIGH && SOLIDS
+WRITES(5, vec4, high)
+#elif HIGH
+WRITES(4, vec4, high)
 #endif
 
 #include "faces.glsl"
@@ -61,6 +70,10 @@ void main() {
         int c = int(i);
         ivec3 at = place_of(level, i);
         vec3 phi = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
+#if HIGH
+        vec3 sums[N_HIGH];
+        [[unroll]] for (int m = 0; m < N_HIGH; ++m) { sums[m] = vec3(0.0); }
+#endif
         for (uint k = 0; k < N_DIRECTIONS; ++k) {
             vec3 w = direction(k);
             first_sent = int(k * n_total(level));
@@ -69,7 +82,19 @@ void main() {
             x += l * w.x;
             y += l * w.y;
             z += l * w.z;
+#if HIGH
+            float orders[N_HIGH];
+            high_orders(w, orders);
+            [[unroll]] for (int m = 0; m < N_HIGH; ++m) { sums[m] += orders[m] * l; }
+#endif
         }
+#if HIGH
+        vec3 scale = push.even / max(push.weakened, vec3(1e-30)) / float(N_DIRECTIONS);
+        [[unroll]] for (int m = 0; m < N_HIGH; ++m) {
+            float share = m < FIRST_THIRD ? push.second : push.third;
+            high[N_HIGH * c + m] = vec4(share * scale * sums[m], 0.0);
+        }
+#endif
         vec3 new[4] = vec3[](phi, x, y, z);
         float sigma = uintBitsToFloat(TEXEL(sent, c)).w;
         vec3 reach = 1.0 / (3.0 * sigma * push.kept + push.inverse_chord);

@@ -1,8 +1,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 #include "each.glsl"
 #include "diffusion.glsl"
+#include "orders.glsl"
 
 // Writes fluence and flux of the diffuse light (model.md §18, passes.md "diffusion").
 // In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi; what
@@ -44,6 +46,9 @@ TEXELS(3, carried)
 TEXELS(4, arrived)
 // [direction][cell]
 TEXEL_STORES(5, sent)
+#if CHANGE && HIGH
+TEXELS(6, high)
+#endif
 #endif
 
 vec3 phi_at(int c) { return uintBitsToFloat(TEXEL(phi, c).rgb); }
@@ -80,7 +85,7 @@ void main() {
 #endif
         field[4 * c].rgb = fluence;
 #if BOUNCES
-        vec3 even = arrived_at(4 * c) + push.even * fluence, forward[3];
+        vec3 even = arrived_at(N_ARRIVED * c) + push.even * fluence, forward[3];
 #endif
         for (int axis = 0; axis < 3; ++axis) {
             int after = at[axis] + 1 < int(level.n_cells[axis]) ? c + stride[axis] : c;
@@ -105,13 +110,27 @@ void main() {
 #endif
             field[k].rgb = flux;
 #if BOUNCES
-            forward[axis] = arrived_at(k) + push.forward * flux;
+            forward[axis] = arrived_at(N_ARRIVED * c + 1 + axis) + push.forward * flux;
 #endif
         }
 #if BOUNCES
+#if HIGH
+        vec3 more[N_HIGH];
+        [[unroll]] for (int m = 0; m < N_HIGH; ++m) {
+            more[m] = arrived_at(N_ARRIVED * c + 4 + m);
+#if CHANGE
+            more[m] += uintBitsToFloat(TEXEL(high, N_HIGH * c + m).rgb);
+#endif
+        }
+#endif
         for (uint k = 0; k < N_DIRECTIONS; ++k) {
             vec3 w = direction(k);
             vec3 all = even + w.x * forward[0] + w.y * forward[1] + w.z * forward[2];
+#if HIGH
+            float orders[N_HIGH];
+            high_orders(w, orders);
+            [[unroll]] for (int m = 0; m < N_HIGH; ++m) { all += orders[m] * more[m]; }
+#endif
             uvec4 words = floatBitsToUint(vec4(all, extinction_of(c)));
             STORE_TEXEL(sent, int(k * n_total(level) + i), words);
         }

@@ -7,6 +7,7 @@
 #include "functions.glsl"
 #include "occlude.glsl"
 #include "diffusion.glsl"
+#include "orders.glsl"
 
 // Computes the light of suns and lamps that is scattered for the first time in every cell
 // (model.md §18, passes.md "diffusion").
@@ -42,6 +43,9 @@ layout(push_constant) uniform Push {
     float step_length;
     uint max_steps;
     float densest;
+    // 5 (g^2-f)/(1-f), and 7 (g^3-f)/(1-f)
+    float second;
+    float third;
 } push;
 READS(0, Light, lights)
 TEXELS(1, regions)
@@ -106,6 +110,10 @@ void main() {
         // Flux of the skies along x, y and z.
         vec3 fallen[3] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0)), direct = vec3(0.0);
         vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
+#if HIGH
+        vec3 high[N_HIGH];
+        [[unroll]] for (int m = 0; m < N_HIGH; ++m) { high[m] = vec3(0.0); }
+#endif
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
             bool is_sky = light.kind == LIGHT_SKY;
@@ -131,6 +139,11 @@ void main() {
                     x -= e * a.toward.x;
                     y -= e * a.toward.y;
                     z -= e * a.toward.z;
+#if HIGH
+                    float orders[N_HIGH];
+                    high_orders(-a.toward, orders);
+                    [[unroll]] for (int m = 0; m < N_HIGH; ++m) { high[m] += orders[m] * e; }
+#endif
                 }
             }
         }
@@ -146,10 +159,18 @@ void main() {
         // Also where nothing scatters yet: the cells about have a mixture.
         vec3 share = push.albedo / max(weakened, vec3(1e-30));
         vec3 along = 3.0 * (push.g - push.straight) * share;
-        arrived[4 * c] = vec4((1.0 - push.straight) * share * fluence, sigma);
-        arrived[4 * c + 1] = vec4(along * x, 0.0);
-        arrived[4 * c + 2] = vec4(along * y, 0.0);
-        arrived[4 * c + 3] = vec4(along * z, 0.0);
+        uint first = N_ARRIVED * c;
+        arrived[first] = vec4((1.0 - push.straight) * share * fluence, sigma);
+        arrived[first + 1] = vec4(along * x, 0.0);
+        arrived[first + 2] = vec4(along * y, 0.0);
+        arrived[first + 3] = vec4(along * z, 0.0);
+#if HIGH
+        vec3 rest = (1.0 - push.straight) * share;
+        [[unroll]] for (int m = 0; m < N_HIGH; ++m) {
+            float counts = m < FIRST_THIRD ? push.second : push.third;
+            arrived[first + 4 + m] = vec4(counts * rest * high[m], 0.0);
+        }
+#endif
 #endif
     }
 }

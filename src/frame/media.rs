@@ -8,14 +8,14 @@ use crate::layout::medium::MediumRecord;
 use crate::model::cloud::{Cloud, Group};
 use crate::model::grid::GridSpec;
 use crate::model::medium::{MeanMedium, Medium};
-use crate::model::scene::{Lighting, Scene};
+use crate::model::scene::Scene;
 
 /// Returns the medium of each cloud at `time_s`; none where clouds are not a medium.
 pub(super) fn records(scene: &Scene, time_s: f64) -> Vec<MediumRecord> {
-    let Lighting { mode, forward, .. } = scene.lighting;
+    let lighting = &scene.lighting;
     let of = |cloud: &Cloud| {
         let material = &scene.materials[cloud.i_material];
-        MediumRecord::new(&Medium::new(material, time_s, forward), mode)
+        MediumRecord::new(&Medium::new(material, time_s, lighting.forward), lighting)
     };
     if is_medium(scene) { scene.clouds.iter().map(of).collect() } else { vec![] }
 }

@@ -3,7 +3,7 @@
 use crate::layout::record;
 use crate::model::medium::{Medium, without};
 use crate::model::phase::Phase;
-use crate::model::scene::LightingMode;
+use crate::model::scene::Lighting;
 
 record! {
     /// The medium of a cloud (model.md §18).
@@ -33,8 +33,8 @@ record! {
 
 impl MediumRecord {
     /// Returns the record of `medium` in a mode of lighting.
-    pub fn new(medium: &Medium, mode: LightingMode) -> Self {
-        let straight = medium.straight(mode);
+    pub fn new(medium: &Medium, lighting: &Lighting) -> Self {
+        let straight = medium.straight(lighting);
         let rest = without(medium.phase, straight);
         let record = MediumRecord {
             reflected: medium.given.unwrap_or(medium.kd).as_vec3().to_array(),

@@ -76,6 +76,8 @@ pub struct DiffusionSettings {
     pub bounces: u32,
     /// Edge of the cells that bounces lead between, in cells of the grid.
     pub bounce_cells: u32,
+    /// Order up to which they have the phase function.
+    pub bounce_order: u32,
     /// The light changes linearly inside of each blob.
     pub slopes: bool,
 }
@@ -213,6 +215,12 @@ impl Lighting {
         self.mode == LightingMode::Diffusion && self.diffusion.slopes
     }
 
+    /// Returns the order up to which diffuse light has the phase function: without bounces the
+    /// first.
+    pub fn order(&self) -> i32 {
+        if self.has_bounces() { self.diffusion.bounce_order as i32 } else { 1 }
+    }
+
     /// Returns whether bounces between cells follow diffusion.
     pub fn has_bounces(&self) -> bool {
         self.mode == LightingMode::Diffusion && self.diffusion.bounces > 0
@@ -228,6 +236,9 @@ pub const MAX_CYCLES: u32 = 32;
 /// Greatest number of bounces between cells: with the correction of each, many more than light
 /// needs.
 pub const MAX_BOUNCES: u32 = 64;
+
+/// Greatest order up to which bounces have the phase function.
+pub const MAX_BOUNCE_ORDER: u32 = 3;
 
 /// Greatest edge of the cells that bounces lead between, in cells of the grid.
 pub const MAX_BOUNCE_CELLS: u32 = 8;

@@ -39,14 +39,20 @@ impl Medium {
 
     /// Returns f: the share of what is scattered that counts as not scattered, because it goes
     /// straight on.
-    pub fn straight(&self, mode: LightingMode) -> f64 {
+    pub fn straight(&self, lighting: &Lighting) -> f64 {
         let g = self.phase.mean_cosine();
-        match mode {
+        match lighting.mode {
             LightingMode::Similarity => g,
-            LightingMode::Diffusion => g * g,
+            LightingMode::Diffusion => straight_of(g, lighting.order()),
             _ => 0.0,
         }
     }
+}
+
+/// Returns g^(n+1), the share that goes straight on where the phase function counts up to order n.
+/// It is none where that is negative.
+fn straight_of(g: f64, order: i32) -> f64 {
+    g.powi(order + 1).max(0.0)
 }
 
 /// The light that a blob scatters toward the eye once, in a mode of lighting.
@@ -68,7 +74,7 @@ const ONCE: Octaves = Octaves { n: 1, light: 1.0, depth: 1.0, phase: 1.0 };
 impl ScatterLaw {
     /// Returns the law of `medium` for particles of a colour.
     pub fn new(lighting: &Lighting, medium: &Medium, color: DVec3) -> ScatterLaw {
-        let (f, albedo) = (medium.straight(lighting.mode), medium.albedo(color));
+        let (f, albedo) = (medium.straight(lighting), medium.albedo(color));
         let depth = DVec3::ONE - albedo * f;
         ScatterLaw {
             // Where all goes straight on, 0/0 is 0.
@@ -141,8 +147,11 @@ pub struct MeanMedium {
     pub albedo: DVec3,
     /// g, mean cosine of the phase function.
     pub g: f64,
-    /// f = g²: share that counts as not scattered.
+    /// f = g^(n+1), n being the order of the phase function that counts: share that counts as not
+    /// scattered.
     pub straight: f64,
+    /// n.
+    pub order: i32,
 }
 
 /// Transport mean free paths across a cell beyond which it counts as no denser. With 4, light grows
@@ -160,9 +169,18 @@ impl MeanMedium {
     /// Returns ϖ' = ϖ(1 − f)/s and 3ϖ'g' = 3ϖ(g − f)/s: factors of φ and of the flux in what is
     /// scattered. Where all goes straight on, they are 0.
     pub fn scattered(&self) -> [DVec3; 2] {
-        let MeanMedium { albedo, g, straight } = *self;
+        let MeanMedium { albedo, g, straight, .. } = *self;
         let all = albedo / self.weakened().max(DVec3::splat(f64::MIN_POSITIVE));
         [1.0 - straight, 3.0 * (g - straight)].map(|share| share * all)
+    }
+
+    /// Returns (2l + 1)(g^l − f)/(1 − f) of the second and the third order l, up to n: factors of
+    /// their share in what is scattered, over ϖ'.
+    pub fn high_orders(&self) -> [f64; 2] {
+        let MeanMedium { g, straight: f, order, .. } = *self;
+        let rest = (1.0 - f).max(f64::MIN_POSITIVE);
+        let of = |l: i32| f64::from(2 * l + 1) * (g.powi(l) - f) / rest;
+        [2, 3].map(|l| if l <= order { of(l) } else { 0.0 })
     }
 
     /// Returns the extinction beyond which a cell of `grid` counts as no denser, 1/length: two
@@ -181,7 +199,7 @@ impl MeanMedium {
     pub fn new(scene: &Scene, groups: &[Group], time_s: f64) -> MeanMedium {
         MeanMedium::weighted(scene, groups, time_s, true)
             .or_else(|| MeanMedium::weighted(scene, groups, time_s, false))
-            .unwrap_or(MeanMedium { albedo: DVec3::ZERO, g: 0.0, straight: 0.0 })
+            .unwrap_or(MeanMedium { albedo: DVec3::ZERO, g: 0.0, straight: 0.0, order: 1 })
     }
 
     /// Returns the mean by mass or by number; `None` if that is 0.
@@ -210,8 +228,13 @@ impl MeanMedium {
                 }
             }
         }
-        let g = g / total;
-        (total > 0.0).then(|| MeanMedium { albedo: albedo / total, g, straight: g * g })
+        let (g, order) = (g / total, scene.lighting.order());
+        (total > 0.0).then(|| MeanMedium {
+            albedo: albedo / total,
+            g,
+            straight: straight_of(g, order),
+            order,
+        })
     }
 }
 
@@ -250,6 +273,7 @@ mod tests {
             cycles: 1,
             bounces: 0,
             bounce_cells: 1,
+            bounce_order: 1,
             slopes: false,
         },
         budget: crate::model::scene::LightBudget { ms: None, error: None },

@@ -17,7 +17,8 @@ use super::group::mean_aspect_of;
 use super::light::Light;
 pub use super::lighting::{
     DiffusionSettings, FacetCount, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCE_CELLS,
-    MAX_BOUNCES, MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs, RUNGS, Rung,
+    MAX_BOUNCE_ORDER, MAX_BOUNCES, MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs, RUNGS,
+    Rung,
 };
 use super::material::Material;
 use super::named::named;

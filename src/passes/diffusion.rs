@@ -19,7 +19,7 @@ use crate::layout::diffusion::{DiffusionParams, LevelStep, levels};
 use crate::layout::frame::GridRecord;
 
 use bounces::Bounces;
-pub use bounces::{BouncePush, N_DIRECTIONS, SeenPush};
+pub use bounces::{BouncePush, HighPush, N_DIRECTIONS, N_HIGH, SeenPush, TowardPush};
 use cells::Cells;
 pub use merged::{MergePush, SpreadPush};
 pub use push::{CyclePush, FluxPush, PairPush, SourcesPush, SweepPush, SystemPush};
@@ -133,7 +133,11 @@ impl Diffusion {
             Kernel::with_macros(device, compiler, name, fields, &[], &macros)
         };
         let has_bounces = room.bounce_cells > 0;
-        let with_bounces = [&macros[..], &[("BOUNCES", u32::from(has_bounces))]].concat();
+        let with_bounces = [
+            &macros[..],
+            &[("BOUNCES", u32::from(has_bounces)), ("HIGH", u32::from(room.has_high))],
+        ]
+        .concat();
         Ok(Diffusion {
             solids: has_solids.then(|| Solids::new(device, compiler)).transpose()?,
             sources: Kernel::with_macros(
@@ -217,6 +221,8 @@ impl Diffusion {
             step_length: (work.step_cells * f64::from(grid.cell)) as f32,
             max_steps: work.max_steps,
             densest: of.densest,
+            second: of.high_orders[0],
+            third: of.high_orders[1],
         };
         let cells = Cells { grid: *grid, density, field, of: *of };
         let arrived = self.bounces.as_ref().map(Bounces::arrived);

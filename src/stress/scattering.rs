@@ -109,9 +109,9 @@ fn furnace(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     {
         let mut scene = scene(LightingMode::Diffusion, EVEN, WHITE, cluster(tau))?;
         scene.surfaces = surfaces;
-        for (bounces, cells) in [(0, 1), (2, 1), (2, 2)] {
+        for (bounces, cells, order) in [(0, 1, 3), (2, 1, 3), (2, 2, 1), (2, 2, 3)] {
             let of = &mut scene.lighting.diffusion;
-            (of.bounces, of.bounce_cells) = (bounces, cells);
+            (of.bounces, of.bounce_cells, of.bounce_order) = (bounces, cells, order);
             let frame = ctx.render(&scene, 0)?;
             for (i, lit) in frame.lit.iter().enumerate() {
                 let what = format_args!("radiance of facet {i}, depth {tau:e}, {bounces} bounces");

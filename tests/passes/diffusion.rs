@@ -23,6 +23,15 @@ fn every_facet_has_the_light_of_the_twin() {
 }
 
 #[test]
+fn bounces_of_lower_orders_have_the_light_of_the_twin() {
+    let gpu = Gpu::new();
+    for name in ["coloured", "opaque", "floors"] {
+        media::check(&gpu, name, "cosine");
+        media::check(&gpu, name, "second");
+    }
+}
+
+#[test]
 fn bounces_have_the_same_light_without_slopes() {
     let gpu = Gpu::new();
     for name in ["boxes", "floors"] {
@@ -140,12 +149,12 @@ fn wrong_shaders_are_found() {
         ("flat", "bounces", "diffusion_flux.comp", "- 2.0 * own * other", "- 2.0 * own * own"),
         ("flat", "merged", "diffusion_flux.comp", "flow(prior, c, axis,", "flow(c, prior, axis,"),
         ("flat", "bounces", "diffusion_flux.comp", "carried_at(next, axis)", "carried_at(c, axis)"),
-        ("coloured", "bounces", "diffusion_seen.comp", "0.5 * dot(bend", "dot(bend"),
-        ("coloured", "bounces", "diffusion_seen.comp", "of_suns * mix(1.0", "of_suns * mix(0.9"),
+        ("coloured", "bounces", "diffusion_toward.comp", "0.5 * dot(bend", "dot(bend"),
+        ("coloured", "bounces", "diffusion_toward.comp", "of_suns * mix(1.0", "of_suns * mix(0.9"),
         ("coloured", "bounces", "diffusion_seen.comp", "(1.0 - push.weakened) *", "0.9 *"),
         ("flat", "bounces", "include/ways.glsl", "face = 0.5 * across", "face = across"),
         ("coloured", "bounces", "diffusion_bounce.comp", "w.y < 0.0 ? 1.0", "w.y > 0.0 ? 1.0"),
-        ("coloured", "bounces", "diffusion_seen.comp", "0.5 - to_eye.y", "0.5 + to_eye.y"),
+        ("coloured", "bounces", "diffusion_seen.comp", "0.5 - way.y", "0.5 + way.y"),
         ("floors", "bounces", "include/ways.glsl", "turn[axis] > 0 ? 1u", "turn[axis] < 0 ? 1u"),
         ("flat", "bounces", "scatter.comp", "passed *= on", "passed *= 1.0"),
         ("coloured", "bounces", "scatter.comp", "APART = 1.2", "APART = 1.3"),
@@ -172,6 +181,21 @@ fn wrong_shaders_are_found() {
             "field[4 * c + k].rgb +=",
             "field[4 * c].rgb +=",
         ),
+        ("coloured", "bounces", "include/orders.glsl", "5.0 * s.z - 1.0", "5.0 * s.z - 0.9"),
+        ("coloured", "bounces", "include/orders.glsl", "0.8660254037844386", "0.9"),
+        ("boxes", "bounces", "include/orders.glsl", "FIRST_THIRD = 5", "FIRST_THIRD = 6"),
+        ("boxes", "bounces", "diffusion_sources.comp", "orders[m] * e", "-orders[m] * e"),
+        ("droplets", "merged", "diffusion_sources.comp", "counts * rest", "counts * share"),
+        ("flat", "bounces", "diffusion_bounce.comp", "? push.second : push", "? push.third : push"),
+        ("boxes", "merged", "diffusion_bounce.comp", "orders[m] * l", "0.9 * orders[m] * l"),
+        ("boxes", "bounces", "diffusion_flux.comp", "more[m] += uint", "more[m] = uint"),
+        ("coloured", "merged", "diffusion_flux.comp", "orders[m] * more", "orders[m] * -more"),
+        ("boxes", "cosine", "diffusion_flux.comp", "+ w.y * forward[1]", "- w.y * forward[1]"),
+        ("coloured", "merged", "diffusion_merge.comp", "N_ARRIVED * i_cell + k)", "i_cell + k)"),
+        ("boxes", "merged", "diffusion_high.comp", "y[k] *", "y[0] *"),
+        ("flat", "merged", "diffusion_toward.comp", "+= high_at(at)", "+= 0.9 * high_at(at)"),
+        ("boxes", "merged", "diffusion_toward.comp", "ivec3(push.before)", "ivec3(0)"),
+        ("boxes", "bounces", "include/eye.glsl", "vec3(1.0, grid.aspect, 1.0)", "vec3(1.01)"),
         ("droplets", "bounces", "facets_groups.comp", "color, sigma)", "color, scale)"),
         ("floors", "diffusion", "include/patches.glsl", "part[u] =", "part[v] ="),
         ("floors", "diffusion", "scatter.comp", "0.25 * field_at(c)", "0.5 * field_at(c)"),

@@ -9,7 +9,7 @@ use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, min_step};
 use crate::model::scene::{
     DiffusionSettings, FacetCount, Gather, LightBudget, Lighting, LightingMode, MAX_BOUNCE_CELLS,
-    MAX_BOUNCES, MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs,
+    MAX_BOUNCE_ORDER, MAX_BOUNCES, MAX_CYCLES, MAX_OCTAVES, MAX_PAIR_LEVELS, Octaves, Pairs,
 };
 use crate::model::sums::{Precision, Summation, Sums};
 
@@ -95,6 +95,9 @@ keys! { DIFFUSION: fn diffusion(s) -> DiffusionSettings { DiffusionSettings;
     /// Edge of the cells that bounces lead between, in cells of the grid. With twice the edge,
     /// light takes a sixteenth of the steps from cell to cell.
     bounce_cells: integer(2, 1, MAX_BOUNCE_CELLS);
+    /// Order up to which bounces have the phase function. With 1, light is scattered by a cosine.
+    /// With 3 it is nearer to transport where cells are thin, and not where they are opaque.
+    bounce_order: integer(3, 1, MAX_BOUNCE_ORDER);
     /// Whether the light of mode "diffusion" changes inside of each blob, as it does in the clouds
     /// around it.
     slopes: flag(true);

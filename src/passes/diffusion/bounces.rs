@@ -13,6 +13,9 @@ use crate::layout::record;
 /// Directions over which a bounce sums.
 pub const N_DIRECTIONS: usize = 24;
 
+/// Harmonics of the second and the third order.
+pub const N_HIGH: usize = 12;
+
 record! {
     /// Push constants of `diffusion_bounce.comp`.
     pub struct BouncePush {
@@ -28,10 +31,48 @@ record! {
         inverse_chord: f32,
         /// 3ϖ(g − f).
         forward: [f32; 3],
-        /// Padding.
-        unused: f32,
+        /// Factor of the second order in what is scattered, over ϖ'.
+        second: f32,
         /// 1 − ϖg.
         kept: [f32; 3],
+        /// The same of the third order.
+        third: f32,
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_high.comp`.
+    pub struct HighPush {
+        /// The cells that bounces lead between.
+        grid: GridRecord,
+        /// Eye, relative to the lighting origin.
+        eye: [f32; 3],
+    }
+}
+
+record! {
+    /// Push constants of `diffusion_toward.comp`.
+    pub struct TowardPush {
+        /// The density grid.
+        grid: GridRecord,
+        /// ϖ'.
+        even: [f32; 3],
+        /// g.
+        g: f32,
+        /// 3ϖ'g'.
+        forward: [f32; 3],
+        /// f.
+        straight: f32,
+        /// Eye, relative to the lighting origin.
+        eye: [f32; 3],
+        /// Edge of a cell that bounces lead between, in cells.
+        edge: u32,
+        /// Cells by which the first of those reaches beyond the grid.
+        before: [u32; 3],
+        /// Padding.
+        unused: u32,
+        /// Cells that bounces lead between, along each axis.
+        n_bounce_cells: [u32; 3],
     }
 }
 
@@ -44,14 +85,6 @@ record! {
         weakened: [f32; 3],
         /// Number of lights.
         n_lights: u32,
-        /// ϖ'.
-        even: [f32; 3],
-        /// g.
-        g: f32,
-        /// 3ϖ'g'.
-        forward: [f32; 3],
-        /// f.
-        straight: f32,
         /// Eye, relative to the lighting origin.
         eye: [f32; 3],
     }
@@ -59,22 +92,28 @@ record! {
 
 buffers! {
     /// Scratch by cell that bounces lead between.
-    struct Scratch(n_cells: u64) {
+    struct Scratch(room: Room) {
         /// Light that cells send out, by direction and cell, beside the extinction.
-        sent: Buffer => [[f32; 4]; N_DIRECTIONS], n_cells, "diffusion.sent", TexelStores;
+        sent: Buffer => [[f32; 4]; N_DIRECTIONS], room.n_bounce_cells(), "diffusion.sent", TexelStores;
         /// Q0 and q of what a bounce has changed.
-        change: Buffer => [[f32; 4]; 4], n_cells, "diffusion.change", Texels;
+        change: Buffer => [[f32; 4]; 4], room.n_bounce_cells(), "diffusion.change", Texels;
+        /// What they send out by the high orders of the phase function, by harmonic.
+        high: Buffer => [[f32; 4]; N_HIGH], room.n_high_cells(), "diffusion.high", Texels;
+        /// The same toward the eye.
+        high_seen: Buffer => [f32; 4], room.n_high_cells(), "diffusion.high_seen", Texels;
     }
 }
 
 buffers! {
     /// Scratch by cell of the grid.
-    struct Arrived(n_cells: u64) {
-        /// Light that suns and lamps make it send out: evenly, beside the extinction, and three
-        /// times the flux along each axis.
-        arrived: Buffer => [[f32; 4]; 4], n_cells, "diffusion.arrived", Texels;
+    struct Arrived(room: Room) {
+        /// Light that suns and lamps make it send out: evenly, beside the extinction, three times
+        /// the flux along each axis, and by the high orders.
+        arrived: Buffer => [f32; 4], room.n_grid_cells() * room.n_arrived(), "diffusion.arrived", Texels;
         /// Q0 and q.
-        carried: Buffer => [[f32; 4]; 4], n_cells, "diffusion.carried", Texels;
+        carried: Buffer => [[f32; 4]; 4], room.n_grid_cells(), "diffusion.carried", Texels;
+        /// Light that it sends out toward the eye, beside the extinction.
+        toward: Buffer => [f32; 4], room.n_grid_cells(), "diffusion.toward", Texels;
     }
 }
 
@@ -87,6 +126,9 @@ pub(super) struct Bounces {
     correct: Kernel,
     /// Corrects after the last bounce, when no cell sends light to another any more.
     correct_last: Kernel,
+    /// Sums high orders toward the eye, where bounces have them.
+    high: Option<Kernel>,
+    toward: Kernel,
     seen: Kernel,
     arrived: Arrived,
     scratch: Scratch,
@@ -98,11 +140,10 @@ pub(super) struct Bounces {
 impl Bounces {
     /// Lists the sizes of all scratch buffers; none without bounces.
     pub fn specs(room: Room) -> Vec<BufferSpec> {
-        let (n, few) = (room.n_grid_cells(), room.n_bounce_cells());
+        let of_merged = if room.bounce_cells > 1 { merged::Scratch::specs(room) } else { vec![] };
         match room.bounce_cells {
             0 => vec![],
-            1 => [Arrived::specs(n), Scratch::specs(n)].concat(),
-            _ => [Arrived::specs(n), Scratch::specs(few), merged::Scratch::specs(few)].concat(),
+            _ => [Arrived::specs(room), Scratch::specs(room), of_merged].concat(),
         }
     }
 
@@ -110,28 +151,39 @@ impl Bounces {
     pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Bounces> {
         let has_solids = room.n_solid_facets > 0;
         let solids = [("N_SETS", room.n_sets), ("SOLIDS", u32::from(has_solids))];
+        let high = ("HIGH", u32::from(room.has_high));
+        let bounce = [&solids[..], &[high]].concat();
         let kernel = |name: &str, fields: &_, macros: &[(&str, u32)]| {
             Kernel::with_macros(device, compiler, name, fields, &[], macros)
         };
         let of_change = [("N_SETS", room.n_sets), ("SOLIDS", 0), ("CHANGE", 1)];
         let is_merged = room.bounce_cells > 1;
         Ok(Bounces {
-            flux: kernel("diffusion.flux", FluxPush::FIELDS, &[("FACES", 1), ("BOUNCES", 1)])?,
-            bounce: kernel("diffusion.bounce", BouncePush::FIELDS, &solids)?,
+            flux: kernel(
+                "diffusion.flux",
+                FluxPush::FIELDS,
+                &[("FACES", 1), ("BOUNCES", 1), high],
+            )?,
+            bounce: kernel("diffusion.bounce", BouncePush::FIELDS, &bounce)?,
             system: kernel("diffusion.system", SystemPush::FIELDS, &of_change)?,
             correct: kernel(
                 "diffusion.flux",
                 FluxPush::FIELDS,
-                &[("FACES", 1), ("BOUNCES", 1), ("CHANGE", 1)],
+                &[("FACES", 1), ("BOUNCES", 1), ("CHANGE", 1), high],
             )?,
             correct_last: kernel(
                 "diffusion.flux",
                 FluxPush::FIELDS,
                 &[("FACES", 1), ("CHANGE", 1)],
             )?,
+            high: room
+                .has_high
+                .then(|| kernel("diffusion.high", HighPush::FIELDS, &[]))
+                .transpose()?,
+            toward: kernel("diffusion.toward", TowardPush::FIELDS, &[high])?,
             seen: kernel("diffusion.seen", SeenPush::FIELDS, &solids)?,
-            arrived: Arrived::new(device, room.n_grid_cells())?,
-            scratch: Scratch::new(device, room.n_bounce_cells())?,
+            arrived: Arrived::new(device, room)?,
+            scratch: Scratch::new(device, room)?,
             merged: is_merged.then(|| Merged::new(device, compiler, room)).transpose()?,
             has_solids,
         })
@@ -174,7 +226,7 @@ impl Bounces {
         [lights, faces]: [&Buffer; 2],
         n_lights: u32,
     ) -> Result<()> {
-        let Scratch { sent, change } = &self.scratch;
+        let Scratch { sent, change, high, .. } = &self.scratch;
         let (of, times) = (&cells.of, |a: [f32; 3], b: f32| a.map(|a| a * b));
         let push = BouncePush {
             grid: cells.grid,
@@ -183,12 +235,15 @@ impl Bounces {
             even: of.scattered(),
             inverse_chord: of.inverse_chord,
             forward: times(of.albedo, 3.0 * (of.g - of.straight)),
+            second: of.high_orders[0],
             kept: of.kept,
-            ..BouncePush::default()
+            third: of.high_orders[1],
         };
-        let all = [lights, sent, cells.field, change, faces];
-        let n_buffers = 4 + usize::from(self.has_solids);
-        rec.dispatch(&self.bounce, &all[..n_buffers], &push, cells.n_total())
+        let of_solids = self.has_solids.then_some(faces);
+        let of_high = self.high.is_some().then_some(high);
+        let all = [lights, sent, cells.field, change].into_iter();
+        let all: Vec<&Buffer> = all.chain(of_solids).chain(of_high).collect();
+        rec.dispatch(&self.bounce, &all, &push, cells.n_total())
     }
 
     /// Adds what diffusion makes of the change.
@@ -199,11 +254,14 @@ impl Bounces {
         [phi, arrived]: [&Buffer; 2],
         is_last: bool,
     ) -> Result<()> {
-        let Scratch { sent, change } = &self.scratch;
-        let all = [cells.density, phi, cells.field, change, arrived, sent];
-        let (kernel, buffers) =
-            if is_last { (&self.correct_last, &all[..4]) } else { (&self.correct, &all[..]) };
-        rec.dispatch(kernel, buffers, &cells.flux_push(), cells.n_total())
+        let Scratch { sent, change, high, .. } = &self.scratch;
+        let all = [cells.density, phi, cells.field, change, arrived, sent, high];
+        let (kernel, n_buffers) = match (is_last, &self.high) {
+            (true, _) => (&self.correct_last, 4),
+            (false, None) => (&self.correct, 6),
+            (false, Some(_)) => (&self.correct, 7),
+        };
+        rec.dispatch(kernel, &all[..n_buffers], &cells.flux_push(), cells.n_total())
     }
 
     /// Writes the radiance that each cell scatters toward the eye.
@@ -214,18 +272,33 @@ impl Bounces {
         grid: &GridRecord,
         (of, n_lights, eye): (&DiffusionParams, u32, [f32; 3]),
     ) -> Result<()> {
-        let push = SeenPush {
+        let edge = self.merged.as_ref().map_or(1, |merged| merged.edge);
+        let bounce_cells = grid.merged(edge);
+        let n_bounce_cells = bounce_cells.n_cells;
+        let Scratch { high, high_seen, .. } = &self.scratch;
+        let Arrived { arrived, toward, .. } = &self.arrived;
+        if let Some(kernel) = &self.high {
+            let push = HighPush { grid: bounce_cells, eye };
+            rec.dispatch(kernel, &[high, high_seen], &push, n_bounce_cells.iter().product())?;
+        }
+        let push = TowardPush {
             grid: *grid,
-            weakened: of.weakened,
-            n_lights,
             even: of.even,
             g: of.g,
             forward: of.forward,
             straight: of.straight,
             eye,
+            edge,
+            before: grid.cells_before(edge),
+            unused: 0,
+            n_bounce_cells,
         };
-        let all = [lights, field, self.arrived(), seen, faces];
-        let n_buffers = 4 + usize::from(self.has_solids);
+        let all = [field, arrived, toward, high_seen];
+        let n_buffers = 3 + usize::from(self.high.is_some());
+        rec.dispatch(&self.toward, &all[..n_buffers], &push, grid.n_cells.iter().product())?;
+        let push = SeenPush { grid: *grid, weakened: of.weakened, n_lights, eye };
+        let all = [lights, toward, seen, faces];
+        let n_buffers = 3 + usize::from(self.has_solids);
         rec.dispatch(&self.seen, &all[..n_buffers], &push, grid.n_cells.iter().product())
     }
 }

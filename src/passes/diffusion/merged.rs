@@ -44,15 +44,16 @@ record! {
 
 buffers! {
     /// Merged cells, as the cells have them.
-    pub struct Scratch(n_cells: u64) {
+    pub struct Scratch(room: Room) {
         /// `f32` by cell: extinction per length.
-        density: Buffer => f32, n_cells, "diffusion.merged_density", Floats;
+        density: Buffer => f32, room.n_bounce_cells(), "diffusion.merged_density", Floats;
         /// Q0 and q, then φ and F.
-        field: Buffer => [[f32; 4]; 4], n_cells, "diffusion.merged_field", Texels;
+        field: Buffer => [[f32; 4]; 4], room.n_bounce_cells(), "diffusion.merged_field", Texels;
         /// φ and F before the bounces.
-        before: Buffer => [[f32; 4]; 4], n_cells, "diffusion.merged_before", Texels;
+        before: Buffer => [[f32; 4]; 4], room.n_bounce_cells(), "diffusion.merged_before", Texels;
         /// Light that suns and lamps make each cell send out, beside its extinction.
-        arrived: Buffer => [[f32; 4]; 4], n_cells, "diffusion.merged_arrived", Texels;
+        arrived: Buffer => [f32; 4], room.n_bounce_cells() * room.n_arrived(),
+            "diffusion.merged_arrived", Texels;
     }
 }
 
@@ -61,7 +62,7 @@ pub(super) struct Merged {
     merge: Kernel,
     spread: Kernel,
     pub scratch: Scratch,
-    edge: u32,
+    pub edge: u32,
     most: u64,
 }
 
@@ -69,10 +70,18 @@ impl Merged {
     /// Creates the kernels, and room for the merged cells of a grid.
     pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Merged> {
         let most = room.n_bounce_cells();
+        let macros = [("HIGH", u32::from(room.has_high))];
         Ok(Merged {
-            merge: Kernel::new(device, compiler, "diffusion.merge", MergePush::FIELDS)?,
+            merge: Kernel::with_macros(
+                device,
+                compiler,
+                "diffusion.merge",
+                MergePush::FIELDS,
+                &[],
+                &macros,
+            )?,
             spread: Kernel::new(device, compiler, "diffusion.spread", SpreadPush::FIELDS)?,
-            scratch: Scratch::new(device, most)?,
+            scratch: Scratch::new(device, room)?,
             edge: room.bounce_cells,
             most,
         })

@@ -27,6 +27,10 @@ record! {
         max_steps: u32,
         /// Extinction beyond which a cell counts as no denser, 1/length.
         densest: f32,
+        /// Factor of the second order in what is scattered, over ϖ'.
+        second: f32,
+        /// The same of the third order.
+        third: f32,
     }
 }
 

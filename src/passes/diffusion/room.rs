@@ -1,5 +1,6 @@
 //! Room for what diffuses light.
 
+use super::bounces::N_HIGH;
 use crate::layout::diffusion::{LEVELS_ROOM, N_PATCHES};
 
 /// Room for the grids of the solver.
@@ -15,6 +16,8 @@ pub struct Room {
     pub n_solid_facets: u64,
     /// Edge of the cells that bounces lead between, in cells; 0 without bounces.
     pub bounce_cells: u32,
+    /// Bounces have the second and the third order of the phase function, too.
+    pub has_high: bool,
 }
 
 impl Room {
@@ -22,11 +25,11 @@ impl Room {
     pub fn new(
         n_cells: u64,
         n_sets: u32,
-        (has_slopes, bounce_cells): (bool, u32),
+        (has_slopes, bounce_cells, has_high): (bool, u32, bool),
         n_solid_facets: u64,
     ) -> Room {
         let n_cells = LEVELS_ROOM * n_cells;
-        Room { n_cells, n_sets, has_slopes, n_solid_facets, bounce_cells }
+        Room { n_cells, n_sets, has_slopes, n_solid_facets, bounce_cells, has_high }
     }
 
     /// Returns the most cells of the density grid.
@@ -38,6 +41,16 @@ impl Room {
     /// axis, of which merging leaves at most two thirds.
     pub(super) fn n_bounce_cells(&self) -> u64 {
         if self.bounce_cells > 1 { self.n_grid_cells() * 8 / 27 } else { self.n_grid_cells() }
+    }
+
+    /// Returns how many numbers a cell has of what suns and lamps make it send out.
+    pub(super) fn n_arrived(&self) -> u64 {
+        if self.has_high { (4 + N_HIGH) as u64 } else { 4 }
+    }
+
+    /// Returns the most cells that have high orders of what bounces bring.
+    pub(super) fn n_high_cells(&self) -> u64 {
+        if self.has_high { self.n_bounce_cells() } else { 0 }
     }
 
     /// Returns the number of patches through which light passes to and from surfaces and ground.

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::moments::flux_through_faces;
 use super::multigrid::Multigrid;
+use super::orders::{self, High, Sent, high_orders, of_order};
 use super::sources::{DiffusionMedium, Moments, Sources};
 use super::system::{AtFaces, System};
 use super::ways::Ways;
@@ -37,45 +38,63 @@ pub(super) struct Bounces<'a> {
 }
 
 impl Bounces<'_> {
-    /// Returns what suns and lamps make each cell send out, over s σ and times 4π: ϖ'U, and
-    /// 3ϖ'g'W along each axis.
-    pub fn arrived(&self, sources: &Sources) -> Vec<Moments> {
+    /// Returns what suns and lamps make each cell send out, over s σ and times 4π: ϖ'U, 3ϖ'g'W
+    /// along each axis, and the high orders.
+    pub fn arrived(&self, sources: &Sources) -> Vec<Sent> {
         let [even, forward] = self.of.mean.scattered();
-        let of = |[u, x, y, z]: &Moments| [even * *u, forward * *x, forward * *y, forward * *z];
-        sources.of_suns.iter().map(of).collect()
+        let of = |([u, x, y, z], high): (&Moments, &High)| Sent {
+            low: [even * *u, forward * *x, forward * *y, forward * *z],
+            high: self.scattered(high),
+        };
+        sources.of_suns.iter().zip(&sources.of_suns_high).map(of).collect()
     }
 
-    /// Returns the light after `n` bounces of `light`.
+    /// Returns what is scattered of light by high orders.
+    fn scattered(&self, high: &High) -> High {
+        let ([even, _], shares) = (self.of.mean.scattered(), self.of.mean.high_orders());
+        std::array::from_fn(|k| of_order(k, shares) * even * high[k])
+    }
+
+    /// Returns the light after `n` bounces of `light`, and what cells scatter of it by high orders.
     pub fn after(
         &self,
         n: u32,
         ways: &Ways<'_>,
-        arrived: &[Moments],
+        arrived: &[Sent],
         light: Vec<Moments>,
-    ) -> Vec<Moments> {
-        (0..n).fold(light, |light, _| self.next(ways, arrived, &light))
+    ) -> (Vec<Moments>, Vec<High>) {
+        let high = vec![High::default(); light.len()];
+        (0..n).fold((light, high), |(light, high), _| self.next(ways, arrived, (&light, &high)))
     }
 
-    /// Returns the light after one more bounce of `light`, and what diffusion makes of the change.
-    fn next(&self, ways: &Ways<'_>, arrived: &[Moments], light: &[Moments]) -> Vec<Moments> {
-        let MeanMedium { albedo, g, straight: f } = self.of.mean;
+    /// Returns the light after one more bounce of `light`, with what diffusion makes of the change.
+    fn next(
+        &self,
+        ways: &Ways<'_>,
+        arrived: &[Sent],
+        (light, high): (&[Moments], &[High]),
+    ) -> (Vec<Moments>, Vec<High>) {
+        let MeanMedium { albedo, g, straight: f, .. } = self.of.mean;
         let ([even, forward], weakened) = (self.of.mean.scattered(), self.of.mean.weakened());
         let sent = |c: usize, toward: DVec3| {
             let along = |m: &Moments| -(m[1] * toward.x + m[2] * toward.y + m[3] * toward.z);
             let (own, sun) = (&light[c], &arrived[c]);
-            even * own[0] + forward * along(own) + sun[0] + along(sun)
+            let of_high = orders::along(&high[c], -toward) + orders::along(&sun.high, -toward);
+            even * own[0] + forward * along(own) + sun.low[0] + along(&sun.low) + of_high
         };
         let all = directions();
-        let found: Vec<Moments> = parallel_map(light.len(), |c| {
-            let mut sum = [DVec3::ZERO; 4];
+        let found: Vec<(Moments, High)> = parallel_map(light.len(), |c| {
+            let (mut sum, mut high) = ([DVec3::ZERO; 4], High::default());
             for d in all {
                 let above = if d.y > 0.0 { 1.0 } else { 0.0 };
                 let l = ways.radiance(c, (d, above), |sky| sky, |k| sent(k, d)) / all.len() as f64;
                 let add = [l, -l * d.x, -l * d.y, -l * d.z];
                 sum.iter_mut().zip(add).for_each(|(sum, l)| *sum += l);
+                high.iter_mut().zip(high_orders(-d)).for_each(|(sum, y)| *sum += y * l);
             }
-            sum
+            (sum, self.scattered(&high))
         });
+        let (found, high): (Vec<Moments>, Vec<High>) = found.into_iter().unzip();
         let change = |c: usize, k: usize| found[c][k] - light[c][k];
         // Where cells are opaque, diffusion is right and the change is rounding.
         let edge = self.grid.edges().min_element();
@@ -94,15 +113,14 @@ impl Bounces<'_> {
                 .map(|c| albedo * (1.0 - f) * counts(c) * change(c, 0))
                 .collect(),
             carried: cells.map(of_axis).collect(),
-            of_suns: vec![],
-            direct: vec![],
+            ..Sources::default()
         };
         let series = AtFaces::InSeries;
         let system = System::new(self.of, self.grid, self.cells, &sources, &[], None, series);
         let phi = Multigrid::new(system, self.grid.edges()).solve(CYCLES_OF_CHANGE);
         let more = flux_through_faces(self.of, self.grid, self.cells, (&sources, series), &phi);
         let all = found.iter().zip(more);
-        all.map(|(a, b)| std::array::from_fn(|k| a[k] + b[k])).collect()
+        (all.map(|(a, b)| std::array::from_fn(|k| a[k] + b[k])).collect(), high)
     }
 }
 

@@ -12,6 +12,7 @@ use super::multigrid::Multigrid;
 use super::seen::SeenCells;
 use super::sources::{DiffusionMedium, Moments, Sources};
 use super::system::{AtFaces, System};
+use super::toward::Toward;
 use super::ways::Ways;
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
@@ -74,18 +75,23 @@ impl DiffuseLight {
         let depths = |cells: &[f64]| cells.iter().map(|sigma| weakened * *sigma).collect();
         let ways = Ways::new(grid, depths(cells), lights, of_solids);
         let bounces = Bounces { of, grid, cells };
-        let arrived = bounces.arrived(&sources);
+        let (arrived, mut bounce_grid) = (bounces.arrived(&sources), *grid);
+        let high;
         if edge == 1 {
-            light = bounces.after(n_bounces, &ways, &arrived, light);
+            (light, high) = bounces.after(n_bounces, &ways, &arrived, light);
         } else {
             let few = Merged::new(of, (grid, cells), &sources, &arrived, edge);
             let before = solved(&few.of, &few.grid, &few.cells, &few.sources);
             let ways = Ways::new(&few.grid, depths(&few.cells), lights, of_solids);
             let bounces = Bounces { of: &few.of, grid: &few.grid, cells: &few.cells };
-            let after = bounces.after(n_bounces, &ways, &few.arrived, before.clone());
+            let after;
+            (after, high) = bounces.after(n_bounces, &ways, &few.arrived, before.clone());
             few.spread(grid, &mut light, [&before, &after]);
+            bounce_grid = few.grid;
         }
-        let seen = SeenCells::new(of, (grid, cells), &light, (&arrived, &ways), eye);
+        let high = (&bounce_grid, &high[..]);
+        let toward = Toward::new(of, grid, (&light, &arrived), high, eye);
+        let seen = SeenCells::new(of, (grid, cells), &toward, &ways, eye);
         (DiffuseLight { spec: *grid, cells: light, direct }, Some(seen))
     }
 

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::moments::corners;
+use super::orders::Sent;
 use super::sources::{DiffusionMedium, Moments, Sources};
 use crate::model::grid::GridSpec;
 
@@ -15,7 +16,7 @@ struct Sums {
     /// q/D along each axis.
     momentum: [DVec3; 3],
     /// Extinction times what is sent out.
-    sent: Moments,
+    sent: Sent,
 }
 
 /// Returns the merged cell that cell `c` is in.
@@ -36,7 +37,7 @@ pub(super) struct Merged {
     /// Q0 and q.
     pub sources: Sources,
     /// Light that suns and lamps make each cell send out, over s σ and times 4π.
-    pub arrived: Vec<Moments>,
+    pub arrived: Vec<Sent>,
 }
 
 impl Merged {
@@ -45,7 +46,7 @@ impl Merged {
         of: &DiffusionMedium,
         (grid, cells): (&GridSpec, &[f64]),
         sources: &Sources,
-        arrived: &[Moments],
+        arrived: &[Sent],
         edge: u32,
     ) -> Merged {
         let few = grid.merged(edge);
@@ -59,15 +60,17 @@ impl Merged {
             for axis in 0..3 {
                 sum.momentum[axis] += share * sources.carried[c][axis] / of.reach(*sigma);
             }
-            for (sent, value) in sum.sent.iter_mut().zip(arrived[c]) {
-                *sent += share * *sigma * value;
-            }
+            sum.sent.add(share * *sigma, &arrived[c]);
         }
         let counted = |sum: &Sums| sum.extinction.min(of_few.densest);
         // A merged cell sends out all that its cells do, also where less extinction counts.
         let sent = |sum: &Sums| {
             let sigma = counted(sum);
-            sum.sent.map(|v| if sigma > 0.0 { v / sigma } else { DVec3::ZERO })
+            let mut sent = Sent::default();
+            if sigma > 0.0 {
+                sent.add(1.0 / sigma, &sum.sent);
+            }
+            sent
         };
         let carried = |sum: &Sums| sum.momentum.map(|q| of_few.reach(sum.extinction) * q);
         Merged {
@@ -77,8 +80,7 @@ impl Merged {
             sources: Sources {
                 scattered: sums.iter().map(|sum| sum.scattered).collect(),
                 carried: sums.iter().map(carried).collect(),
-                of_suns: vec![],
-                direct: vec![],
+                ..Sources::default()
             },
             arrived: sums.iter().map(sent).collect(),
         }

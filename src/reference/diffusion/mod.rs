@@ -24,11 +24,13 @@ mod field;
 mod merged;
 mod moments;
 mod multigrid;
+mod orders;
 mod seen;
 mod sources;
 mod system;
 #[cfg(test)]
 mod tests;
+mod toward;
 mod ways;
 
 pub use box_light::BoxLight;

@@ -5,13 +5,11 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::moments::corners;
-use super::sources::{DiffusionMedium, Moments};
+use super::sources::DiffusionMedium;
+use super::toward::{Toward, direction};
 use super::ways::Ways;
 use crate::model::grid::GridSpec;
-use crate::model::light::UP;
-use crate::model::medium::MeanMedium;
 use crate::model::parallel::parallel_map;
-use crate::model::phase::Phase;
 
 /// Places on a way to the eye on which a blob is seen, and their distance, σ.
 const N_PLACES: u32 = 4;
@@ -42,35 +40,22 @@ fn mean(v: DVec3) -> f64 {
 }
 
 impl SeenCells {
-    /// Returns the light of `cells`, whose extinction is `extinction`, toward `eye`.
+    /// Returns the light of cells toward `eye`, where they send out `toward`. Their extinction is
+    /// `extinction`.
     pub(super) fn new(
         of: &DiffusionMedium,
         (grid, extinction): (&GridSpec, &[f64]),
-        light: &[Moments],
-        (arrived, ways): (&[Moments], &Ways<'_>),
+        toward: &Toward,
+        ways: &Ways<'_>,
         eye: DVec3,
     ) -> SeenCells {
-        let MeanMedium { g, straight: f, .. } = of.mean;
-        let ([even, forward], weakened) = (of.mean.scattered(), of.mean.weakened());
-        let phase = Phase::HenyeyGreenstein { g };
-        let sent = |c: usize, w: DVec3| {
-            let along = |m: &Moments| m[1] * w.x + m[2] * w.y + m[3] * w.z;
-            let (own, suns) = (&light[c], &arrived[c]);
-            let diffuse = even * own[0] + forward * along(own);
-            let flux = DVec3::new(mean(suns[1]), mean(suns[2]), mean(suns[3]));
-            let fluence = mean(forward) * mean(suns[0]);
-            let of_flux = if fluence > 0.0 { flux.length() * mean(even) / fluence } else { 0.0 };
-            let directed = of_flux.min(1.0);
-            let cosine = flux.normalize_or_zero().dot(w);
-            let peak = 4.0 * PI * phase.at(cosine) / (1.0 - f).max(f64::MIN_POSITIVE);
-            diffuse.max(DVec3::ZERO) + suns[0] * (1.0 - directed + directed * peak)
-        };
+        let weakened = of.mean.weakened();
         let cells = parallel_map(extinction.len(), |c| {
-            let to_eye = eye - grid.center(c);
-            let w = to_eye.try_normalize().unwrap_or(UP);
-            let above = (0.5 - to_eye.y / grid.edges().y).clamp(0.0, 1.0);
-            let behind = ways.radiance(c, (-w, above), |sky| sky.max(DVec3::ZERO), |k| sent(k, w));
-            let all = weakened * sent(c, w) + (DVec3::ONE - weakened) * behind;
+            let (w, up) = (direction(grid, c, eye), (eye - grid.center(c)).y);
+            let above = (0.5 - up / grid.edges().y).clamp(0.0, 1.0);
+            let sky = |l: DVec3| l.max(DVec3::ZERO);
+            let behind = ways.radiance(c, (-w, above), sky, |k| toward.cells[k]);
+            let all = weakened * toward.cells[c] + (DVec3::ONE - weakened) * behind;
             (all / (4.0 * PI), extinction[c])
         });
         SeenCells { grid: *grid, cells }

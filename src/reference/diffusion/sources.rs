@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
+use super::orders::{High, high_orders};
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 use crate::model::medium::MeanMedium;
@@ -38,7 +39,7 @@ impl DiffusionMedium {
 }
 
 /// Light of suns and lamps in the cells.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Sources {
     /// Q0: light that is scattered, W m⁻³.
     pub scattered: Vec<DVec3>,
@@ -47,6 +48,8 @@ pub struct Sources {
     pub carried: Vec<[DVec3; 3]>,
     /// Fluence of suns and lamps, and their flux along each axis, means over the cell, W m⁻².
     pub of_suns: Vec<Moments>,
+    /// The same by high orders.
+    pub of_suns_high: Vec<High>,
     /// U: fluence of suns and lamps, mean over the channels, W m⁻².
     pub direct: Vec<f64>,
 }
@@ -59,7 +62,7 @@ impl Sources {
         lights: &[Light],
         has_sky_flux: bool,
     ) -> Sources {
-        let MeanMedium { albedo, g, straight: f } = of.mean;
+        let MeanMedium { albedo, g, straight: f, .. } = of.mean;
         let (depth, kept) = (DVec3::ONE - albedo * f, DVec3::ONE - albedo * g);
         let spec = obstacles.spec;
         let found = parallel_map(obstacles.cells.len(), |c| {
@@ -67,7 +70,7 @@ impl Sources {
             let extinction = whole.min(of.densest);
             let receiver = Receiver { position: p, i_region: u32::MAX };
             let (mut fluence, mut flux, mut fallen) = (DVec3::ZERO, DMat3::ZERO, [DVec3::ZERO; 3]);
-            let (mut direct, mut from_middle) = (0.0, DVec3::ZERO);
+            let (mut direct, mut from_middle, mut high) = (0.0, DVec3::ZERO, High::default());
             for light in lights.iter().filter(|light| has_sky_flux || !light.is_sky()) {
                 let way = light.arrival(p);
                 let tau = obstacles.depths(&[receiver], std::slice::from_ref(light))[0];
@@ -89,6 +92,7 @@ impl Sources {
                 let e = e * mean;
                 fluence += e;
                 from_middle += share * e;
+                high.iter_mut().zip(high_orders(-way.toward)).for_each(|(sum, y)| *sum += y * e);
                 // A column an axis.
                 for axis in 0..3 {
                     *flux.col_mut(axis) -= e * way.toward[axis];
@@ -99,12 +103,14 @@ impl Sources {
                 let of_suns = 3.0 * albedo * (g - f) * extinction * flux.col(axis);
                 of.reach(extinction) * (of_suns + of.inverse_chord * fallen[axis])
             });
-            (albedo * (1.0 - f) * extinction * from_middle, (carried, of_suns, direct))
+            (albedo * (1.0 - f) * extinction * from_middle, (carried, of_suns, high, direct))
         });
         let (scattered, rest): (Vec<DVec3>, Vec<_>) = found.into_iter().unzip();
         let direct = rest.iter().map(|(.., direct)| *direct).collect();
-        let (carried, of_suns) = rest.into_iter().map(|(carried, suns, _)| (carried, suns)).unzip();
-        Sources { scattered, carried, of_suns, direct }
+        let of_suns = rest.iter().map(|(_, suns, ..)| *suns).collect();
+        let of_suns_high = rest.iter().map(|(.., high, _)| *high).collect();
+        let carried = rest.into_iter().map(|(carried, ..)| carried).collect();
+        Sources { scattered, carried, of_suns, of_suns_high, direct }
     }
 }
 

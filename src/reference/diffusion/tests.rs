@@ -12,7 +12,7 @@ use crate::reference::grid::density;
 use crate::reference::transmit::Obstacles;
 
 const MEAN: MeanMedium =
-    MeanMedium { albedo: DVec3::new(1.0, 0.99, 0.6), g: 0.85, straight: 0.85 * 0.85 };
+    MeanMedium { albedo: DVec3::new(1.0, 0.99, 0.6), g: 0.85, straight: 0.85 * 0.85, order: 1 };
 
 fn spec(n: [u32; 3], aspect: f64) -> GridSpec {
     let half = DVec3::new(2.0, 1.5, 1.0);
@@ -103,8 +103,7 @@ fn fluence_rises_by_the_mean_of_q_over_d() {
             let sources = Sources {
                 scattered: zero,
                 carried: vec![[p, DVec3::ZERO, DVec3::ZERO], [q, DVec3::ZERO, DVec3::ZERO]],
-                of_suns: vec![],
-                direct: vec![],
+                ..Sources::default()
             };
             let series = AtFaces::InSeries;
             let system = System::new(&of, &grid, &cells, &sources, &[], None, series);
@@ -205,16 +204,15 @@ fn an_empty_box_lets_the_sky_through() {
 #[test]
 fn what_flows_through_faces_by_hand() {
     let grid = GridSpec { n_cells: UVec3::new(3, 1, 1), cell: 0.5, aspect: 1.0, low: DVec3::ZERO };
-    let mean = MeanMedium { albedo: DVec3::ZERO, g: 0.0, straight: 0.0 };
+    let mean = MeanMedium { albedo: DVec3::ZERO, g: 0.0, straight: 0.0, order: 1 };
     let of = DiffusionMedium { densest: f64::INFINITY, ..DiffusionMedium::new(mean, &grid) };
     let cells = [0.0, 7.0 / 9.0, 0.0];
     let phi = [1.0, 3.0, 4.0].map(DVec3::splat);
     let of_axis = |x: f64| [DVec3::splat(x), DVec3::Y, DVec3::Z];
     let sources = Sources {
-        of_suns: vec![],
         scattered: vec![DVec3::ZERO; 3],
         carried: [1.0, 4.0, -2.0].map(of_axis).into(),
-        direct: vec![],
+        ..Sources::default()
     };
     // D of a face is 2/(7/3 + 14/3) = 2/7, slopes are 4 and 2.
     for (at_faces, [first, second]) in [
@@ -241,10 +239,10 @@ fn a_flux_by_hand() {
     assert!((of.inverse_chord - 7.0 / 3.0).abs() < 1e-15);
     let phi = [1.0, 3.0, 5.0].map(DVec3::splat);
     let nothing = Sources {
-        of_suns: vec![],
         scattered: vec![DVec3::ZERO; 3],
         carried: vec![[DVec3::ZERO; 3]; 3],
         direct: vec![1.0, 2.0, 4.0],
+        ..Sources::default()
     };
     let light = DiffuseLight::of_fluence(&of, &grid, &[0.0; 3], &nothing, &phi);
     // All faces have the same flow.

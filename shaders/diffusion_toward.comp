@@ -1,0 +1,89 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+#include "records.glsl"
+#include "each.glsl"
+#include "diffusion.glsl"
+#include "field.glsl"
+#include "medium.glsl"
+#include "orders.glsl"
+
+// Sums what each cell scatters toward the eye of light that is not scattered straight on (model.md
+// §18, passes.md "scatter").
+// In: phi and F by cell, what suns and lamps make a cell send out, and by bounce cell what the high
+// orders add. Out: by cell 4 pi times the radiance over s sigma, and the extinction. Error: some
+// ulp.
+
+layout(push_constant) uniform Push {
+    Grid grid;
+    // albedo', and 3 albedo' g'
+    vec3 even;
+    float g;
+    vec3 forward;
+    float straight;
+    vec3 eye;
+    // Edge of a bounce cell, in cells.
+    uint edge;
+    // Cells by which the first bounce cell reaches beyond the grid.
+    uvec3 before;
+    uint unused;
+    uvec3 n_bounce_cells;
+} push;
+// Texels, which llvmpipe fetches for all invocations at once.
+TEXELS(0, field)
+TEXELS(1, arrived)
+WRITES(2, vec4, toward)
+#if HIGH
+TEXELS(3, high_seen)
+#endif
+
+#include "eye.glsl"
+
+vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
+vec4 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k)); }
+float mean_of(vec3 v) { return dot(v, vec3(1.0 / 3.0)); }
+
+#if HIGH
+// Returns what the high orders add, trilinear between the bounce cells' centres.
+vec3 high_at(ivec3 at) {
+    ivec3 n = ivec3(push.n_bounce_cells);
+    Weights of =
+        weights_among(n, (vec3(at + ivec3(push.before)) + 0.5) / float(push.edge) - 0.5);
+    vec3 sum = vec3(0.0);
+    for (int corner = 0; corner < 8; ++corner) {
+        Corner to = corner_of(n, of, corner);
+        sum += to.share * uintBitsToFloat(TEXEL(high_seen, to.i_cell).rgb);
+    }
+    return sum;
+}
+#endif
+
+void main() {
+    Level level = Level(push.grid.n_cells, 0u);
+    FOR_EACH(i, n_total(level)) {
+        int c = int(i);
+        ivec3 at = place_of(level, i);
+        vec3 w = toward_eye(push.grid, at, push.eye);
+        vec3 along =
+            w.x * field_at(4 * c + 1) + w.y * field_at(4 * c + 2) + w.z * field_at(4 * c + 3);
+        vec3 diffuse = push.even * field_at(4 * c) + push.forward * along;
+#if HIGH
+        diffuse += high_at(at);
+#endif
+        // Light of suns and lamps goes in the direction of its flux, and what is left of the
+        // fluence evenly in all.
+        vec4 even = arrived_at(N_ARRIVED * c);
+        vec3 of_suns = even.rgb;
+        vec3 flux = vec3(
+            mean_of(arrived_at(N_ARRIVED * c + 1).rgb), mean_of(arrived_at(N_ARRIVED * c + 2).rgb),
+            mean_of(arrived_at(N_ARRIVED * c + 3).rgb)
+        );
+        float fluence = mean_of(push.forward) * mean_of(of_suns), size = length(flux);
+        float directed = fluence > 0.0 ? min(size * mean_of(push.even) / fluence, 1.0) : 0.0;
+        vec3 bend = w - (size > 0.0 ? flux / size : vec3(0.0));
+        float away = 0.5 * dot(bend, bend);
+        float phase =
+            henyey_greenstein(push.g, away) / (INV_FOUR_PI * max(1.0 - push.straight, 1e-30));
+        toward[c] = vec4(max(diffuse, vec3(0.0)) + of_suns * mix(1.0, phase, directed), even.w);
+    }
+}

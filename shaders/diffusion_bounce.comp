@@ -71,8 +71,8 @@ void main() {
         ivec3 at = place_of(level, i);
         vec3 phi = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
 #if HIGH
-        vec3 sums[N_HIGH];
-        [[unroll]] for (int m = 0; m < N_HIGH; ++m) { sums[m] = vec3(0.0); }
+        vec3 sums[HIGH];
+        [[unroll]] for (int m = 0; m < HIGH; ++m) { sums[m] = vec3(0.0); }
 #endif
         for (uint k = 0; k < N_DIRECTIONS; ++k) {
             vec3 w = direction(k);
@@ -83,16 +83,16 @@ void main() {
             y += l * w.y;
             z += l * w.z;
 #if HIGH
-            float orders[N_HIGH];
+            float orders[HIGH];
             high_orders(w, orders);
-            [[unroll]] for (int m = 0; m < N_HIGH; ++m) { sums[m] += orders[m] * l; }
+            [[unroll]] for (int m = 0; m < HIGH; ++m) { sums[m] += orders[m] * l; }
 #endif
         }
 #if HIGH
         vec3 scale = push.even / max(push.weakened, vec3(1e-30)) / float(N_DIRECTIONS);
-        [[unroll]] for (int m = 0; m < N_HIGH; ++m) {
+        [[unroll]] for (int m = 0; m < HIGH; ++m) {
             float share = m < FIRST_THIRD ? push.second : push.third;
-            high[N_HIGH * c + m] = vec4(share * scale * sums[m], 0.0);
+            high[HIGH * c + m] = vec4(share * scale * sums[m], 0.0);
         }
 #endif
         vec3 new[4] = vec3[](phi, x, y, z);

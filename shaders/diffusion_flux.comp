@@ -115,11 +115,11 @@ void main() {
         }
 #if BOUNCES
 #if HIGH
-        vec3 more[N_HIGH];
-        [[unroll]] for (int m = 0; m < N_HIGH; ++m) {
+        vec3 more[HIGH];
+        [[unroll]] for (int m = 0; m < HIGH; ++m) {
             more[m] = arrived_at(N_ARRIVED * c + 4 + m);
 #if CHANGE
-            more[m] += uintBitsToFloat(TEXEL(high, N_HIGH * c + m).rgb);
+            more[m] += uintBitsToFloat(TEXEL(high, HIGH * c + m).rgb);
 #endif
         }
 #endif
@@ -127,9 +127,9 @@ void main() {
             vec3 w = direction(k);
             vec3 all = even + w.x * forward[0] + w.y * forward[1] + w.z * forward[2];
 #if HIGH
-            float orders[N_HIGH];
+            float orders[HIGH];
             high_orders(w, orders);
-            [[unroll]] for (int m = 0; m < N_HIGH; ++m) { all += orders[m] * more[m]; }
+            [[unroll]] for (int m = 0; m < HIGH; ++m) { all += orders[m] * more[m]; }
 #endif
             uvec4 words = floatBitsToUint(vec4(all, extinction_of(c)));
             STORE_TEXEL(sent, int(k * n_total(level) + i), words);

@@ -24,11 +24,11 @@ WRITES(1, vec4, high_seen)
 void main() {
     Level level = Level(push.grid.n_cells, 0u);
     FOR_EACH(c, n_total(level)) {
-        float y[N_HIGH];
+        float y[HIGH];
         high_orders(toward_eye(push.grid, place_of(level, c), push.eye), y);
         vec3 sum = vec3(0.0);
-        [[unroll]] for (int k = 0; k < N_HIGH; ++k) {
-            sum += y[k] * uintBitsToFloat(TEXEL(high, N_HIGH * int(c) + k).rgb);
+        [[unroll]] for (int k = 0; k < HIGH; ++k) {
+            sum += y[k] * uintBitsToFloat(TEXEL(high, HIGH * int(c) + k).rgb);
         }
         high_seen[c] = vec4(sum, 0.0);
     }

@@ -111,8 +111,8 @@ void main() {
         vec3 fallen[3] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0)), direct = vec3(0.0);
         vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
 #if HIGH
-        vec3 high[N_HIGH];
-        [[unroll]] for (int m = 0; m < N_HIGH; ++m) { high[m] = vec3(0.0); }
+        vec3 high[HIGH];
+        [[unroll]] for (int m = 0; m < HIGH; ++m) { high[m] = vec3(0.0); }
 #endif
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
@@ -140,9 +140,9 @@ void main() {
                     y -= e * a.toward.y;
                     z -= e * a.toward.z;
 #if HIGH
-                    float orders[N_HIGH];
+                    float orders[HIGH];
                     high_orders(-a.toward, orders);
-                    [[unroll]] for (int m = 0; m < N_HIGH; ++m) { high[m] += orders[m] * e; }
+                    [[unroll]] for (int m = 0; m < HIGH; ++m) { high[m] += orders[m] * e; }
 #endif
                 }
             }
@@ -166,7 +166,7 @@ void main() {
         arrived[first + 3] = vec4(along * z, 0.0);
 #if HIGH
         vec3 rest = (1.0 - push.straight) * share;
-        [[unroll]] for (int m = 0; m < N_HIGH; ++m) {
+        [[unroll]] for (int m = 0; m < HIGH; ++m) {
             float counts = m < FIRST_THIRD ? push.second : push.third;
             arrived[first + 4 + m] = vec4(counts * rest * high[m], 0.0);
         }

@@ -321,7 +321,6 @@ fn shared_constants_have_one_value() {
         ("include/sort.glsl", "NO_COUNT", f64::from(sort::NO_COUNT)),
         ("include/tiles.glsl", "BLOCK", f64::from(tiles::BLOCK)),
         ("include/tiles.glsl", "TILES_ACROSS", f64::from(tiles::TILES_ACROSS)),
-        ("include/orders.glsl", "N_HIGH", nimbus::passes::diffusion::N_HIGH as f64),
         ("include/directions.glsl", "N_DIRECTIONS", nimbus::passes::diffusion::N_DIRECTIONS as f64),
         ("tiles.comp", "RUN", f64::from(tiles::RUN)),
         ("include/lod.glsl", "RUN", f64::from(lod::RUN)),

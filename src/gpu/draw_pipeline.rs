@@ -7,8 +7,7 @@ use ash::vk;
 use super::call::Call;
 use super::device::Device;
 use super::image::{TargetFormat, depth_format};
-use super::interface::{Constants, Field, Interface, Pipeline, Stage};
-use super::kept_pipelines::MadePipeline;
+use super::interface::{Constants, Field, Interface, MadePipeline, Pipeline, Stage};
 use super::shader::Compiler;
 use crate::error::Result;
 

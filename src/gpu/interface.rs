@@ -6,7 +6,6 @@ use ash::vk;
 
 use super::call::Call;
 use super::device::{Device, Owned, SharedDevice};
-use super::kept_pipelines::MadePipeline;
 use super::limits::Limits;
 use super::rate::Rate;
 use super::reflect::{Binding, BindingKind, Reflection, reflect};
@@ -192,6 +191,15 @@ fn set_layout(
     let raw = unsafe { shared.raw.create_descriptor_set_layout(&info, None) }
         .of_call("vkCreateDescriptorSetLayout", name)?;
     Ok(shared.own(raw, name, ash::Device::destroy_descriptor_set_layout))
+}
+
+/// A pipeline and its layouts.
+// Fields drop in order: the pipeline before its layouts.
+pub(super) struct MadePipeline {
+    pub handle: Owned<vk::Pipeline>,
+    pub interface: Interface,
+    /// Invocations of a workgroup along x; 0 of a pipeline that draws.
+    pub local_size_x: u32,
 }
 
 /// A pipeline, as the recorder binds it.

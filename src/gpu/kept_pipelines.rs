@@ -3,28 +3,20 @@
 //! An edited scene, or one of many scenes, makes most of its kernels as the scene before did.
 //! Drivers take from a millisecond to a second for one.
 
+use std::any::Any;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use ash::vk;
 use sha2::{Digest, Sha256};
 
-use super::device::Owned;
-use super::interface::{Field, Interface};
 use crate::error::Result;
+
+/// A push constant: name, offset, bytes.
+type Field = (&'static str, usize, usize);
 
 /// Number of pipelines from which those are dropped that no kernel uses: shaders that are edited
 /// again and again make new ones.
 const MANY: usize = 1024;
-
-/// A pipeline and its layouts.
-// Fields drop in order: the pipeline before its layouts.
-pub(super) struct MadePipeline {
-    pub handle: Owned<vk::Pipeline>,
-    pub interface: Interface,
-    /// Invocations of a workgroup along x; 0 of a pipeline that draws.
-    pub local_size_x: u32,
-}
 
 /// What two kernels share if their pipelines are the same.
 #[derive(PartialEq, Eq, Hash)]
@@ -56,23 +48,24 @@ impl Key {
     }
 }
 
-/// The pipelines of a device.
+/// The pipelines of a device, of any type: theirs holds on to the device.
 #[derive(Default)]
-pub(super) struct KeptPipelines(Mutex<HashMap<Key, Arc<MadePipeline>>>);
+pub(super) struct KeptPipelines(Mutex<HashMap<Key, Arc<dyn Any + Send + Sync>>>);
 
 impl KeptPipelines {
     /// Returns the pipeline of `key`, which `make` makes if there is none yet.
     ///
     /// # Errors
     /// `make` fails.
-    pub fn get(
+    pub fn get<T: Any + Send + Sync>(
         &self,
         key: Key,
-        make: impl FnOnce() -> Result<MadePipeline>,
-    ) -> Result<Arc<MadePipeline>> {
+        make: impl FnOnce() -> Result<T>,
+    ) -> Result<Arc<T>> {
         let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(made) = lock().get(&key) {
-            return Ok(made.clone());
+        let kept = lock().get(&key).cloned();
+        if let Some(Ok(made)) = kept.map(Arc::downcast) {
+            return Ok(made);
         }
         let made = Arc::new(make()?);
         let mut all = lock();

@@ -4,8 +4,8 @@ use ash::vk;
 
 use super::call::Call;
 use super::device::Device;
-use super::interface::{Constants, Field, Interface, Pipeline, Stage};
-use super::kept_pipelines::{Key, MadePipeline};
+use super::interface::{Constants, Field, Interface, MadePipeline, Pipeline, Stage};
+use super::kept_pipelines::Key;
 use super::reflect::Reflection;
 use super::shader::Compiler;
 use crate::error::{Error, Result};

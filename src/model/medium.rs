@@ -127,7 +127,7 @@ pub fn without(phase: Phase, f: f64) -> Phase {
     if f == 0.0 {
         return phase;
     }
-    // f is g or g², so that f = 1 has g = 1.
+    // f is a power of g, so that f = 1 has g = 1.
     let g = if f < 1.0 { (phase.mean_cosine() - f) / (1.0 - f) } else { 0.0 };
     Phase::HenyeyGreenstein { g }
 }

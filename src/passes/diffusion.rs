@@ -19,7 +19,7 @@ use crate::layout::diffusion::{DiffusionParams, LevelStep, levels};
 use crate::layout::frame::GridRecord;
 
 use bounces::Bounces;
-pub use bounces::{BouncePush, HighPush, N_DIRECTIONS, N_HIGH, SeenPush, TowardPush};
+pub use bounces::{BouncePush, HighPush, N_DIRECTIONS, SeenPush, TowardPush};
 use cells::Cells;
 pub use merged::{MergePush, SpreadPush};
 pub use push::{CyclePush, FluxPush, PairPush, SourcesPush, SweepPush, SystemPush};
@@ -30,8 +30,8 @@ pub use solids::{FacesPush, PatchesPush, SolidsPush, SolidsWork};
 /// Sweeps of the coarsest grid.
 const COARSEST_SWEEPS: u32 = 16;
 
-/// Most cells of a level that one workgroup sweeps, which are four an invocation on a GPU. On 2
-/// cores of llvmpipe, limits of 300 and 20 000 take the same time within the noise (cubes-554).
+/// Most cells of a level that one workgroup sweeps: four an invocation on a GPU. On llvmpipe, 300
+/// and 20 000 take the same time within the noise (cubes-554).
 const SMALL_CELLS: u32 = 2048;
 
 bindings! {
@@ -123,31 +123,20 @@ impl Diffusion {
     /// # Errors
     /// Fails if a shader does not compile or the device cannot hold the buffers.
     pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Diffusion> {
-        let has_solids = room.n_solid_facets > 0;
+        let (has_solids, has_bounces) = (room.n_solid_facets > 0, room.bounce_cells > 0);
         let macros = [
             ("N_SETS", room.n_sets),
             ("SLOPES", u32::from(room.has_slopes)),
             ("SOLIDS", u32::from(has_solids)),
+            ("BOUNCES", u32::from(has_bounces)),
+            ("HIGH", room.n_high()),
         ];
         let kernel = |name: &str, fields: &_| {
             Kernel::with_macros(device, compiler, name, fields, &[], &macros)
         };
-        let has_bounces = room.bounce_cells > 0;
-        let with_bounces = [
-            &macros[..],
-            &[("BOUNCES", u32::from(has_bounces)), ("HIGH", u32::from(room.has_high))],
-        ]
-        .concat();
         Ok(Diffusion {
             solids: has_solids.then(|| Solids::new(device, compiler)).transpose()?,
-            sources: Kernel::with_macros(
-                device,
-                compiler,
-                "diffusion.sources",
-                SourcesPush::FIELDS,
-                &[],
-                &with_bounces,
-            )?,
+            sources: kernel("diffusion.sources", SourcesPush::FIELDS)?,
             system: kernel("diffusion.system", SystemPush::FIELDS)?,
             coarsen: kernel("diffusion.coarsen", PairPush::FIELDS)?,
             sweep: kernel("diffusion.sweep", SweepPush::FIELDS)?,

@@ -13,9 +13,6 @@ use crate::layout::record;
 /// Directions over which a bounce sums.
 pub const N_DIRECTIONS: usize = 24;
 
-/// Harmonics of the second and the third order.
-pub const N_HIGH: usize = 12;
-
 record! {
     /// Push constants of `diffusion_bounce.comp`.
     pub struct BouncePush {
@@ -94,11 +91,13 @@ buffers! {
     /// Scratch by cell that bounces lead between.
     struct Scratch(room: Room) {
         /// Light that cells send out, by direction and cell, beside the extinction.
-        sent: Buffer => [[f32; 4]; N_DIRECTIONS], room.n_bounce_cells(), "diffusion.sent", TexelStores;
+        sent: Buffer => [[f32; 4]; N_DIRECTIONS], room.n_bounce_cells(),
+            "diffusion.sent", TexelStores;
         /// Q0 and q of what a bounce has changed.
         change: Buffer => [[f32; 4]; 4], room.n_bounce_cells(), "diffusion.change", Texels;
         /// What they send out by the high orders of the phase function, by harmonic.
-        high: Buffer => [[f32; 4]; N_HIGH], room.n_high_cells(), "diffusion.high", Texels;
+        high: Buffer => [f32; 4], room.n_high_cells() * u64::from(room.n_high()),
+            "diffusion.high", Texels;
         /// The same toward the eye.
         high_seen: Buffer => [f32; 4], room.n_high_cells(), "diffusion.high_seen", Texels;
     }
@@ -109,7 +108,8 @@ buffers! {
     struct Arrived(room: Room) {
         /// Light that suns and lamps make it send out: evenly, beside the extinction, three times
         /// the flux along each axis, and by the high orders.
-        arrived: Buffer => [f32; 4], room.n_grid_cells() * room.n_arrived(), "diffusion.arrived", Texels;
+        arrived: Buffer => [f32; 4], room.n_grid_cells() * room.n_arrived(),
+            "diffusion.arrived", Texels;
         /// Q0 and q.
         carried: Buffer => [[f32; 4]; 4], room.n_grid_cells(), "diffusion.carried", Texels;
         /// Light that it sends out toward the eye, beside the extinction.
@@ -151,7 +151,7 @@ impl Bounces {
     pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Bounces> {
         let has_solids = room.n_solid_facets > 0;
         let solids = [("N_SETS", room.n_sets), ("SOLIDS", u32::from(has_solids))];
-        let high = ("HIGH", u32::from(room.has_high));
+        let high = ("HIGH", room.n_high());
         let bounce = [&solids[..], &[high]].concat();
         let kernel = |name: &str, fields: &_, macros: &[(&str, u32)]| {
             Kernel::with_macros(device, compiler, name, fields, &[], macros)
@@ -176,9 +176,8 @@ impl Bounces {
                 FluxPush::FIELDS,
                 &[("FACES", 1), ("CHANGE", 1)],
             )?,
-            high: room
-                .has_high
-                .then(|| kernel("diffusion.high", HighPush::FIELDS, &[]))
+            high: (room.n_high() > 0)
+                .then(|| kernel("diffusion.high", HighPush::FIELDS, &[high]))
                 .transpose()?,
             toward: kernel("diffusion.toward", TowardPush::FIELDS, &[high])?,
             seen: kernel("diffusion.seen", SeenPush::FIELDS, &solids)?,

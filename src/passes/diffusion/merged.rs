@@ -70,7 +70,7 @@ impl Merged {
     /// Creates the kernels, and room for the merged cells of a grid.
     pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Merged> {
         let most = room.n_bounce_cells();
-        let macros = [("HIGH", u32::from(room.has_high))];
+        let macros = [("HIGH", room.n_high())];
         Ok(Merged {
             merge: Kernel::with_macros(
                 device,

@@ -1,6 +1,5 @@
 //! Room for what diffuses light.
 
-use super::bounces::N_HIGH;
 use crate::layout::diffusion::{LEVELS_ROOM, N_PATCHES};
 
 /// Room for the grids of the solver.
@@ -16,8 +15,8 @@ pub struct Room {
     pub n_solid_facets: u64,
     /// Edge of the cells that bounces lead between, in cells; 0 without bounces.
     pub bounce_cells: u32,
-    /// Bounces have the second and the third order of the phase function, too.
-    pub has_high: bool,
+    /// Order up to which bounces have the phase function.
+    pub order: u32,
 }
 
 impl Room {
@@ -25,11 +24,11 @@ impl Room {
     pub fn new(
         n_cells: u64,
         n_sets: u32,
-        (has_slopes, bounce_cells, has_high): (bool, u32, bool),
+        (has_slopes, bounce_cells, order): (bool, u32, u32),
         n_solid_facets: u64,
     ) -> Room {
         let n_cells = LEVELS_ROOM * n_cells;
-        Room { n_cells, n_sets, has_slopes, n_solid_facets, bounce_cells, has_high }
+        Room { n_cells, n_sets, has_slopes, n_solid_facets, bounce_cells, order }
     }
 
     /// Returns the most cells of the density grid.
@@ -45,12 +44,21 @@ impl Room {
 
     /// Returns how many numbers a cell has of what suns and lamps make it send out.
     pub(super) fn n_arrived(&self) -> u64 {
-        if self.has_high { (4 + N_HIGH) as u64 } else { 4 }
+        4 + u64::from(self.n_high())
+    }
+
+    /// Returns the number of harmonics of the second and the third order that bounces have.
+    pub(super) fn n_high(&self) -> u32 {
+        match self.order {
+            0 | 1 => 0,
+            2 => 5,
+            _ => 12,
+        }
     }
 
     /// Returns the most cells that have high orders of what bounces bring.
     pub(super) fn n_high_cells(&self) -> u64 {
-        if self.has_high { self.n_bounce_cells() } else { 0 }
+        if self.n_high() > 0 { self.n_bounce_cells() } else { 0 }
     }
 
     /// Returns the number of patches through which light passes to and from surfaces and ground.

@@ -4,7 +4,6 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::sources::Moments;
 use crate::reference::harmonics::harmonics;
 
 /// Values by harmonic of the second order and of the third.
@@ -16,7 +15,7 @@ const N_SECOND: usize = 5;
 /// What cells send out times 4π: evenly, by a cosine along each axis, and by high orders.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sent {
-    pub low: Moments,
+    pub low: [DVec3; 4],
     pub high: High,
 }
 

@@ -18,7 +18,7 @@ type Field = (&'static str, usize, usize);
 /// again and again make new ones.
 const MANY: usize = 1024;
 
-/// What two kernels share if their pipelines are the same.
+/// Two kernels of the same key have the same pipeline.
 #[derive(PartialEq, Eq, Hash)]
 pub(super) struct Key {
     name: String,

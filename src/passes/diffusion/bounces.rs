@@ -95,7 +95,7 @@ buffers! {
             "diffusion.sent", TexelStores;
         /// Q0 and q of what a bounce has changed.
         change: Buffer => [[f32; 4]; 4], room.n_bounce_cells(), "diffusion.change", Texels;
-        /// What they send out by the high orders of the phase function, by harmonic.
+        /// High orders of the phase function in the light that cells send out, by harmonic.
         high: Buffer => [f32; 4], room.n_high_cells() * u64::from(room.n_high()),
             "diffusion.high", Texels;
         /// The same toward the eye.

@@ -12,7 +12,7 @@ pub type High = [DVec3; 12];
 /// Harmonics of the second order; those of the third follow.
 const N_SECOND: usize = 5;
 
-/// What cells send out times 4π: evenly, by a cosine along each axis, and by high orders.
+/// Light that cells send out, times 4π: evenly, by a cosine along each axis, and by high orders.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Sent {
     pub low: [DVec3; 4],

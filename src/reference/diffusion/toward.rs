@@ -12,7 +12,7 @@ use crate::model::light::UP;
 use crate::model::medium::MeanMedium;
 use crate::model::phase::Phase;
 
-/// What each cell of a grid sends out toward an eye, times 4π over s σ.
+/// Light that each cell of a grid sends out toward an eye, times 4π over s σ.
 pub(super) struct Toward {
     pub cells: Vec<DVec3>,
 }

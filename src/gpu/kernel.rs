@@ -46,11 +46,10 @@ impl Kernel {
         let is_one_subgroup = macros.contains(&("ONE_SUBGROUP", 1));
         let key = Key::new(name, &words, push, constants, is_one_subgroup);
         let shared = device.shared();
-        let made = shared.pipelines.get(key, || {
-            let made = make(device, (name, file, &words), push, constants, is_one_subgroup)?;
-            shared.report(made.handle.raw, name, macros)?;
-            Ok(made)
-        })?;
+        let made = shared
+            .pipelines
+            .get(key, || make(device, (name, file, &words), push, constants, is_one_subgroup))?;
+        shared.report(made.handle.raw, name, macros)?;
         let point = vk::PipelineBindPoint::COMPUTE;
         let (rate, indirect_rate) = Default::default();
         let pipeline = Pipeline { made, point, name: name.to_owned(), rate, indirect_rate };

@@ -7,14 +7,15 @@
 #include "diffusion.glsl"
 #include "medium.glsl"
 #include "patches.glsl"
-#include "orders.glsl"
+#include "second_order.glsl"
 
 // Gathers the light that arrives in each cell from all others (model.md §18, passes.md
 // "diffusion").
 // In: lights, by direction and cell what the cell sends out there, beside its extinction; with
 // SOLIDS the light of surfaces and ground on the box. In, out: phi and F by cell. Out: the sources
-// Q0 and q that their change is in diffusion. Law: phi and F are the means over 24 directions w of
-// 4 pi L and 4 pi L w, L being the radiance along w. Error: some ulp.
+// Q0 and q that their change is in diffusion; with SECOND the second order of what it scatters.
+// Law: phi and F are the means over 24 directions w of 4 pi L and 4 pi L w, L being the radiance
+// along w. Error: some ulp.
 
 // 1: the scene has surfaces or ground.
 #ifndef SOLIDS
@@ -30,11 +31,10 @@ layout(push_constant) uniform Push {
     vec3 even;
     float inverse_chord;
     vec3 forward;
-    // 5 (g^2-f)/(1-f), and 7 (g^3-f)/(1-f)
+    // 5 (g^2-f)/(1-f)
     float second;
     // 1 - albedo g
     vec3 kept;
-    float third;
 } push;
 READS(0, Light, lights)
 // Texels, which llvmpipe fetches for all invocations at once.
@@ -44,10 +44,10 @@ WRITES(3, vec4, change)
 #if SOLIDS
 READS(4, vec4, faces)
 #endif
-#if HIGH && SOLIDS
-WRITES(5, vec4, high)
-#elif HIGH
-WRITES(4, vec4, high)
+#if SECOND && SOLIDS
+WRITES(5, vec4, of_second)
+#elif SECOND
+WRITES(4, vec4, of_second)
 #endif
 
 #include "faces.glsl"
@@ -70,9 +70,9 @@ void main() {
         int c = int(i);
         ivec3 at = place_of(level, i);
         vec3 phi = vec3(0.0), x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
-#if HIGH
-        vec3 sums[HIGH];
-        [[unroll]] for (int m = 0; m < HIGH; ++m) { sums[m] = vec3(0.0); }
+#if SECOND
+        vec3 sums[N_SECOND];
+        [[unroll]] for (int m = 0; m < N_SECOND; ++m) { sums[m] = vec3(0.0); }
 #endif
         for (uint k = 0; k < N_DIRECTIONS; ++k) {
             vec3 w = direction(k);
@@ -82,17 +82,16 @@ void main() {
             x += l * w.x;
             y += l * w.y;
             z += l * w.z;
-#if HIGH
-            float orders[HIGH];
-            high_orders(w, orders);
-            [[unroll]] for (int m = 0; m < HIGH; ++m) { sums[m] += orders[m] * l; }
+#if SECOND
+            float at_w[N_SECOND] = second_order(w);
+            [[unroll]] for (int m = 0; m < N_SECOND; ++m) { sums[m] += at_w[m] * l; }
 #endif
         }
-#if HIGH
-        vec3 scale = push.even / max(push.weakened, vec3(1e-30)) / float(N_DIRECTIONS);
-        [[unroll]] for (int m = 0; m < HIGH; ++m) {
-            float share = m < FIRST_THIRD ? push.second : push.third;
-            high[HIGH * c + m] = vec4(share * scale * sums[m], 0.0);
+#if SECOND
+        vec3 scattered = push.second * push.even / max(push.weakened, vec3(1e-30));
+        [[unroll]] for (int m = 0; m < N_SECOND; ++m) {
+            vec3 mean = sums[m] / (SECOND_MEANS[m] * float(N_DIRECTIONS));
+            of_second[N_SECOND * c + m] = vec4(scattered * mean, 0.0);
         }
 #endif
         vec3 new[4] = vec3[](phi, x, y, z);

@@ -4,7 +4,7 @@
 #include "records.glsl"
 #include "each.glsl"
 #include "diffusion.glsl"
-#include "orders.glsl"
+#include "second_order.glsl"
 
 // Writes fluence and flux of the diffuse light (model.md §18, passes.md "diffusion").
 // In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi; what
@@ -46,8 +46,8 @@ TEXELS(3, carried)
 TEXELS(4, arrived)
 // [direction][cell]
 TEXEL_STORES(5, sent)
-#if CHANGE && HIGH
-TEXELS(6, high)
+#if CHANGE && SECOND
+TEXELS(6, of_second)
 #endif
 #endif
 
@@ -114,22 +114,21 @@ void main() {
 #endif
         }
 #if BOUNCES
-#if HIGH
-        vec3 more[HIGH];
-        [[unroll]] for (int m = 0; m < HIGH; ++m) {
-            more[m] = arrived_at(N_ARRIVED * c + 4 + m);
+#if SECOND
+        vec3 second[N_SECOND];
+        [[unroll]] for (int m = 0; m < N_SECOND; ++m) {
+            second[m] = arrived_at(N_ARRIVED * c + 4 + m);
 #if CHANGE
-            more[m] += uintBitsToFloat(TEXEL(high, HIGH * c + m).rgb);
+            second[m] += uintBitsToFloat(TEXEL(of_second, N_SECOND * c + m).rgb);
 #endif
         }
 #endif
         for (uint k = 0; k < N_DIRECTIONS; ++k) {
             vec3 w = direction(k);
             vec3 all = even + w.x * forward[0] + w.y * forward[1] + w.z * forward[2];
-#if HIGH
-            float orders[HIGH];
-            high_orders(w, orders);
-            [[unroll]] for (int m = 0; m < HIGH; ++m) { all += orders[m] * more[m]; }
+#if SECOND
+            float y[N_SECOND] = second_order(w);
+            [[unroll]] for (int m = 0; m < N_SECOND; ++m) { all += y[m] * second[m]; }
 #endif
             uvec4 words = floatBitsToUint(vec4(all, extinction_of(c)));
             STORE_TEXEL(sent, int(k * n_total(level) + i), words);

@@ -4,7 +4,7 @@
 #include "buffers.glsl"
 #include "each.glsl"
 #include "diffusion.glsl"
-#include "orders.glsl"
+#include "second_order.glsl"
 
 // Merges cells to those between which bounces lead (model.md §18, passes.md "diffusion").
 // In: by cell Q0 and q, and what suns and lamps make it send out, beside its extinction. Out: the

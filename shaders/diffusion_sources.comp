@@ -7,7 +7,7 @@
 #include "functions.glsl"
 #include "occlude.glsl"
 #include "diffusion.glsl"
-#include "orders.glsl"
+#include "second_order.glsl"
 
 // Computes the light of suns and lamps that is scattered for the first time in every cell
 // (model.md §18, passes.md "diffusion").
@@ -43,9 +43,8 @@ layout(push_constant) uniform Push {
     float step_length;
     uint max_steps;
     float densest;
-    // 5 (g^2-f)/(1-f), and 7 (g^3-f)/(1-f)
+    // 5 (g^2-f)/(1-f)
     float second;
-    float third;
 } push;
 READS(0, Light, lights)
 TEXELS(1, regions)
@@ -110,9 +109,9 @@ void main() {
         // Flux of the skies along x, y and z.
         vec3 fallen[3] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0)), direct = vec3(0.0);
         vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
-#if HIGH
-        vec3 high[HIGH];
-        [[unroll]] for (int m = 0; m < HIGH; ++m) { high[m] = vec3(0.0); }
+#if SECOND
+        vec3 second[N_SECOND];
+        [[unroll]] for (int m = 0; m < N_SECOND; ++m) { second[m] = vec3(0.0); }
 #endif
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
@@ -139,10 +138,9 @@ void main() {
                     x -= e * a.toward.x;
                     y -= e * a.toward.y;
                     z -= e * a.toward.z;
-#if HIGH
-                    float orders[HIGH];
-                    high_orders(-a.toward, orders);
-                    [[unroll]] for (int m = 0; m < HIGH; ++m) { high[m] += orders[m] * e; }
+#if SECOND
+                    float at_light[N_SECOND] = second_order(a.toward);
+                    [[unroll]] for (int m = 0; m < N_SECOND; ++m) { second[m] += at_light[m] * e; }
 #endif
                 }
             }
@@ -164,11 +162,10 @@ void main() {
         arrived[first + 1] = vec4(along * x, 0.0);
         arrived[first + 2] = vec4(along * y, 0.0);
         arrived[first + 3] = vec4(along * z, 0.0);
-#if HIGH
-        vec3 rest = (1.0 - push.straight) * share;
-        [[unroll]] for (int m = 0; m < HIGH; ++m) {
-            float counts = m < FIRST_THIRD ? push.second : push.third;
-            arrived[first + 4 + m] = vec4(counts * rest * high[m], 0.0);
+#if SECOND
+        [[unroll]] for (int m = 0; m < N_SECOND; ++m) {
+            vec3 scattered = push.second * (1.0 - push.straight) * share;
+            arrived[first + 4 + m] = vec4(scattered * second[m], 0.0);
         }
 #endif
 #endif

@@ -6,13 +6,12 @@
 #include "diffusion.glsl"
 #include "field.glsl"
 #include "medium.glsl"
-#include "orders.glsl"
+#include "second_order.glsl"
 
 // Sums what each cell scatters toward the eye of light that is not scattered straight on (model.md
 // §18, passes.md "scatter").
-// In: phi and F by cell, what suns and lamps make a cell send out, and by bounce cell what the high
-// orders add. Out: by cell 4 pi times the radiance over s sigma, and the extinction. Error: some
-// ulp.
+// In: phi and F by cell, what suns and lamps make a cell send out, and the second order by bounce
+// cell. Out: by cell what it sends out, times 4 pi, beside its extinction. Error: some ulp.
 
 layout(push_constant) uniform Push {
     Grid grid;
@@ -33,8 +32,8 @@ layout(push_constant) uniform Push {
 TEXELS(0, field)
 TEXELS(1, arrived)
 WRITES(2, vec4, toward)
-#if HIGH
-TEXELS(3, high_seen)
+#if SECOND
+TEXELS(3, of_second)
 #endif
 
 #include "eye.glsl"
@@ -43,16 +42,20 @@ vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
 vec4 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k)); }
 float mean_of(vec3 v) { return dot(v, vec3(1.0 / 3.0)); }
 
-#if HIGH
-// Returns what the high orders add, trilinear between the bounce cells' centres.
-vec3 high_at(ivec3 at) {
+#if SECOND
+// Returns the second order along w, trilinear between the bounce cells' centres.
+vec3 second_at(ivec3 at, vec3 w) {
     ivec3 n = ivec3(push.n_bounce_cells);
     Weights of =
         weights_among(n, (vec3(at + ivec3(push.before)) + 0.5) / float(push.edge) - 0.5);
+    float y[N_SECOND] = second_order(w);
     vec3 sum = vec3(0.0);
     for (int corner = 0; corner < 8; ++corner) {
         Corner to = corner_of(n, of, corner);
-        sum += to.share * uintBitsToFloat(TEXEL(high_seen, to.i_cell).rgb);
+        [[unroll]] for (int m = 0; m < N_SECOND; ++m) {
+            vec3 value = uintBitsToFloat(TEXEL(of_second, N_SECOND * to.i_cell + m).rgb);
+            sum += to.share * y[m] * value;
+        }
     }
     return sum;
 }
@@ -67,8 +70,8 @@ void main() {
         vec3 along =
             w.x * field_at(4 * c + 1) + w.y * field_at(4 * c + 2) + w.z * field_at(4 * c + 3);
         vec3 diffuse = push.even * field_at(4 * c) + push.forward * along;
-#if HIGH
-        diffuse += high_at(at);
+#if SECOND
+        diffuse += second_at(at, w);
 #endif
         // Light of suns and lamps goes in the direction of its flux, and what is left of the
         // fluence evenly in all.

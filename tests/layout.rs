@@ -321,6 +321,7 @@ fn shared_constants_have_one_value() {
         ("include/sort.glsl", "NO_COUNT", f64::from(sort::NO_COUNT)),
         ("include/tiles.glsl", "BLOCK", f64::from(tiles::BLOCK)),
         ("include/tiles.glsl", "TILES_ACROSS", f64::from(tiles::TILES_ACROSS)),
+        ("include/second_order.glsl", "N_SECOND", nimbus::passes::diffusion::N_SECOND as f64),
         ("include/directions.glsl", "N_DIRECTIONS", nimbus::passes::diffusion::N_DIRECTIONS as f64),
         ("tiles.comp", "RUN", f64::from(tiles::RUN)),
         ("include/lod.glsl", "RUN", f64::from(lod::RUN)),

@@ -4,6 +4,11 @@
 // and of its square over these directions are those over the sphere.
 const float LONG_PART = 0.908248290463863, SHORT_PART = 0.295875854768068;
 const uint N_DIRECTIONS = 24;
+// Five times the means of the squares of the harmonics of the second order (second_order.glsl),
+// which are 1 over the sphere.
+const float SECOND_MEANS[5] = float[](
+    0.760469818460, 0.760469818460, 0.760469818460, 1.359295272310, 1.359295272310
+);
 
 vec3 direction(uint i) {
     vec3 d = vec3(SHORT_PART);

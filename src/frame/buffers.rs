@@ -233,7 +233,7 @@ pub(super) fn diffusion_room(scene: &Scene) -> Option<Room> {
     let n_sets = if scene.clouds.iter().all(plain) { 1 } else { 3 };
     let n_solid_facets = scene.n_solid_facets();
     let bounce_cells = if has_bounces(scene) { scene.lighting.diffusion.bounce_cells } else { 0 };
-    let more = (has_slopes(scene), bounce_cells, scene.lighting.order() as u32);
+    let more = (has_slopes(scene), bounce_cells, scene.lighting.order() > 1);
     has_diffusion(scene).then(|| Room::new(n_cells(scene), n_sets, more, n_solid_facets))
 }
 

@@ -78,8 +78,8 @@ pub struct DiffusionParams {
     pub even: [f32; 3],
     /// 3ϖ'g' = 3ϖ(g − f)/s.
     pub forward: [f32; 3],
-    /// Factors of the second and the third order in what is scattered, over ϖ'.
-    pub high_orders: [f32; 2],
+    /// Factor of the second order in what is scattered, over ϖ'.
+    pub second: f32,
     /// Extinction beyond which a cell counts as no denser, 1/length.
     pub densest: f32,
 }
@@ -99,7 +99,7 @@ impl DiffusionParams {
             weakened: f32s(mean.weakened()),
             even: f32s(even),
             forward: f32s(forward),
-            high_orders: mean.high_orders().map(|v| v as f32),
+            second: mean.second as f32,
             densest: mean.densest(grid) as f32,
         }
     }

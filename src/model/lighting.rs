@@ -238,7 +238,7 @@ pub const MAX_CYCLES: u32 = 32;
 pub const MAX_BOUNCES: u32 = 64;
 
 /// Greatest order up to which bounces have the phase function.
-pub const MAX_BOUNCE_ORDER: u32 = 3;
+pub const MAX_BOUNCE_ORDER: u32 = 2;
 
 /// Greatest edge of the cells that bounces lead between, in cells of the grid.
 pub const MAX_BOUNCE_CELLS: u32 = 8;

@@ -50,9 +50,9 @@ impl Medium {
 }
 
 /// Returns g^(n+1), the share that goes straight on where the phase function counts up to order n.
-/// It is none where that is negative.
+/// It is none where most light goes back.
 fn straight_of(g: f64, order: i32) -> f64 {
-    g.powi(order + 1).max(0.0)
+    g.max(0.0).powi(order + 1)
 }
 
 /// The light that a blob scatters toward the eye once, in a mode of lighting.
@@ -150,8 +150,9 @@ pub struct MeanMedium {
     /// f = g^(n+1), n being the order of the phase function that counts: share that counts as not
     /// scattered.
     pub straight: f64,
-    /// n.
-    pub order: i32,
+    /// 5(g² − f)/(1 − f), the factor of the second order in what is scattered, over ϖ'; 0 where
+    /// n is 1.
+    pub second: f64,
 }
 
 /// Transport mean free paths across a cell beyond which it counts as no denser. With 4, light grows
@@ -174,15 +175,6 @@ impl MeanMedium {
         [1.0 - straight, 3.0 * (g - straight)].map(|share| share * all)
     }
 
-    /// Returns (2l + 1)(g^l − f)/(1 − f) of the second and the third order l, up to n: factors of
-    /// their share in what is scattered, over ϖ'.
-    pub fn high_orders(&self) -> [f64; 2] {
-        let MeanMedium { g, straight: f, order, .. } = *self;
-        let rest = (1.0 - f).max(f64::MIN_POSITIVE);
-        let of = |l: i32| f64::from(2 * l + 1) * (g.powi(l) - f) / rest;
-        [2, 3].map(|l| if l <= order { of(l) } else { 0.0 })
-    }
-
     /// Returns the extinction beyond which a cell of `grid` counts as no denser, 1/length: two
     /// transport mean free paths across its shortest edge, of the channel that scatters most.
     ///
@@ -199,7 +191,7 @@ impl MeanMedium {
     pub fn new(scene: &Scene, groups: &[Group], time_s: f64) -> MeanMedium {
         MeanMedium::weighted(scene, groups, time_s, true)
             .or_else(|| MeanMedium::weighted(scene, groups, time_s, false))
-            .unwrap_or(MeanMedium { albedo: DVec3::ZERO, g: 0.0, straight: 0.0, order: 1 })
+            .unwrap_or(MeanMedium { albedo: DVec3::ZERO, g: 0.0, straight: 0.0, second: 0.0 })
     }
 
     /// Returns the mean by mass or by number; `None` if that is 0.
@@ -229,12 +221,12 @@ impl MeanMedium {
             }
         }
         let (g, order) = (g / total, scene.lighting.order());
-        (total > 0.0).then(|| MeanMedium {
-            albedo: albedo / total,
-            g,
-            straight: straight_of(g, order),
-            order,
-        })
+        let straight = straight_of(g, order);
+        let second = match order {
+            1 => 0.0,
+            _ => 5.0 * (g * g - straight) / (1.0 - straight).max(f64::MIN_POSITIVE),
+        };
+        (total > 0.0).then(|| MeanMedium { albedo: albedo / total, g, straight, second })
     }
 }
 

@@ -19,11 +19,11 @@ use crate::layout::diffusion::{DiffusionParams, LevelStep, levels};
 use crate::layout::frame::GridRecord;
 
 use bounces::Bounces;
-pub use bounces::{BouncePush, HighPush, N_DIRECTIONS, SeenPush, TowardPush};
+pub use bounces::{BouncePush, N_DIRECTIONS, SeenPush, TowardPush};
 use cells::Cells;
 pub use merged::{MergePush, SpreadPush};
 pub use push::{CyclePush, FluxPush, PairPush, SourcesPush, SweepPush, SystemPush};
-pub use room::Room;
+pub use room::{N_SECOND, Room};
 use solids::Solids;
 pub use solids::{FacesPush, PatchesPush, SolidsPush, SolidsWork};
 
@@ -129,7 +129,7 @@ impl Diffusion {
             ("SLOPES", u32::from(room.has_slopes)),
             ("SOLIDS", u32::from(has_solids)),
             ("BOUNCES", u32::from(has_bounces)),
-            ("HIGH", room.n_high()),
+            ("SECOND", u32::from(room.has_second)),
         ];
         let kernel = |name: &str, fields: &_| {
             Kernel::with_macros(device, compiler, name, fields, &[], &macros)
@@ -210,8 +210,7 @@ impl Diffusion {
             step_length: (work.step_cells * f64::from(grid.cell)) as f32,
             max_steps: work.max_steps,
             densest: of.densest,
-            second: of.high_orders[0],
-            third: of.high_orders[1],
+            second: of.second,
         };
         let cells = Cells { grid: *grid, density, field, of: *of };
         let arrived = self.bounces.as_ref().map(Bounces::arrived);

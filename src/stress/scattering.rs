@@ -109,7 +109,7 @@ fn furnace(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     {
         let mut scene = scene(LightingMode::Diffusion, EVEN, WHITE, cluster(tau))?;
         scene.surfaces = surfaces;
-        for (bounces, cells, order) in [(0, 1, 1), (2, 1, 3), (2, 2, 1), (2, 2, 2)] {
+        for (bounces, cells, order) in [(0, 1, 1), (2, 1, 2), (2, 2, 1), (2, 2, 2)] {
             let of = &mut scene.lighting.diffusion;
             (of.bounces, of.bounce_cells, of.bounce_order) = (bounces, cells, order);
             let frame = ctx.render(&scene, 0)?;
@@ -144,13 +144,18 @@ fn all_modes(
 ) -> Result<f64> {
     let lights = [EVEN, SUN].concat();
     let mut most = 0.0f64;
-    let all = MEDIA.map(|mode| (mode, 0)).into_iter().chain([(LightingMode::Diffusion, 2)]);
-    for (mode, bounces) in all {
+    let bounces = [1, 2].map(|order| (LightingMode::Diffusion, 2, order));
+    let all = MEDIA.map(|mode| (mode, 0, 1)).into_iter().chain(bounces);
+    for (mode, bounces, order) in all {
         let mut scene = scene(mode, &lights, material, particles.to_vec())?;
-        (scene.lighting.forward, scene.lighting.diffusion.bounces) = (forward, bounces);
+        scene.lighting.forward = forward;
+        let of = &mut scene.lighting.diffusion;
+        (of.bounces, of.bounce_order) = (bounces, order);
         let frame = ctx.render(&scene, 0)?;
         let mut light = frame.lit.iter().flat_map(|l| l.direct.into_iter().chain(l.first));
-        let what = format!("finite light, not negative, {}, {bounces} bounces", mode.name());
+        let mode = mode.name();
+        let what =
+            format!("finite light, not negative, {mode}, {bounces} bounces of order {order}");
         c.holds(light.all(|v| v.is_finite() && v >= 0.0), what);
         c.finite(&frame.rgba, "picture");
         let radiance = frame.lit.iter().flat_map(|l| l.first).map(f64::from);
@@ -160,11 +165,15 @@ fn all_modes(
 }
 
 fn thick(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
-    let most = all_modes(ctx, c, ("albedo = [1, 1, 1]\n", G), &cluster(1e5))?;
-    // The sun's light at the phase function's peak, and the even light in eight octaves.
-    let peak = (1.0 + G) / (4.0 * std::f64::consts::PI * (1.0 - G).powi(2));
-    c.holds(most > 0.0, "light");
-    c.add(most, 0.0, 2.0 * (peak + FRAC_1_PI), "the greatest radiance");
+    // Forward, and back.
+    for (material, g) in [("albedo = [1, 1, 1]\n", G), ("albedo = [1, 1, 1]\nphase = -0.9\n", 0.9)]
+    {
+        let most = all_modes(ctx, c, (material, G), &cluster(1e5))?;
+        // The sun's light at the phase function's peak, and the even light in eight octaves.
+        let peak = (1.0 + g) / (4.0 * std::f64::consts::PI * (1.0 - g).powi(2));
+        c.holds(most > 0.0, "light");
+        c.add(most, 0.0, 2.0 * (peak + FRAC_1_PI), "the greatest radiance");
+    }
     Ok(())
 }
 

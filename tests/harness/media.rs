@@ -85,11 +85,10 @@ pub fn scene(name: &str, mode: &str, more: &[&str]) -> Scene {
     let grouped = if name == "droplets" { "facets_per_cloud = 30\n" } else { "" };
     // Not a mode, but diffusion with more.
     let (mode, bounces) = match mode {
-        "bounces" => ("diffusion", "bounces = 2\nbounce_cells = 1\nbounce_order = 3\n"),
-        "merged" => ("diffusion", "bounces = 2\nbounce_cells = 3\nbounce_order = 3\n"),
-        // Lower orders of the phase function.
+        "bounces" => ("diffusion", "bounces = 2\nbounce_cells = 1\n"),
+        "merged" => ("diffusion", "bounces = 2\nbounce_cells = 3\n"),
+        // The first order of the phase function alone.
         "cosine" => ("diffusion", "bounces = 2\nbounce_cells = 2\nbounce_order = 1\n"),
-        "second" => ("diffusion", "bounces = 2\nbounce_cells = 2\n"),
         // Merged cells that no coarser grid has.
         "few" => ("diffusion", "bounces = 2\nbounce_cells = 8\n"),
         _ => (mode, ""),

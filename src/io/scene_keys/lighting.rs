@@ -95,9 +95,8 @@ keys! { DIFFUSION: fn diffusion(s) -> DiffusionSettings { DiffusionSettings;
     /// Edge of the cells that bounces lead between, in cells of the grid. With twice the edge,
     /// light takes a sixteenth of the steps from cell to cell.
     bounce_cells: integer(2, 1, MAX_BOUNCE_CELLS);
-    /// Order up to which bounces have the phase function. With 1, light is scattered by a cosine,
-    /// which is nearest to transport where cells are deep. The thinner they are, the more orders
-    /// are worth their time.
+    /// Order up to which bounces have the phase function. 2 is nearer to transport where cells are
+    /// thin, and 1 where they are deep.
     bounce_order: integer(2, 1, MAX_BOUNCE_ORDER);
     /// Whether the light of mode "diffusion" changes inside of each blob, as it does in the clouds
     /// around it.

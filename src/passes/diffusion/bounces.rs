@@ -32,18 +32,6 @@ record! {
         second: f32,
         /// 1 − ϖg.
         kept: [f32; 3],
-        /// The same of the third order.
-        third: f32,
-    }
-}
-
-record! {
-    /// Push constants of `diffusion_high.comp`.
-    pub struct HighPush {
-        /// The cells that bounces lead between.
-        grid: GridRecord,
-        /// Eye, relative to the lighting origin.
-        eye: [f32; 3],
     }
 }
 
@@ -95,11 +83,8 @@ buffers! {
             "diffusion.sent", TexelStores;
         /// Q0 and q of what a bounce has changed.
         change: Buffer => [[f32; 4]; 4], room.n_bounce_cells(), "diffusion.change", Texels;
-        /// High orders of the phase function in the light that cells send out, by harmonic.
-        high: Buffer => [f32; 4], room.n_high_cells() * u64::from(room.n_high()),
-            "diffusion.high", Texels;
-        /// The same toward the eye.
-        high_seen: Buffer => [f32; 4], room.n_high_cells(), "diffusion.high_seen", Texels;
+        /// The second order of what they scatter, by harmonic.
+        of_second: Buffer => [f32; 4], room.n_of_second(), "diffusion.of_second", Texels;
     }
 }
 
@@ -107,8 +92,8 @@ buffers! {
     /// Scratch by cell of the grid.
     struct Arrived(room: Room) {
         /// Light that suns and lamps make it send out: evenly, beside the extinction, three times
-        /// the flux along each axis, and by the high orders.
-        arrived: Buffer => [f32; 4], room.n_grid_cells() * room.n_arrived(),
+        /// the flux along each axis, and the second order.
+        arrived: Buffer => [f32; 4], room.n_arrived(room.n_grid_cells()),
             "diffusion.arrived", Texels;
         /// Q0 and q.
         carried: Buffer => [[f32; 4]; 4], room.n_grid_cells(), "diffusion.carried", Texels;
@@ -126,8 +111,6 @@ pub(super) struct Bounces {
     correct: Kernel,
     /// Corrects after the last bounce, when no cell sends light to another any more.
     correct_last: Kernel,
-    /// Sums high orders toward the eye, where bounces have them.
-    high: Option<Kernel>,
     toward: Kernel,
     seen: Kernel,
     arrived: Arrived,
@@ -135,15 +118,18 @@ pub(super) struct Bounces {
     /// The cells that bounces lead between, where they are not those of the grid.
     pub merged: Option<Merged>,
     has_solids: bool,
+    has_second: bool,
 }
 
 impl Bounces {
     /// Lists the sizes of all scratch buffers; none without bounces.
     pub fn specs(room: Room) -> Vec<BufferSpec> {
-        let of_merged = if room.bounce_cells > 1 { merged::Scratch::specs(room) } else { vec![] };
         match room.bounce_cells {
             0 => vec![],
-            _ => [Arrived::specs(room), Scratch::specs(room), of_merged].concat(),
+            1 => [Arrived::specs(room), Scratch::specs(room)].concat(),
+            _ => {
+                [Arrived::specs(room), Scratch::specs(room), merged::Scratch::specs(room)].concat()
+            }
         }
     }
 
@@ -151,8 +137,8 @@ impl Bounces {
     pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Bounces> {
         let has_solids = room.n_solid_facets > 0;
         let solids = [("N_SETS", room.n_sets), ("SOLIDS", u32::from(has_solids))];
-        let high = ("HIGH", room.n_high());
-        let bounce = [&solids[..], &[high]].concat();
+        let second = ("SECOND", u32::from(room.has_second));
+        let bounce = [&solids[..], &[second]].concat();
         let kernel = |name: &str, fields: &_, macros: &[(&str, u32)]| {
             Kernel::with_macros(device, compiler, name, fields, &[], macros)
         };
@@ -162,29 +148,27 @@ impl Bounces {
             flux: kernel(
                 "diffusion.flux",
                 FluxPush::FIELDS,
-                &[("FACES", 1), ("BOUNCES", 1), high],
+                &[("FACES", 1), ("BOUNCES", 1), second],
             )?,
             bounce: kernel("diffusion.bounce", BouncePush::FIELDS, &bounce)?,
             system: kernel("diffusion.system", SystemPush::FIELDS, &of_change)?,
             correct: kernel(
                 "diffusion.flux",
                 FluxPush::FIELDS,
-                &[("FACES", 1), ("BOUNCES", 1), ("CHANGE", 1), high],
+                &[("FACES", 1), ("BOUNCES", 1), ("CHANGE", 1), second],
             )?,
             correct_last: kernel(
                 "diffusion.flux",
                 FluxPush::FIELDS,
                 &[("FACES", 1), ("CHANGE", 1)],
             )?,
-            high: (room.n_high() > 0)
-                .then(|| kernel("diffusion.high", HighPush::FIELDS, &[high]))
-                .transpose()?,
-            toward: kernel("diffusion.toward", TowardPush::FIELDS, &[high])?,
+            toward: kernel("diffusion.toward", TowardPush::FIELDS, &[second])?,
             seen: kernel("diffusion.seen", SeenPush::FIELDS, &solids)?,
             arrived: Arrived::new(device, room)?,
             scratch: Scratch::new(device, room)?,
             merged: is_merged.then(|| Merged::new(device, compiler, room)).transpose()?,
             has_solids,
+            has_second: room.has_second,
         })
     }
 
@@ -225,7 +209,7 @@ impl Bounces {
         [lights, faces]: [&Buffer; 2],
         n_lights: u32,
     ) -> Result<()> {
-        let Scratch { sent, change, high, .. } = &self.scratch;
+        let Scratch { sent, change, of_second } = &self.scratch;
         let (of, times) = (&cells.of, |a: [f32; 3], b: f32| a.map(|a| a * b));
         let push = BouncePush {
             grid: cells.grid,
@@ -234,14 +218,13 @@ impl Bounces {
             even: of.scattered(),
             inverse_chord: of.inverse_chord,
             forward: times(of.albedo, 3.0 * (of.g - of.straight)),
-            second: of.high_orders[0],
+            second: of.second,
             kept: of.kept,
-            third: of.high_orders[1],
         };
         let of_solids = self.has_solids.then_some(faces);
-        let of_high = self.high.is_some().then_some(high);
+        let of_second = self.has_second.then_some(of_second);
         let all = [lights, sent, cells.field, change].into_iter();
-        let all: Vec<&Buffer> = all.chain(of_solids).chain(of_high).collect();
+        let all: Vec<&Buffer> = all.chain(of_solids).chain(of_second).collect();
         rec.dispatch(&self.bounce, &all, &push, cells.n_total())
     }
 
@@ -253,12 +236,11 @@ impl Bounces {
         [phi, arrived]: [&Buffer; 2],
         is_last: bool,
     ) -> Result<()> {
-        let Scratch { sent, change, high, .. } = &self.scratch;
-        let all = [cells.density, phi, cells.field, change, arrived, sent, high];
-        let (kernel, n_buffers) = match (is_last, &self.high) {
-            (true, _) => (&self.correct_last, 4),
-            (false, None) => (&self.correct, 6),
-            (false, Some(_)) => (&self.correct, 7),
+        let Scratch { sent, change, of_second } = &self.scratch;
+        let all = [cells.density, phi, cells.field, change, arrived, sent, of_second];
+        let (kernel, n_buffers) = match is_last {
+            true => (&self.correct_last, 4),
+            false => (&self.correct, 6 + usize::from(self.has_second)),
         };
         rec.dispatch(kernel, &all[..n_buffers], &cells.flux_push(), cells.n_total())
     }
@@ -272,14 +254,7 @@ impl Bounces {
         (of, n_lights, eye): (&DiffusionParams, u32, [f32; 3]),
     ) -> Result<()> {
         let edge = self.merged.as_ref().map_or(1, |merged| merged.edge);
-        let bounce_cells = grid.merged(edge);
-        let n_bounce_cells = bounce_cells.n_cells;
-        let Scratch { high, high_seen, .. } = &self.scratch;
         let Arrived { arrived, toward, .. } = &self.arrived;
-        if let Some(kernel) = &self.high {
-            let push = HighPush { grid: bounce_cells, eye };
-            rec.dispatch(kernel, &[high, high_seen], &push, n_bounce_cells.iter().product())?;
-        }
         let push = TowardPush {
             grid: *grid,
             even: of.even,
@@ -290,10 +265,10 @@ impl Bounces {
             edge,
             before: grid.cells_before(edge),
             unused: 0,
-            n_bounce_cells,
+            n_bounce_cells: grid.merged(edge).n_cells,
         };
-        let all = [field, arrived, toward, high_seen];
-        let n_buffers = 3 + usize::from(self.high.is_some());
+        let all = [field, arrived, toward, &self.scratch.of_second];
+        let n_buffers = 3 + usize::from(self.has_second);
         rec.dispatch(&self.toward, &all[..n_buffers], &push, grid.n_cells.iter().product())?;
         let push = SeenPush { grid: *grid, weakened: of.weakened, n_lights, eye };
         let all = [lights, toward, seen, faces];

@@ -52,7 +52,7 @@ buffers! {
         /// φ and F before the bounces.
         before: Buffer => [[f32; 4]; 4], room.n_bounce_cells(), "diffusion.merged_before", Texels;
         /// Light that suns and lamps make each cell send out, beside its extinction.
-        arrived: Buffer => [f32; 4], room.n_bounce_cells() * room.n_arrived(),
+        arrived: Buffer => [f32; 4], room.n_arrived(room.n_bounce_cells()),
             "diffusion.merged_arrived", Texels;
     }
 }
@@ -70,7 +70,7 @@ impl Merged {
     /// Creates the kernels, and room for the merged cells of a grid.
     pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Merged> {
         let most = room.n_bounce_cells();
-        let macros = [("HIGH", room.n_high())];
+        let macros = [("SECOND", u32::from(room.has_second))];
         Ok(Merged {
             merge: Kernel::with_macros(
                 device,

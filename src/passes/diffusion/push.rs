@@ -29,8 +29,6 @@ record! {
         densest: f32,
         /// Factor of the second order in what is scattered, over ϖ'.
         second: f32,
-        /// The same of the third order.
-        third: f32,
     }
 }
 

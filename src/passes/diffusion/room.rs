@@ -2,6 +2,9 @@
 
 use crate::layout::diffusion::{LEVELS_ROOM, N_PATCHES};
 
+/// Harmonics of the second order.
+pub const N_SECOND: u64 = 5;
+
 /// Room for the grids of the solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Room {
@@ -15,8 +18,8 @@ pub struct Room {
     pub n_solid_facets: u64,
     /// Edge of the cells that bounces lead between, in cells; 0 without bounces.
     pub bounce_cells: u32,
-    /// Order up to which bounces have the phase function.
-    pub order: u32,
+    /// Bounces have the second order of the phase function.
+    pub has_second: bool,
 }
 
 impl Room {
@@ -24,11 +27,11 @@ impl Room {
     pub fn new(
         n_cells: u64,
         n_sets: u32,
-        (has_slopes, bounce_cells, order): (bool, u32, u32),
+        (has_slopes, bounce_cells, has_second): (bool, u32, bool),
         n_solid_facets: u64,
     ) -> Room {
         let n_cells = LEVELS_ROOM * n_cells;
-        Room { n_cells, n_sets, has_slopes, n_solid_facets, bounce_cells, order }
+        Room { n_cells, n_sets, has_slopes, n_solid_facets, bounce_cells, has_second }
     }
 
     /// Returns the most cells of the density grid.
@@ -42,23 +45,14 @@ impl Room {
         if self.bounce_cells > 1 { self.n_grid_cells() * 8 / 27 } else { self.n_grid_cells() }
     }
 
-    /// Returns how many numbers a cell has of what suns and lamps make it send out.
-    pub(super) fn n_arrived(&self) -> u64 {
-        4 + u64::from(self.n_high())
+    /// Returns how many numbers the grid's cells have of what suns and lamps make them send out.
+    pub(super) fn n_arrived(&self, n_cells: u64) -> u64 {
+        n_cells * (4 + if self.has_second { N_SECOND } else { 0 })
     }
 
-    /// Returns the number of harmonics of the second and the third order that bounces have.
-    pub(super) fn n_high(&self) -> u32 {
-        match self.order {
-            0 | 1 => 0,
-            2 => 5,
-            _ => 12,
-        }
-    }
-
-    /// Returns the most cells that have high orders of what bounces bring.
-    pub(super) fn n_high_cells(&self) -> u64 {
-        if self.n_high() > 0 { self.n_bounce_cells() } else { 0 }
+    /// Returns how many numbers the cells that bounces lead between have of the second order.
+    pub(super) fn n_of_second(&self) -> u64 {
+        if self.has_second { self.n_bounce_cells() * N_SECOND } else { 0 }
     }
 
     /// Returns the number of patches through which light passes to and from surfaces and ground.

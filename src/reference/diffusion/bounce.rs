@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::moments::flux_through_faces;
 use super::multigrid::Multigrid;
-use super::orders::{self, High, Sent, high_orders, of_order};
+use super::second_order::{self, Orders, Second, second_order};
 use super::sources::{DiffusionMedium, Moments, Sources};
 use super::system::{AtFaces, System};
 use super::ways::Ways;
@@ -26,6 +26,13 @@ pub(super) fn directions() -> [DVec3; 24] {
     })
 }
 
+/// Returns the means of the squares of the second order's harmonics over some directions. Over the
+/// sphere they are 1/5.
+fn means_of_squares(all: &[DVec3]) -> [f64; 5] {
+    let of = |m: usize| all.iter().map(|d| second_order(*d)[m].powi(2)).sum::<f64>();
+    std::array::from_fn(|m| of(m) / all.len() as f64)
+}
+
 /// Cycles for the change by a bounce: the next bounce finds what is left.
 const CYCLES_OF_CHANGE: u32 = 1;
 
@@ -39,62 +46,69 @@ pub(super) struct Bounces<'a> {
 
 impl Bounces<'_> {
     /// Returns what suns and lamps make each cell send out, over s σ and times 4π: ϖ'U, 3ϖ'g'W
-    /// along each axis, and the high orders.
-    pub fn arrived(&self, sources: &Sources) -> Vec<Sent> {
+    /// along each axis, and the second order.
+    pub fn arrived(&self, sources: &Sources) -> Vec<Orders> {
         let [even, forward] = self.of.mean.scattered();
-        let of = |([u, x, y, z], high): (&Moments, &High)| Sent {
+        let of = |Orders { low: [u, x, y, z], second }: &Orders| Orders {
             low: [even * *u, forward * *x, forward * *y, forward * *z],
-            high: self.scattered(high),
+            second: self.scattered(second),
         };
-        sources.of_suns.iter().zip(&sources.of_suns_high).map(of).collect()
+        sources.of_suns.iter().map(of).collect()
     }
 
-    /// Returns what is scattered of light by high orders.
-    fn scattered(&self, high: &High) -> High {
-        let ([even, _], shares) = (self.of.mean.scattered(), self.of.mean.high_orders());
-        std::array::from_fn(|k| of_order(k, shares) * even * high[k])
+    /// Returns what is scattered of the second order of light.
+    fn scattered(&self, second: &Second) -> Second {
+        let [even, _] = self.of.mean.scattered();
+        second.map(|light| self.of.mean.second * even * light)
     }
 
-    /// Returns the light after `n` bounces of `light`, and what cells scatter of it by high orders.
+    /// Returns the light after `n` bounces of `light`, and the second order of what cells scatter
+    /// of it.
     pub fn after(
         &self,
         n: u32,
         ways: &Ways<'_>,
-        arrived: &[Sent],
+        arrived: &[Orders],
         light: Vec<Moments>,
-    ) -> (Vec<Moments>, Vec<High>) {
-        let high = vec![High::default(); light.len()];
-        (0..n).fold((light, high), |(light, high), _| self.next(ways, arrived, (&light, &high)))
+    ) -> (Vec<Moments>, Vec<Second>) {
+        let second = vec![Second::default(); light.len()];
+        let next = |(light, second): (Vec<Moments>, Vec<Second>), _| {
+            self.next(ways, arrived, (&light, &second))
+        };
+        (0..n).fold((light, second), next)
     }
 
     /// Returns the light after one more bounce of `light`, with what diffusion makes of the change.
     fn next(
         &self,
         ways: &Ways<'_>,
-        arrived: &[Sent],
-        (light, high): (&[Moments], &[High]),
-    ) -> (Vec<Moments>, Vec<High>) {
+        arrived: &[Orders],
+        (light, second): (&[Moments], &[Second]),
+    ) -> (Vec<Moments>, Vec<Second>) {
         let MeanMedium { albedo, g, straight: f, .. } = self.of.mean;
         let ([even, forward], weakened) = (self.of.mean.scattered(), self.of.mean.weakened());
         let sent = |c: usize, toward: DVec3| {
             let along = |m: &Moments| -(m[1] * toward.x + m[2] * toward.y + m[3] * toward.z);
             let (own, sun) = (&light[c], &arrived[c]);
-            let of_high = orders::along(&high[c], -toward) + orders::along(&sun.high, -toward);
-            even * own[0] + forward * along(own) + sun.low[0] + along(&sun.low) + of_high
+            let both = std::array::from_fn(|m| second[c][m] + sun.second[m]);
+            let of_second = second_order::along(&both, -toward);
+            even * own[0] + forward * along(own) + sun.low[0] + along(&sun.low) + of_second
         };
         let all = directions();
-        let found: Vec<(Moments, High)> = parallel_map(light.len(), |c| {
-            let (mut sum, mut high) = ([DVec3::ZERO; 4], High::default());
+        let squares = means_of_squares(&all);
+        let found: Vec<(Moments, Second)> = parallel_map(light.len(), |c| {
+            let (mut sum, mut second) = ([DVec3::ZERO; 4], Second::default());
             for d in all {
                 let above = if d.y > 0.0 { 1.0 } else { 0.0 };
                 let l = ways.radiance(c, (d, above), |sky| sky, |k| sent(k, d)) / all.len() as f64;
                 let add = [l, -l * d.x, -l * d.y, -l * d.z];
                 sum.iter_mut().zip(add).for_each(|(sum, l)| *sum += l);
-                high.iter_mut().zip(high_orders(-d)).for_each(|(sum, y)| *sum += y * l);
+                second.iter_mut().zip(second_order(-d)).for_each(|(sum, y)| *sum += y * l);
             }
-            (sum, self.scattered(&high))
+            let second = std::array::from_fn(|m| second[m] / (5.0 * squares[m]));
+            (sum, self.scattered(&second))
         });
-        let (found, high): (Vec<Moments>, Vec<High>) = found.into_iter().unzip();
+        let (found, second): (Vec<Moments>, Vec<Second>) = found.into_iter().unzip();
         let change = |c: usize, k: usize| found[c][k] - light[c][k];
         // Where cells are opaque, diffusion is right and the change is rounding.
         let edge = self.grid.edges().min_element();
@@ -120,7 +134,7 @@ impl Bounces<'_> {
         let phi = Multigrid::new(system, self.grid.edges()).solve(CYCLES_OF_CHANGE);
         let more = flux_through_faces(self.of, self.grid, self.cells, (&sources, series), &phi);
         let all = found.iter().zip(more);
-        (all.map(|(a, b)| std::array::from_fn(|k| a[k] + b[k])).collect(), high)
+        (all.map(|(a, b)| std::array::from_fn(|k| a[k] + b[k])).collect(), second)
     }
 }
 
@@ -138,5 +152,27 @@ mod tests {
             assert!((mean(&|d| d.dot(axis).powi(2)) - 1.0 / 3.0).abs() < 1e-15);
         }
         assert!(all.iter().all(|d| (d.length() - 1.0).abs() < 1e-15));
+    }
+
+    #[test]
+    fn the_second_order_has_its_own_sums_alone() {
+        let all = directions();
+        let squares = means_of_squares(&all);
+        for (m, square) in squares.into_iter().enumerate() {
+            let mean = |of: &dyn Fn(DVec3) -> f64| {
+                all.iter().map(|d| second_order(*d)[m] * of(*d)).sum::<f64>() / 24.0
+            };
+            assert!(mean(&|_| 1.0).abs() < 1e-15);
+            assert!(DVec3::AXES.iter().all(|axis| mean(&|d| d.dot(*axis)).abs() < 1e-15));
+            for other in 0..5 {
+                let expected = if other == m { square } else { 0.0 };
+                assert!(
+                    (mean(&|d| second_order(d)[other]) - expected).abs() < 1e-15,
+                    "{m} {other}"
+                );
+            }
+        }
+        // Three harmonics like xy and two like x² − y²; together they are those of the sphere.
+        assert!((squares.iter().sum::<f64>() - 1.0).abs() < 1e-15, "{squares:?}");
     }
 }

@@ -76,21 +76,21 @@ impl DiffuseLight {
         let ways = Ways::new(grid, depths(cells), lights, of_solids);
         let bounces = Bounces { of, grid, cells };
         let (arrived, mut bounce_grid) = (bounces.arrived(&sources), *grid);
-        let high;
+        let second;
         if edge == 1 {
-            (light, high) = bounces.after(n_bounces, &ways, &arrived, light);
+            (light, second) = bounces.after(n_bounces, &ways, &arrived, light);
         } else {
             let few = Merged::new(of, (grid, cells), &sources, &arrived, edge);
             let before = solved(&few.of, &few.grid, &few.cells, &few.sources);
             let ways = Ways::new(&few.grid, depths(&few.cells), lights, of_solids);
             let bounces = Bounces { of: &few.of, grid: &few.grid, cells: &few.cells };
             let after;
-            (after, high) = bounces.after(n_bounces, &ways, &few.arrived, before.clone());
+            (after, second) = bounces.after(n_bounces, &ways, &few.arrived, before.clone());
             few.spread(grid, &mut light, [&before, &after]);
             bounce_grid = few.grid;
         }
-        let high = (&bounce_grid, &high[..]);
-        let toward = Toward::new(of, grid, (&light, &arrived), high, eye);
+        let second = (&bounce_grid, &second[..]);
+        let toward = Toward::new(of, grid, (&light, &arrived), second, eye);
         let seen = SeenCells::new(of, (grid, cells), &toward, &ways, eye);
         (DiffuseLight { spec: *grid, cells: light, direct }, Some(seen))
     }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::moments::corners;
-use super::orders::Sent;
+use super::second_order::Orders;
 use super::sources::{DiffusionMedium, Moments, Sources};
 use crate::model::grid::GridSpec;
 
@@ -16,7 +16,7 @@ struct Sums {
     /// q/D along each axis.
     momentum: [DVec3; 3],
     /// Extinction times what is sent out.
-    sent: Sent,
+    sent: Orders,
 }
 
 /// Returns the merged cell that cell `c` is in.
@@ -37,7 +37,7 @@ pub(super) struct Merged {
     /// Q0 and q.
     pub sources: Sources,
     /// Light that suns and lamps make each cell send out, over s σ and times 4π.
-    pub arrived: Vec<Sent>,
+    pub arrived: Vec<Orders>,
 }
 
 impl Merged {
@@ -46,7 +46,7 @@ impl Merged {
         of: &DiffusionMedium,
         (grid, cells): (&GridSpec, &[f64]),
         sources: &Sources,
-        arrived: &[Sent],
+        arrived: &[Orders],
         edge: u32,
     ) -> Merged {
         let few = grid.merged(edge);
@@ -66,7 +66,7 @@ impl Merged {
         // A merged cell sends out all that its cells do, also where less extinction counts.
         let sent = |sum: &Sums| {
             let sigma = counted(sum);
-            let mut sent = Sent::default();
+            let mut sent = Orders::default();
             if sigma > 0.0 {
                 sent.add(1.0 / sigma, &sum.sent);
             }

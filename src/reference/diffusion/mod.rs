@@ -24,7 +24,7 @@ mod field;
 mod merged;
 mod moments;
 mod multigrid;
-mod orders;
+mod second_order;
 mod seen;
 mod sources;
 mod system;

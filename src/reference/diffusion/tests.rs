@@ -12,7 +12,7 @@ use crate::reference::grid::density;
 use crate::reference::transmit::Obstacles;
 
 const MEAN: MeanMedium =
-    MeanMedium { albedo: DVec3::new(1.0, 0.99, 0.6), g: 0.85, straight: 0.85 * 0.85, order: 1 };
+    MeanMedium { albedo: DVec3::new(1.0, 0.99, 0.6), g: 0.85, straight: 0.85 * 0.85, second: 0.0 };
 
 fn spec(n: [u32; 3], aspect: f64) -> GridSpec {
     let half = DVec3::new(2.0, 1.5, 1.0);
@@ -204,7 +204,7 @@ fn an_empty_box_lets_the_sky_through() {
 #[test]
 fn what_flows_through_faces_by_hand() {
     let grid = GridSpec { n_cells: UVec3::new(3, 1, 1), cell: 0.5, aspect: 1.0, low: DVec3::ZERO };
-    let mean = MeanMedium { albedo: DVec3::ZERO, g: 0.0, straight: 0.0, order: 1 };
+    let mean = MeanMedium { albedo: DVec3::ZERO, g: 0.0, straight: 0.0, second: 0.0 };
     let of = DiffusionMedium { densest: f64::INFINITY, ..DiffusionMedium::new(mean, &grid) };
     let cells = [0.0, 7.0 / 9.0, 0.0];
     let phi = [1.0, 3.0, 4.0].map(DVec3::splat);

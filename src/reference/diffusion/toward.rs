@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::moments::corners;
-use super::orders::{self, High, Sent};
+use super::second_order::{self, Orders, Second};
 use super::sources::{DiffusionMedium, Moments};
 use crate::model::grid::GridSpec;
 use crate::model::light::UP;
@@ -24,30 +24,27 @@ pub(super) fn direction(grid: &GridSpec, c: usize, eye: DVec3) -> DVec3 {
 
 impl Toward {
     /// Returns what cells send out: `light` is φ and F, `arrived` what suns and lamps make them
-    /// send out. `high` are the high orders of the cells that bounces lead between.
+    /// send out. `second` is the second order of the cells that bounces lead between.
     pub fn new(
         of: &DiffusionMedium,
         grid: &GridSpec,
-        (light, arrived): (&[Moments], &[Sent]),
-        (bounce_grid, high): (&GridSpec, &[High]),
+        (light, arrived): (&[Moments], &[Orders]),
+        (bounce_grid, second): (&GridSpec, &[Second]),
         eye: DVec3,
     ) -> Toward {
         let MeanMedium { g, straight: f, .. } = of.mean;
         let [even, forward] = of.mean.scattered();
         let phase = Phase::HenyeyGreenstein { g };
         let mean = |v: DVec3| v.element_sum() / 3.0;
-        let of_high =
-            |(c, high): (usize, &High)| orders::along(high, direction(bounce_grid, c, eye));
-        let high: Vec<DVec3> = high.iter().enumerate().map(of_high).collect();
         let sent = |c: usize| {
             let w = direction(grid, c, eye);
             let along = |m: &Moments| m[1] * w.x + m[2] * w.y + m[3] * w.z;
             let (own, suns) = (&light[c], &arrived[c].low);
-            let high: DVec3 = corners(bounce_grid, grid.center(c))
+            let of_second: DVec3 = corners(bounce_grid, grid.center(c))
                 .into_iter()
-                .map(|(from, weight)| weight * high[from])
+                .map(|(from, weight)| weight * second_order::along(&second[from], w))
                 .sum();
-            let diffuse = even * own[0] + forward * along(own) + high;
+            let diffuse = even * own[0] + forward * along(own) + of_second;
             let flux = DVec3::new(mean(suns[1]), mean(suns[2]), mean(suns[3]));
             let fluence = mean(forward) * mean(suns[0]);
             let of_flux = if fluence > 0.0 { flux.length() * mean(even) / fluence } else { 0.0 };

@@ -50,17 +50,21 @@ WRITES(5, vec4, of_second)
 WRITES(4, vec4, of_second)
 #endif
 
+#include "directions.glsl"
+#include "sectors.glsl"
 #include "faces.glsl"
 #include "angle.glsl"
 #include "sky.glsl"
-#include "directions.glsl"
 
 // The first cell's texel of the direction that is being summed.
 int first_sent = 0;
+// The sector that it comes from.
+uint i_sector = 0u;
 vec4 sent_along(int c, vec3 w) { return uintBitsToFloat(TEXEL(sent, first_sent + c)); }
 
 // Sums over directions keep its flux.
 #define OUTSIDE(radiance) (radiance)
+#define FROM_SOLIDS(at, axis, side, d, above) of_sector(at, axis, side, i_sector)
 #include "ways.glsl"
 
 void main() {
@@ -77,6 +81,8 @@ void main() {
         for (uint k = 0; k < N_DIRECTIONS; ++k) {
             vec3 w = direction(k);
             first_sent = int(k * n_total(level));
+            // The signs are the others.
+            i_sector = k ^ 7u;
             vec3 l = radiance_along(level, at, w, w.y < 0.0 ? 1.0 : 0.0, skies);
             phi += l;
             x += l * w.x;

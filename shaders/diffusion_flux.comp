@@ -5,6 +5,7 @@
 #include "each.glsl"
 #include "diffusion.glsl"
 #include "second_order.glsl"
+#include "medium.glsl"
 
 // Writes fluence and flux of the diffuse light (model.md §18, passes.md "diffusion").
 // In: the density grid, phi. In, out: by cell Q0 and q, then phi and F = q - D grad phi; what
@@ -33,6 +34,8 @@ layout(push_constant) uniform Push {
     vec3 even;
     float densest;
     vec3 forward;
+    // g'
+    float g;
 } push;
 FLOATS(0, density)
 // Texels, which llvmpipe fetches for all invocations at once.
@@ -69,8 +72,27 @@ vec3 flow(int c, int next, int axis, float edge) {
 
 #if BOUNCES
 #include "directions.glsl"
+#include "of_suns.glsl"
 
-vec3 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k).rgb); }
+// The lobe of suns and lamps over the directions of bounces: its mean is 1, and its mean times the
+// direction g' times the way.
+struct Lobe {
+    // 1 over the mean of the plain lobe.
+    float factor;
+    // What makes up for the rest of its mean times the direction.
+    vec3 slope;
+};
+
+Lobe lobe_of(OfSuns suns) {
+    float mean = 0.0;
+    vec3 along = vec3(0.0);
+    for (uint k = 0; k < N_DIRECTIONS; ++k) {
+        float l = lobe(suns, push.g, direction(k));
+        mean += l / float(N_DIRECTIONS);
+        along += l / float(N_DIRECTIONS) * direction(k);
+    }
+    return Lobe(1.0 / mean, 3.0 * (push.g * suns.way - along / mean));
+}
 #endif
 
 void main() {
@@ -85,7 +107,7 @@ void main() {
 #endif
         field[4 * c].rgb = fluence;
 #if BOUNCES
-        vec3 even = arrived_at(N_ARRIVED * c) + push.even * fluence, forward[3];
+        vec3 even = push.even * fluence, forward[3];
 #endif
         for (int axis = 0; axis < 3; ++axis) {
             int after = at[axis] + 1 < int(level.n_cells[axis]) ? c + stride[axis] : c;
@@ -110,26 +132,27 @@ void main() {
 #endif
             field[k].rgb = flux;
 #if BOUNCES
-            forward[axis] = arrived_at(N_ARRIVED * c + 1 + axis) + push.forward * flux;
+            forward[axis] = push.forward * flux;
 #endif
         }
 #if BOUNCES
-#if SECOND
+#if CHANGE && SECOND
         vec3 second[N_SECOND];
         [[unroll]] for (int m = 0; m < N_SECOND; ++m) {
-            second[m] = arrived_at(N_ARRIVED * c + 4 + m);
-#if CHANGE
-            second[m] += uintBitsToFloat(TEXEL(of_second, N_SECOND * c + m).rgb);
-#endif
+            second[m] = uintBitsToFloat(TEXEL(of_second, N_SECOND * c + m).rgb);
         }
 #endif
+        OfSuns suns = of_suns(c);
+        Lobe of = lobe_of(suns);
         for (uint k = 0; k < N_DIRECTIONS; ++k) {
             vec3 w = direction(k);
             vec3 all = even + w.x * forward[0] + w.y * forward[1] + w.z * forward[2];
-#if SECOND
+#if CHANGE && SECOND
             float y[N_SECOND] = second_order(w);
             [[unroll]] for (int m = 0; m < N_SECOND; ++m) { all += y[m] * second[m]; }
 #endif
+            float once = of.factor * lobe(suns, push.g, w) + dot(of.slope, w);
+            all += suns.all * mix(1.0, once, suns.directed);
             uvec4 words = floatBitsToUint(vec4(all, extinction_of(c)));
             STORE_TEXEL(sent, int(k * n_total(level) + i), words);
         }

@@ -4,7 +4,6 @@
 #include "buffers.glsl"
 #include "each.glsl"
 #include "diffusion.glsl"
-#include "second_order.glsl"
 
 // Merges cells to those between which bounces lead (model.md §18, passes.md "diffusion").
 // In: by cell Q0 and q, and what suns and lamps make it send out, beside its extinction. Out: the
@@ -44,21 +43,16 @@ void main() {
         ivec3 first = max(low, ivec3(0));
         ivec3 end = min(low + int(push.edge), ivec3(push.fine.n_cells));
         float all = 0.0;
-        vec3 sources[4] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)), sent[N_ARRIVED];
-        [[unroll]] for (int k = 0; k < N_ARRIVED; ++k) { sent[k] = vec3(0.0); }
+        vec3 sources[4] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0)), sent[4] = sources;
         for (int z = first.z; z < end.z; ++z) {
             for (int y = first.y; y < end.y; ++y) {
                 for (int x = first.x; x < end.x; ++x) {
-                    int i_cell = index_of(push.fine, ivec3(x, y, z)), c = 4 * i_cell;
-                    vec4 even = arrived_at(N_ARRIVED * i_cell);
-                    all += even.w;
-                    sources[0] += field_at(c);
-                    sent[0] += even.w * even.rgb;
-                    [[unroll]] for (int k = 1; k < 4; ++k) {
-                        sources[k] += loss_of(even.w) * field_at(c + k);
-                    }
-                    [[unroll]] for (int k = 1; k < N_ARRIVED; ++k) {
-                        sent[k] += even.w * arrived_at(N_ARRIVED * i_cell + k).rgb;
+                    int c = 4 * index_of(push.fine, ivec3(x, y, z));
+                    float sigma = arrived_at(c).w;
+                    all += sigma;
+                    [[unroll]] for (int k = 0; k < 4; ++k) {
+                        sources[k] += k == 0 ? field_at(c) : loss_of(sigma) * field_at(c + k);
+                        sent[k] += sigma * arrived_at(c + k).rgb;
                     }
                 }
             }
@@ -70,9 +64,7 @@ void main() {
         [[unroll]] for (int k = 0; k < 4; ++k) {
             vec3 source = share * sources[k];
             merged_field[4 * i + k] = vec4(k == 0 ? source : source / loss_of(sigma), 0.0);
-        }
-        [[unroll]] for (int k = 0; k < N_ARRIVED; ++k) {
-            merged_arrived[N_ARRIVED * i + k] = vec4(weight * sent[k], k == 0 ? sigma : 0.0);
+            merged_arrived[4 * i + k] = vec4(weight * sent[k], k == 0 ? sigma : 0.0);
         }
     }
 }

@@ -33,6 +33,8 @@ WRITES(2, vec4, seen)
 READS(3, vec4, faces)
 #endif
 
+#include "directions.glsl"
+#include "sectors.glsl"
 #include "faces.glsl"
 #include "angle.glsl"
 #include "sky.glsl"
@@ -41,6 +43,7 @@ READS(3, vec4, faces)
 vec4 sent_along(int c, vec3 w) { return uintBitsToFloat(TEXEL(toward, c)); }
 
 #define OUTSIDE(radiance) max(radiance, vec3(0.0))
+#define FROM_SOLIDS(at, axis, side, d, above) between_sectors(at, axis, side, d, above)
 #include "ways.glsl"
 
 void main() {

@@ -7,7 +7,6 @@
 #include "functions.glsl"
 #include "occlude.glsl"
 #include "diffusion.glsl"
-#include "second_order.glsl"
 
 // Computes the light of suns and lamps that is scattered for the first time in every cell
 // (model.md §18, passes.md "diffusion").
@@ -43,8 +42,6 @@ layout(push_constant) uniform Push {
     float step_length;
     uint max_steps;
     float densest;
-    // 5 (g^2-f)/(1-f)
-    float second;
 } push;
 READS(0, Light, lights)
 TEXELS(1, regions)
@@ -109,10 +106,6 @@ void main() {
         // Flux of the skies along x, y and z.
         vec3 fallen[3] = vec3[](vec3(0.0), vec3(0.0), vec3(0.0)), direct = vec3(0.0);
         vec3 x = vec3(0.0), y = vec3(0.0), z = vec3(0.0);
-#if SECOND
-        vec3 second[N_SECOND];
-        [[unroll]] for (int m = 0; m < N_SECOND; ++m) { second[m] = vec3(0.0); }
-#endif
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
             bool is_sky = light.kind == LIGHT_SKY;
@@ -138,10 +131,6 @@ void main() {
                     x -= e * a.toward.x;
                     y -= e * a.toward.y;
                     z -= e * a.toward.z;
-#if SECOND
-                    float at_light[N_SECOND] = second_order(a.toward);
-                    [[unroll]] for (int m = 0; m < N_SECOND; ++m) { second[m] += at_light[m] * e; }
-#endif
                 }
             }
         }
@@ -155,19 +144,11 @@ void main() {
         field[4 * c + 3] = vec4(carried * z + bounded * fallen[2], 0.0);
 #if BOUNCES
         // Also where nothing scatters yet: the cells about have a mixture.
-        vec3 share = push.albedo / max(weakened, vec3(1e-30));
-        vec3 along = 3.0 * (push.g - push.straight) * share;
-        uint first = N_ARRIVED * c;
-        arrived[first] = vec4((1.0 - push.straight) * share * fluence, sigma);
-        arrived[first + 1] = vec4(along * x, 0.0);
-        arrived[first + 2] = vec4(along * y, 0.0);
-        arrived[first + 3] = vec4(along * z, 0.0);
-#if SECOND
-        [[unroll]] for (int m = 0; m < N_SECOND; ++m) {
-            vec3 scattered = push.second * (1.0 - push.straight) * share;
-            arrived[first + 4 + m] = vec4(scattered * second[m], 0.0);
-        }
-#endif
+        vec3 share = push.albedo * (1.0 - push.straight) / max(weakened, vec3(1e-30));
+        arrived[4 * c] = vec4(share * fluence, sigma);
+        arrived[4 * c + 1] = vec4(share * x, 0.0);
+        arrived[4 * c + 2] = vec4(share * y, 0.0);
+        arrived[4 * c + 3] = vec4(share * z, 0.0);
 #endif
     }
 }

@@ -44,6 +44,8 @@ READS(6, vec4, faces)
 vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
 
 #include "diffusivity.glsl"
+#include "directions.glsl"
+#include "sectors.glsl"
 #include "faces.glsl"
 #include "angle.glsl"
 #include "sky.glsl"

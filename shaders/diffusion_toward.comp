@@ -37,10 +37,9 @@ TEXELS(3, of_second)
 #endif
 
 #include "eye.glsl"
+#include "of_suns.glsl"
 
 vec3 field_at(int k) { return uintBitsToFloat(TEXEL(field, k).rgb); }
-vec4 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k)); }
-float mean_of(vec3 v) { return dot(v, vec3(1.0 / 3.0)); }
 
 #if SECOND
 // Returns the second order along w, trilinear between the bounce cells' centres.
@@ -73,20 +72,9 @@ void main() {
 #if SECOND
         diffuse += second_at(at, w);
 #endif
-        // Light of suns and lamps goes in the direction of its flux, and what is left of the
-        // fluence evenly in all.
-        vec4 even = arrived_at(N_ARRIVED * c);
-        vec3 of_suns = even.rgb;
-        vec3 flux = vec3(
-            mean_of(arrived_at(N_ARRIVED * c + 1).rgb), mean_of(arrived_at(N_ARRIVED * c + 2).rgb),
-            mean_of(arrived_at(N_ARRIVED * c + 3).rgb)
-        );
-        float fluence = mean_of(push.forward) * mean_of(of_suns), size = length(flux);
-        float directed = fluence > 0.0 ? min(size * mean_of(push.even) / fluence, 1.0) : 0.0;
-        vec3 bend = w - (size > 0.0 ? flux / size : vec3(0.0));
-        float away = 0.5 * dot(bend, bend);
-        float phase =
-            henyey_greenstein(push.g, away) / (INV_FOUR_PI * max(1.0 - push.straight, 1e-30));
-        toward[c] = vec4(max(diffuse, vec3(0.0)) + of_suns * mix(1.0, phase, directed), even.w);
+        OfSuns suns = of_suns(c);
+        float peak = lobe(suns, push.g, w) / max(1.0 - push.straight, 1e-30);
+        vec3 once = suns.all * mix(1.0, peak, suns.directed);
+        toward[c] = vec4(max(diffuse, vec3(0.0)) + once, arrived_at(4 * c).w);
     }
 }

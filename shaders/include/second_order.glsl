@@ -6,8 +6,6 @@
 #endif
 
 const int N_SECOND = 5;
-// Numbers of what suns and lamps make a cell send out: even, along each axis, second order.
-const int N_ARRIVED = 4 + SECOND * N_SECOND;
 
 // Returns the spherical harmonics of the second order at w, over sqrt(5/(4 pi)). The sum of their
 // products at two directions is Legendre's polynomial of the cosine between these.

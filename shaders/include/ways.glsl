@@ -1,7 +1,8 @@
 // Straight ways through the cells, which are even inside (model.md §18). Needs faces.glsl,
 // sky.glsl, medium.glsl, push.grid and push.weakened. Of each cell it needs sent_along(c, w): 4 pi
 // times what it sends out along w, beside its extinction. OUTSIDE(l) is what a bounce or an eye
-// takes of the sky's radiance l, which is below 0 high up under a low sun.
+// takes of the sky's radiance l, which is below 0 high up under a low sun. FROM_SOLIDS(at, axis,
+// side, d, above) is pi times the radiance of surfaces and ground from d.
 
 // Returns the share of light that passes a depth, by channel where channels differ.
 #if N_SETS == 1
@@ -46,6 +47,6 @@ vec3 radiance_along(Level level, ivec3 at, vec3 w, float above, Skies skies) {
         }
     }
     vec3 outside = OUTSIDE(sky_along(skies, -w, above));
-    outside += of_solids(at, axis, turn[axis] > 0 ? 1u : 0u);
+    outside += FROM_SOLIDS(at, axis, turn[axis] > 0 ? 1u : 0u, -w, above);
     return sum + 4.0 * passed * outside;
 }

@@ -78,6 +78,8 @@ pub struct DiffusionParams {
     pub even: [f32; 3],
     /// 3ϖ'g' = 3ϖ(g − f)/s.
     pub forward: [f32; 3],
+    /// g' = (g − f)/(1 − f).
+    pub scattered_g: f32,
     /// Factor of the second order in what is scattered, over ϖ'.
     pub second: f32,
     /// Extinction beyond which a cell counts as no denser, 1/length.
@@ -99,6 +101,7 @@ impl DiffusionParams {
             weakened: f32s(mean.weakened()),
             even: f32s(even),
             forward: f32s(forward),
+            scattered_g: mean.scattered_g() as f32,
             second: mean.second as f32,
             densest: mean.densest(grid) as f32,
         }

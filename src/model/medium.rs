@@ -175,6 +175,11 @@ impl MeanMedium {
         [1.0 - straight, 3.0 * (g - straight)].map(|share| share * all)
     }
 
+    /// Returns g' = (g − f)/(1 − f), the mean cosine of what is scattered.
+    pub fn scattered_g(&self) -> f64 {
+        (self.g - self.straight) / (1.0 - self.straight).max(f64::MIN_POSITIVE)
+    }
+
     /// Returns the extinction beyond which a cell of `grid` counts as no denser, 1/length: two
     /// transport mean free paths across its shortest edge, of the channel that scatters most.
     ///

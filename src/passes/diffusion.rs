@@ -89,8 +89,8 @@ buffers! {
         source: Buffer => [f32; 4], room.n_cells, "diffusion.source", Texels;
         /// By facet of surfaces and ground: place and area, normal, radiosity.
         solids: Buffer => [[f32; 4]; 3], room.n_solid_facets, "diffusion.solids", Texels;
-        /// Their light by patch of the box.
-        faces: Buffer => [f32; 4], room.n_patches(), "diffusion.faces";
+        /// Their light by patch of the box: irradiance, and π times the radiance by sector.
+        faces: Buffer => [[f32; 4]; 1 + N_DIRECTIONS], room.n_patches(), "diffusion.faces";
     }
 }
 
@@ -129,13 +129,12 @@ impl Diffusion {
             ("SLOPES", u32::from(room.has_slopes)),
             ("SOLIDS", u32::from(has_solids)),
             ("BOUNCES", u32::from(has_bounces)),
-            ("SECOND", u32::from(room.has_second)),
         ];
         let kernel = |name: &str, fields: &_| {
             Kernel::with_macros(device, compiler, name, fields, &[], &macros)
         };
         Ok(Diffusion {
-            solids: has_solids.then(|| Solids::new(device, compiler)).transpose()?,
+            solids: has_solids.then(|| Solids::new(device, compiler, has_bounces)).transpose()?,
             sources: kernel("diffusion.sources", SourcesPush::FIELDS)?,
             system: kernel("diffusion.system", SystemPush::FIELDS)?,
             coarsen: kernel("diffusion.coarsen", PairPush::FIELDS)?,
@@ -210,7 +209,6 @@ impl Diffusion {
             step_length: (work.step_cells * f64::from(grid.cell)) as f32,
             max_steps: work.max_steps,
             densest: of.densest,
-            second: of.second,
         };
         let cells = Cells { grid: *grid, density, field, of: *of };
         let arrived = self.bounces.as_ref().map(Bounces::arrived);

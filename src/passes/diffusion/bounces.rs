@@ -91,10 +91,9 @@ buffers! {
 buffers! {
     /// Scratch by cell of the grid.
     struct Arrived(room: Room) {
-        /// Light that suns and lamps make it send out: evenly, beside the extinction, three times
-        /// the flux along each axis, and the second order.
-        arrived: Buffer => [f32; 4], room.n_arrived(room.n_grid_cells()),
-            "diffusion.arrived", Texels;
+        /// What it scatters of the light of suns and lamps: ϖ'U, beside the extinction, and ϖ'W
+        /// along each axis.
+        arrived: Buffer => [[f32; 4]; 4], room.n_grid_cells(), "diffusion.arrived", Texels;
         /// Q0 and q.
         carried: Buffer => [[f32; 4]; 4], room.n_grid_cells(), "diffusion.carried", Texels;
         /// Light that it sends out toward the eye, beside the extinction.
@@ -145,11 +144,7 @@ impl Bounces {
         let of_change = [("N_SETS", room.n_sets), ("SOLIDS", 0), ("CHANGE", 1)];
         let is_merged = room.bounce_cells > 1;
         Ok(Bounces {
-            flux: kernel(
-                "diffusion.flux",
-                FluxPush::FIELDS,
-                &[("FACES", 1), ("BOUNCES", 1), second],
-            )?,
+            flux: kernel("diffusion.flux", FluxPush::FIELDS, &[("FACES", 1), ("BOUNCES", 1)])?,
             bounce: kernel("diffusion.bounce", BouncePush::FIELDS, &bounce)?,
             system: kernel("diffusion.system", SystemPush::FIELDS, &of_change)?,
             correct: kernel(

@@ -44,6 +44,7 @@ impl Cells<'_> {
             even: self.of.even,
             densest: self.of.densest,
             forward: self.of.forward,
+            g: self.of.scattered_g,
         }
     }
 }

@@ -52,8 +52,7 @@ buffers! {
         /// φ and F before the bounces.
         before: Buffer => [[f32; 4]; 4], room.n_bounce_cells(), "diffusion.merged_before", Texels;
         /// Light that suns and lamps make each cell send out, beside its extinction.
-        arrived: Buffer => [f32; 4], room.n_arrived(room.n_bounce_cells()),
-            "diffusion.merged_arrived", Texels;
+        arrived: Buffer => [[f32; 4]; 4], room.n_bounce_cells(), "diffusion.merged_arrived", Texels;
     }
 }
 
@@ -70,16 +69,8 @@ impl Merged {
     /// Creates the kernels, and room for the merged cells of a grid.
     pub fn new(device: &Device, compiler: &Compiler, room: Room) -> Result<Merged> {
         let most = room.n_bounce_cells();
-        let macros = [("SECOND", u32::from(room.has_second))];
         Ok(Merged {
-            merge: Kernel::with_macros(
-                device,
-                compiler,
-                "diffusion.merge",
-                MergePush::FIELDS,
-                &[],
-                &macros,
-            )?,
+            merge: Kernel::new(device, compiler, "diffusion.merge", MergePush::FIELDS)?,
             spread: Kernel::new(device, compiler, "diffusion.spread", SpreadPush::FIELDS)?,
             scratch: Scratch::new(device, room)?,
             edge: room.bounce_cells,

@@ -27,8 +27,6 @@ record! {
         max_steps: u32,
         /// Extinction beyond which a cell counts as no denser, 1/length.
         densest: f32,
-        /// Factor of the second order in what is scattered, over ϖ'.
-        second: f32,
     }
 }
 
@@ -138,5 +136,7 @@ record! {
         densest: f32,
         /// 3ϖ'g'.
         forward: [f32; 3],
+        /// g'.
+        g: f32,
     }
 }

@@ -45,11 +45,6 @@ impl Room {
         if self.bounce_cells > 1 { self.n_grid_cells() * 8 / 27 } else { self.n_grid_cells() }
     }
 
-    /// Returns how many numbers the grid's cells have of what suns and lamps make them send out.
-    pub(super) fn n_arrived(&self, n_cells: u64) -> u64 {
-        n_cells * (4 + if self.has_second { N_SECOND } else { 0 })
-    }
-
     /// Returns how many numbers the cells that bounces lead between have of the second order.
     pub(super) fn n_of_second(&self) -> u64 {
         if self.has_second { self.n_bounce_cells() * N_SECOND } else { 0 }

@@ -61,11 +61,19 @@ pub(super) struct Solids {
 }
 
 impl Solids {
-    pub fn new(device: &Device, compiler: &Compiler) -> Result<Solids> {
+    /// Creates the kernels. `has_bounces`: light is wanted by sector.
+    pub fn new(device: &Device, compiler: &Compiler, has_bounces: bool) -> Result<Solids> {
         let kernel = |name: &str, fields: &_| Kernel::new(device, compiler, name, fields);
         Ok(Solids {
             solids: kernel("diffusion.solids", SolidsPush::FIELDS)?,
-            faces: kernel("diffusion.faces", FacesPush::FIELDS)?,
+            faces: Kernel::with_macros(
+                device,
+                compiler,
+                "diffusion.faces",
+                FacesPush::FIELDS,
+                &[],
+                &[("BOUNCES", u32::from(has_bounces))],
+            )?,
             patches: kernel("diffusion.patches", PatchesPush::FIELDS)?,
         })
     }

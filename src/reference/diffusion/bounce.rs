@@ -2,9 +2,11 @@
 
 use glam::DVec3;
 
+use super::faces::FaceLight;
 use super::moments::flux_through_faces;
 use super::multigrid::Multigrid;
-use super::second_order::{self, Orders, Second, second_order};
+use super::of_suns::OfSuns;
+use super::second_order::{self, Second, second_order};
 use super::sources::{DiffusionMedium, Moments, Sources};
 use super::system::{AtFaces, System};
 use super::ways::Ways;
@@ -45,15 +47,11 @@ pub(super) struct Bounces<'a> {
 }
 
 impl Bounces<'_> {
-    /// Returns what suns and lamps make each cell send out, over s σ and times 4π: ϖ'U, 3ϖ'g'W
-    /// along each axis, and the second order.
-    pub fn arrived(&self, sources: &Sources) -> Vec<Orders> {
-        let [even, forward] = self.of.mean.scattered();
-        let of = |Orders { low: [u, x, y, z], second }: &Orders| Orders {
-            low: [even * *u, forward * *x, forward * *y, forward * *z],
-            second: self.scattered(second),
-        };
-        sources.of_suns.iter().map(of).collect()
+    /// Returns what each cell scatters of the light of suns and lamps: ϖ'U, and ϖ'W along each
+    /// axis.
+    pub fn arrived(&self, sources: &Sources) -> Vec<Moments> {
+        let [even, _] = self.of.mean.scattered();
+        sources.of_suns.iter().map(|of| of.map(|light| even * light)).collect()
     }
 
     /// Returns what is scattered of the second order of light.
@@ -68,12 +66,14 @@ impl Bounces<'_> {
         &self,
         n: u32,
         ways: &Ways<'_>,
-        arrived: &[Orders],
+        arrived: &[Moments],
         light: Vec<Moments>,
     ) -> (Vec<Moments>, Vec<Second>) {
         let second = vec![Second::default(); light.len()];
+        let (all, g) = (directions(), self.of.mean.scattered_g());
+        let of_suns: Vec<_> = arrived.iter().map(|of| OfSuns::new(of).along_all(&all, g)).collect();
         let next = |(light, second): (Vec<Moments>, Vec<Second>), _| {
-            self.next(ways, arrived, (&light, &second))
+            self.next(ways, &of_suns, (&light, &second))
         };
         (0..n).fold((light, second), next)
     }
@@ -82,28 +82,29 @@ impl Bounces<'_> {
     fn next(
         &self,
         ways: &Ways<'_>,
-        arrived: &[Orders],
+        of_suns: &[[DVec3; 24]],
         (light, second): (&[Moments], &[Second]),
     ) -> (Vec<Moments>, Vec<Second>) {
         let MeanMedium { albedo, g, straight: f, .. } = self.of.mean;
         let ([even, forward], weakened) = (self.of.mean.scattered(), self.of.mean.weakened());
-        let sent = |c: usize, toward: DVec3| {
-            let along = |m: &Moments| -(m[1] * toward.x + m[2] * toward.y + m[3] * toward.z);
-            let (own, sun) = (&light[c], &arrived[c]);
-            let both = std::array::from_fn(|m| second[c][m] + sun.second[m]);
-            let of_second = second_order::along(&both, -toward);
-            even * own[0] + forward * along(own) + sun.low[0] + along(&sun.low) + of_second
+        let sent = |c: usize, w: DVec3| {
+            let own = &light[c];
+            let along = own[1] * w.x + own[2] * w.y + own[3] * w.z;
+            even * own[0] + forward * along + second_order::along(&second[c], w)
         };
         let all = directions();
         let squares = means_of_squares(&all);
         let found: Vec<(Moments, Second)> = parallel_map(light.len(), |c| {
             let (mut sum, mut second) = ([DVec3::ZERO; 4], Second::default());
-            for d in all {
-                let above = if d.y > 0.0 { 1.0 } else { 0.0 };
-                let l = ways.radiance(c, (d, above), |sky| sky, |k| sent(k, d)) / all.len() as f64;
-                let add = [l, -l * d.x, -l * d.y, -l * d.z];
+            for (k, w) in all.into_iter().enumerate() {
+                let above = if w.y < 0.0 { 1.0 } else { 0.0 };
+                let sent = |c: usize| sent(c, w) + of_suns[c][k];
+                // Light comes from -w, whose signs are the others.
+                let solids = |of: &FaceLight, (axis, side), part| of.from(axis, side, part, k ^ 7);
+                let l = ways.radiance(c, (-w, above), |sky| sky, solids, sent) / all.len() as f64;
+                let add = [l, l * w.x, l * w.y, l * w.z];
                 sum.iter_mut().zip(add).for_each(|(sum, l)| *sum += l);
-                second.iter_mut().zip(second_order(-d)).for_each(|(sum, y)| *sum += y * l);
+                second.iter_mut().zip(second_order(w)).for_each(|(sum, y)| *sum += y * l);
             }
             let second = std::array::from_fn(|m| second[m] / (5.0 * squares[m]));
             (sum, self.scattered(&second))

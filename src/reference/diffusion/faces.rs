@@ -85,10 +85,38 @@ impl Skies {
     }
 }
 
+/// Sectors of the sphere around the directions of bounces: of each long axis, and by the signs.
+const N_SECTORS: usize = 24;
+
+/// Returns by axis the share of a direction that counts as positive, before a face of the box.
+fn positive(d: DVec3, axis: usize, side: usize) -> [f64; 3] {
+    let mut positive = d.to_array().map(|part| (0.5 + 2.0 * part).clamp(0.0, 1.0));
+    // Behind the face is nothing.
+    positive[axis] = side as f64;
+    positive
+}
+
+/// Returns the shares of a direction in the sectors, 1 in all.
+fn shares(d: DVec3, positive: [f64; 3]) -> [f64; N_SECTORS] {
+    std::array::from_fn(|k| {
+        let of_sign = |bit: usize| match k >> bit & 1 {
+            1 => 1.0 - positive[bit],
+            _ => positive[bit],
+        };
+        d[k / 8].powi(2) * of_sign(0) * of_sign(1) * of_sign(2)
+    })
+}
+
+/// Returns the integral over π of a cosine times the shares in a sector: half of it goes to the
+/// cosine's axis, and a quarter to each other one.
+fn projected(k: usize, axis: usize) -> f64 {
+    if k / 8 == axis { 1.0 / 8.0 } else { 1.0 / 16.0 }
+}
+
 /// Light that arrives at the box from surfaces and ground, less that of the sky that they hide:
-/// by axis, side, and patch.
+/// irradiance by axis, side, patch and sector.
 #[derive(Debug, Clone)]
-pub struct FaceLight(Vec<DVec3>);
+pub struct FaceLight(Vec<[DVec3; N_SECTORS]>);
 
 impl FaceLight {
     /// Returns the light of `facets`, which send out `radiosity`, W m⁻².
@@ -109,18 +137,42 @@ impl FaceLight {
             let (axis, side) = (i / (2 * n * n), i / (n * n) % 2);
             let Patch { center, outward, .. } = patch(grid, axis, side, [i % n, i / n % n]);
             let place = center - outward * lift.min(half[axis]);
-            let of = |(f, sent): (&Facet, &DVec3)| {
+            let mut sums = [DVec3::ZERO; N_SECTORS];
+            for (f, sent) in facets.iter().zip(radiosity) {
                 let share = share((f.position, f.normal), f.area, (place, outward));
-                share * (*sent - skies.from((f.position - place).normalize_or_zero()))
-            };
-            facets.iter().zip(radiosity).map(of).sum()
+                let toward = (f.position - place).normalize_or_zero();
+                let light = share * (*sent - skies.from(toward));
+                let shares = shares(toward, positive(toward, axis, side));
+                sums.iter_mut().zip(shares).for_each(|(sum, share)| *sum += share * light);
+            }
+            sums
         };
         FaceLight((0..6 * n * n).map(at).collect())
     }
 
-    /// Returns the light at a place of a face, given by its share of the box along each axis:
+    /// Returns the irradiance at a place of a face, given by its share of the box along each axis:
     /// bilinear between the patches' centres.
     pub fn at(&self, axis: usize, side: usize, part: DVec3) -> DVec3 {
+        self.sectors_at(axis, side, part).into_iter().sum()
+    }
+
+    /// Returns π times the mean radiance there from the sector of direction `k` of bounces.
+    pub fn from(&self, axis: usize, side: usize, part: DVec3, k: usize) -> DVec3 {
+        self.sectors_at(axis, side, part)[k] / projected(k, axis)
+    }
+
+    /// Returns π times the radiance there from `d`, of which the share `above` comes from above the
+    /// horizon.
+    pub fn between(&self, axis: usize, side: usize, part: DVec3, d: DVec3, above: f64) -> DVec3 {
+        let mut positive = positive(d, axis, side);
+        if axis != 1 {
+            positive[1] = above;
+        }
+        let sectors = self.sectors_at(axis, side, part).into_iter().zip(shares(d, positive));
+        sectors.enumerate().map(|(k, (sum, share))| share / projected(k, axis) * sum).sum()
+    }
+
+    fn sectors_at(&self, axis: usize, side: usize, part: DVec3) -> [DVec3; N_SECTORS] {
         let n = PATCHES as usize;
         let along = |axis: usize| {
             let at = (part[axis] * n as f64 - 0.5).clamp(0.0, n as f64 - 1.0);
@@ -128,9 +180,11 @@ impl FaceLight {
             (base, (base + 1).min(n - 1), at - base as f64)
         };
         let ((u, next_u, s), (v, next_v, t)) = (along((axis + 1) % 3), along((axis + 2) % 3));
-        let of = |u: usize, v: usize| self.0[(2 * axis + side) * n * n + v * n + u];
-        let row = |v: usize| of(u, v).lerp(of(next_u, v), s);
-        row(v).lerp(row(next_v), t)
+        std::array::from_fn(|k| {
+            let of = |u: usize, v: usize| self.0[(2 * axis + side) * n * n + v * n + u][k];
+            let row = |v: usize| of(u, v).lerp(of(next_u, v), s);
+            row(v).lerp(row(next_v), t)
+        })
     }
 }
 
@@ -172,6 +226,49 @@ mod tests {
         assert!((down - 1.0).abs() < 0.02, "{down}");
         assert!((side - 0.45).abs() < 0.02, "{side}");
         assert_eq!(up, 0.0);
+    }
+
+    #[test]
+    fn a_wide_floor_has_its_radiance_in_the_sectors_below() {
+        let floor = floor(-4.1);
+        let light = FaceLight::new(&GRID, &floor, &vec![DVec3::ONE; 6400], &[], 0.5);
+        let mid = DVec3::splat(0.5);
+        // Of y, the long axis 1: the sectors 10, 11, 14 and 15 lie below, two of them before +x.
+        for (axis, side, k) in [(1, 0, 10), (1, 0, 15), (0, 1, 10), (0, 1, 14)] {
+            let l = light.from(axis, side, mid, k).x;
+            // The floor ends 20 away, at 13° below the horizon from 4.6 above it. Of what is below
+            // by less than 14°, a part counts as above.
+            assert!((l - 0.97).abs() < 0.04, "{axis} {k}: {l}");
+        }
+        assert!(light.from(0, 1, mid, 8).x < 0.01);
+        let down = light.between(1, 0, mid, -DVec3::Y, 0.0).x;
+        assert!((down - 0.97).abs() < 0.04, "{down}");
+        let side = |above: f64| light.between(0, 1, mid, DVec3::new(0.8, -0.6, 0.0), above).x;
+        assert!(side(1.0) < 0.03 && (2.0 * side(0.5) - side(0.0) - side(1.0)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn sectors_divide_what_a_face_sees() {
+        // Midpoints of a lattice on the half sphere before +x, equal in area.
+        let (mut sums, n) = ([0.0; N_SECTORS], 400);
+        for i in 0..n * n {
+            let (cosine, angle) = ((i / n) as f64 + 0.5, (i % n) as f64 + 0.5);
+            let (cosine, angle) = (cosine / n as f64, 2.0 * PI * angle / n as f64);
+            let sine = (1.0 - cosine * cosine).sqrt();
+            let d = DVec3::new(cosine, sine * angle.cos(), sine * angle.sin());
+            let of = shares(d, positive(d, 0, 1));
+            assert!((of.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+            sums.iter_mut().zip(of).for_each(|(sum, s)| *sum += 2.0 * cosine * s / (n * n) as f64);
+        }
+        for (k, sum) in sums.into_iter().enumerate() {
+            let expected = if k & 1 == 1 { 0.0 } else { projected(k, 0) };
+            // A midpoint's error falls with n².
+            assert!((sum - expected).abs() < 1e-5, "{k}: {sum}");
+        }
+        // Directions of bounces have the signs of their sector, and most of their light is there.
+        for (k, d) in super::super::bounce::directions().into_iter().enumerate() {
+            assert!(shares(d, d.to_array().map(|part| f64::from(part > 0.0)))[k] > 0.8);
+        }
     }
 
     #[test]

@@ -3,7 +3,6 @@
 use glam::DVec3;
 
 use super::moments::corners;
-use super::second_order::Orders;
 use super::sources::{DiffusionMedium, Moments, Sources};
 use crate::model::grid::GridSpec;
 
@@ -15,8 +14,8 @@ struct Sums {
     scattered: DVec3,
     /// q/D along each axis.
     momentum: [DVec3; 3],
-    /// Extinction times what is sent out.
-    sent: Orders,
+    /// Extinction times what is scattered of the light of suns and lamps.
+    sent: Moments,
 }
 
 /// Returns the merged cell that cell `c` is in.
@@ -36,8 +35,8 @@ pub(super) struct Merged {
     pub cells: Vec<f64>,
     /// Q0 and q.
     pub sources: Sources,
-    /// Light that suns and lamps make each cell send out, over s σ and times 4π.
-    pub arrived: Vec<Orders>,
+    /// What each cell scatters of the light of suns and lamps: ϖ'U, and ϖ'W along each axis.
+    pub arrived: Vec<Moments>,
 }
 
 impl Merged {
@@ -46,7 +45,7 @@ impl Merged {
         of: &DiffusionMedium,
         (grid, cells): (&GridSpec, &[f64]),
         sources: &Sources,
-        arrived: &[Orders],
+        arrived: &[Moments],
         edge: u32,
     ) -> Merged {
         let few = grid.merged(edge);
@@ -60,17 +59,15 @@ impl Merged {
             for axis in 0..3 {
                 sum.momentum[axis] += share * sources.carried[c][axis] / of.reach(*sigma);
             }
-            sum.sent.add(share * *sigma, &arrived[c]);
+            for (sum, sent) in sum.sent.iter_mut().zip(arrived[c]) {
+                *sum += share * *sigma * sent;
+            }
         }
         let counted = |sum: &Sums| sum.extinction.min(of_few.densest);
         // A merged cell sends out all that its cells do, also where less extinction counts.
         let sent = |sum: &Sums| {
             let sigma = counted(sum);
-            let mut sent = Orders::default();
-            if sigma > 0.0 {
-                sent.add(1.0 / sigma, &sum.sent);
-            }
-            sent
+            if sigma > 0.0 { sum.sent.map(|sent| sent / sigma) } else { Moments::default() }
         };
         let carried = |sum: &Sums| sum.momentum.map(|q| of_few.reach(sum.extinction) * q);
         Merged {

@@ -24,6 +24,7 @@ mod field;
 mod merged;
 mod moments;
 mod multigrid;
+mod of_suns;
 mod second_order;
 mod seen;
 mod sources;

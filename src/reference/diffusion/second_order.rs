@@ -9,21 +9,6 @@ use crate::reference::harmonics::harmonics;
 /// Values by harmonic of the second order.
 pub type Second = [DVec3; 5];
 
-/// Light by direction, times 4π: evenly, by a cosine along each axis, and the second order.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Orders {
-    pub low: [DVec3; 4],
-    pub second: Second,
-}
-
-impl Orders {
-    /// Adds a multiple of other light.
-    pub fn add(&mut self, times: f64, of: &Orders) {
-        self.low.iter_mut().zip(of.low).for_each(|(sum, v)| *sum += times * v);
-        self.second.iter_mut().zip(of.second).for_each(|(sum, v)| *sum += times * v);
-    }
-}
-
 /// Returns Y_2m of a unit direction times √(4π/5). The sum of the products at two directions is
 /// Legendre's polynomial of the cosine between them.
 pub fn second_order(w: DVec3) -> [f64; 5] {

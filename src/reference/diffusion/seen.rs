@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
+use super::faces::FaceLight;
 use super::moments::corners;
 use super::sources::DiffusionMedium;
 use super::toward::{Toward, direction};
@@ -54,7 +55,9 @@ impl SeenCells {
             let (w, up) = (direction(grid, c, eye), (eye - grid.center(c)).y);
             let above = (0.5 - up / grid.edges().y).clamp(0.0, 1.0);
             let sky = |l: DVec3| l.max(DVec3::ZERO);
-            let behind = ways.radiance(c, (-w, above), sky, |k| toward.cells[k]);
+            let solids =
+                |of: &FaceLight, (axis, side), part| of.between(axis, side, part, -w, above);
+            let behind = ways.radiance(c, (-w, above), sky, solids, |k| toward.cells[k]);
             let all = weakened * toward.cells[c] + (DVec3::ONE - weakened) * behind;
             (all / (4.0 * PI), extinction[c])
         });

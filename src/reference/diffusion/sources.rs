@@ -2,7 +2,6 @@
 
 use glam::{DMat3, DVec3};
 
-use super::second_order::{Orders, Second, second_order};
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 use crate::model::medium::MeanMedium;
@@ -46,9 +45,8 @@ pub struct Sources {
     /// q = D(3Q1 + cF₀): D times three times the momentum that it keeps, with the sky's where a
     /// scene has surfaces or ground; a row an axis, W m⁻².
     pub carried: Vec<[DVec3; 3]>,
-    /// Fluence of suns and lamps, their flux along each axis, and the second order, means over the
-    /// cell, W m⁻².
-    pub of_suns: Vec<Orders>,
+    /// Fluence of suns and lamps and their flux along each axis, means over the cell, W m⁻².
+    pub of_suns: Vec<Moments>,
     /// U: fluence of suns and lamps, mean over the channels, W m⁻².
     pub direct: Vec<f64>,
 }
@@ -69,7 +67,7 @@ impl Sources {
             let extinction = whole.min(of.densest);
             let receiver = Receiver { position: p, i_region: u32::MAX };
             let (mut fluence, mut flux, mut fallen) = (DVec3::ZERO, DMat3::ZERO, [DVec3::ZERO; 3]);
-            let (mut direct, mut from_middle, mut second) = (0.0, DVec3::ZERO, Second::default());
+            let (mut direct, mut from_middle) = (0.0, DVec3::ZERO);
             for light in lights.iter().filter(|light| has_sky_flux || !light.is_sky()) {
                 let way = light.arrival(p);
                 let tau = obstacles.depths(&[receiver], std::slice::from_ref(light))[0];
@@ -91,15 +89,12 @@ impl Sources {
                 let e = e * mean;
                 fluence += e;
                 from_middle += share * e;
-                let of_second = second.iter_mut().zip(second_order(-way.toward));
-                of_second.for_each(|(sum, y)| *sum += y * e);
                 // A column an axis.
                 for axis in 0..3 {
                     *flux.col_mut(axis) -= e * way.toward[axis];
                 }
             }
-            let low = [fluence, flux.x_axis, flux.y_axis, flux.z_axis];
-            let of_suns = Orders { low, second };
+            let of_suns = [fluence, flux.x_axis, flux.y_axis, flux.z_axis];
             let carried = [0, 1, 2].map(|axis| {
                 let of_suns = 3.0 * albedo * (g - f) * extinction * flux.col(axis);
                 of.reach(extinction) * (of_suns + of.inverse_chord * fallen[axis])

@@ -28,12 +28,14 @@ impl<'a> Ways<'a> {
 
     /// Returns 4π times the radiance that comes to the middle of cell `c` from the direction
     /// `toward`, where cells send out `sent` along the way, times 4π. The share `above` of it comes
-    /// from above the horizon. Of the sky, `outside` is taken.
+    /// from above the horizon. Of the sky, `outside` is taken. `solids` is π times the radiance of
+    /// surfaces and ground at a place of a face.
     pub fn radiance(
         &self,
         c: usize,
         (toward, above): (DVec3, f64),
         outside: impl Fn(DVec3) -> DVec3,
+        solids: impl Fn(&FaceLight, (usize, usize), DVec3) -> DVec3,
         sent: impl Fn(usize) -> DVec3,
     ) -> DVec3 {
         let (n, edges) = (self.grid.n_cells.as_usizevec3(), self.grid.edges());
@@ -53,7 +55,7 @@ impl<'a> Ways<'a> {
             let side = usize::from(toward[k] > 0.0);
             if at[k] == [0, n[k] - 1][side] {
                 let part = (DVec3::from(at.map(|i| i as f64)) + 0.5) / n.as_dvec3();
-                let of_solids = self.of_solids.map_or(DVec3::ZERO, |f| f.at(k, side, part));
+                let of_solids = self.of_solids.map_or(DVec3::ZERO, |f| solids(f, (k, side), part));
                 let of_sky = outside(self.skies.along(toward, above));
                 return sum + 4.0 * passed * (of_solids + of_sky);
             }

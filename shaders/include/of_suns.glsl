@@ -1,0 +1,32 @@
+// What cells send out of the light of suns and lamps (model.md §18). Needs medium.glsl and the
+// texels `arrived`: by cell albedo' U beside the extinction, and albedo' W along each axis.
+
+vec4 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k)); }
+float mean_of(vec3 v) { return dot(v, vec3(1.0 / 3.0)); }
+
+struct OfSuns {
+    // albedo' U
+    vec3 all;
+    // The share that comes along `way`; the rest comes evenly from all sides.
+    float directed;
+    vec3 way;
+};
+
+OfSuns of_suns(int c) {
+    vec3 all = arrived_at(4 * c).rgb;
+    vec3 flux = vec3(
+        mean_of(arrived_at(4 * c + 1).rgb), mean_of(arrived_at(4 * c + 2).rgb),
+        mean_of(arrived_at(4 * c + 3).rgb)
+    );
+    float fluence = mean_of(all), size = length(flux);
+    return OfSuns(
+        all, fluence > 0.0 ? min(size / fluence, 1.0) : 0.0,
+        size > 0.0 ? flux / size : vec3(0.0)
+    );
+}
+
+// Returns 4 pi times Henyey's and Greenstein's phase function from the way to w.
+float lobe(OfSuns suns, float g, vec3 w) {
+    vec3 bend = w - suns.way;
+    return henyey_greenstein(g, 0.5 * dot(bend, bend)) / INV_FOUR_PI;
+}

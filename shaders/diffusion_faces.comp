@@ -1,5 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 #include "light.glsl"
 #include "angle.glsl"
@@ -11,7 +12,12 @@
 // of each sector, W/m^2. Law: sum of A cos cos/(pi d^2) times radiosity less the sky's; the
 // receiving places lie deeper by a facet's edge. Error: some ulp of the terms.
 
-layout(local_size_x = 64) in;
+// Invocations, a power of 2, at least 8. The fewer, the less is to be added up.
+#ifndef WORKGROUP
+#define WORKGROUP 32
+#endif
+
+layout(local_size_x = WORKGROUP) in;
 
 layout(push_constant) uniform Push {
     Grid grid;
@@ -36,9 +42,8 @@ vec4 solid_at(uint k) { return uintBitsToFloat(TEXEL(solids, int(k))); }
 #define BOUNCES 0
 #endif
 
-// Light of a facet an invocation, and the direction that it comes from.
-shared vec3 lights_of[64];
-shared vec3 towards[64];
+// Sums of invocations: of all light, then of eight sectors at a time.
+shared vec3 sums[8 * WORKGROUP];
 
 void main() {
     uint k = gl_LocalInvocationID.x, i_patch = gl_WorkGroupID.x;
@@ -47,48 +52,50 @@ void main() {
     vec3 deeper = min(vec3(push.lift), 0.5 * extent_of(push.grid));
     vec3 at = to.center - to.outward * deeper;
     Skies skies = all_skies();
-    // Light of all, and of sector k.
-    vec3 sum = vec3(0.0), of_sector = vec3(0.0);
-    for (uint first = 0u; first < push.n_facets; first += 64u) {
-        uint j = first + k;
-        vec3 light = vec3(0.0), toward = vec3(0.0);
-        if (j < push.n_facets) {
-            vec4 place = solid_at(3u * j);
-            vec3 offset = place.xyz - at;
-            float share = share_between(offset, solid_at(3u * j + 1u).xyz, place.w, to.outward);
-            vec3 sent = solid_at(3u * j + 2u).rgb;
-            toward = offset * inversesqrt(max(dot(offset, offset), 1e-30));
-            light = share * (sent - sky_along(skies, toward, offset.y > 0.0 ? 1.0 : 0.0));
-        }
-        sum += light;
+    vec3 sum = vec3(0.0);
 #if BOUNCES
-        lights_of[k] = light;
-        towards[k] = toward;
-        barrier();
-        if (k < N_DIRECTIONS) {
-            for (uint i = 0u; i < 64u; ++i) {
-                vec3 d = towards[i];
-                of_sector += share_in(k, d, positive_of(d, axis, side)) * lights_of[i];
-            }
-        }
-        barrier();
+    vec3 of_sector[N_DIRECTIONS];
+    [[unroll]] for (uint i = 0u; i < N_DIRECTIONS; ++i) { of_sector[i] = vec3(0.0); }
 #endif
+    for (uint j = k; j < push.n_facets; j += WORKGROUP) {
+        vec4 place = solid_at(3u * j);
+        vec3 offset = place.xyz - at;
+        float share = share_between(offset, solid_at(3u * j + 1u).xyz, place.w, to.outward);
+        if (share > 0.0) {
+            vec3 sent = solid_at(3u * j + 2u).rgb;
+            vec3 toward = offset * inversesqrt(max(dot(offset, offset), 1e-30));
+            vec3 light = share * (sent - sky_along(skies, toward, offset.y > 0.0 ? 1.0 : 0.0));
+            sum += light;
+#if BOUNCES
+            vec3 positive = positive_of(toward, axis, side);
+            [[unroll]] for (uint i = 0u; i < N_DIRECTIONS; ++i) {
+                of_sector[i] += share_in(i, toward, positive) * light;
+            }
+#endif
+        }
     }
-    lights_of[k] = sum;
-    for (uint n = 32u; n > 0u; n /= 2u) {
+    sums[k] = sum;
+    for (uint n = WORKGROUP / 2u; n > 0u; n /= 2u) {
         barrier();
         if (k < n) {
-            lights_of[k] += lights_of[k + n];
+            sums[k] += sums[k + n];
         }
     }
     if (k == 0u) {
-        faces[OF_PATCH * i_patch] = vec4(lights_of[0], 0.0);
+        faces[OF_PATCH * i_patch] = vec4(sums[0], 0.0);
     }
 #if BOUNCES
-    if (k < N_DIRECTIONS) {
-        // The integral over pi of a cosine times the shares.
-        float all = k >> 3 == axis ? 0.125 : 0.0625;
-        faces[OF_PATCH * i_patch + 1u + k] = vec4(of_sector / all, 0.0);
+    [[unroll]] for (uint a = 0u; a < 3u; ++a) {
+        barrier();
+        [[unroll]] for (uint i = 0u; i < 8u; ++i) { sums[WORKGROUP * i + k] = of_sector[8u * a + i]; }
+        barrier();
+        if (k < 8u) {
+            vec3 all = vec3(0.0);
+            for (uint i = 0u; i < WORKGROUP; ++i) { all += sums[WORKGROUP * k + i]; }
+            // By the integral over pi of a cosine times the shares.
+            float mean = a == axis ? 0.125 : 0.0625;
+            faces[OF_PATCH * i_patch + 1u + 8u * a + k] = vec4(all / mean, 0.0);
+        }
     }
 #endif
 }

@@ -15,5 +15,5 @@ vec3 positive_of(vec3 d, uint axis, uint side) {
 // Returns the share of a direction in sector k. All shares add up to 1.
 float share_in(uint k, vec3 d, vec3 positive) {
     vec3 shares = mix(positive, 1.0 - positive, notEqual(uvec3(k, k >> 1, k >> 2) & 1u, uvec3(0u)));
-    return d[k >> 3] * d[k >> 3] * shares.x * shares.y * shares.z;
+    return shares.x * shares.y * shares.z * (d[k >> 3] * d[k >> 3]);
 }

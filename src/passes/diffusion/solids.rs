@@ -63,6 +63,7 @@ pub(super) struct Solids {
 impl Solids {
     /// Creates the kernels. `has_bounces`: light is wanted by sector.
     pub fn new(device: &Device, compiler: &Compiler, has_bounces: bool) -> Result<Solids> {
+        let invocations = device.limits().subgroup_size.clamp(8, 64);
         let kernel = |name: &str, fields: &_| Kernel::new(device, compiler, name, fields);
         Ok(Solids {
             solids: kernel("diffusion.solids", SolidsPush::FIELDS)?,
@@ -72,7 +73,7 @@ impl Solids {
                 "diffusion.faces",
                 FacesPush::FIELDS,
                 &[],
-                &[("BOUNCES", u32::from(has_bounces))],
+                &[("BOUNCES", u32::from(has_bounces)), ("WORKGROUP", invocations)],
             )?,
             patches: kernel("diffusion.patches", PatchesPush::FIELDS)?,
         })

@@ -117,10 +117,10 @@ pub const RUNGS: [Rung; 8] = [
     rung(LightingMode::Diffusion, 16, (0, 2), None, [0.32, 0.31]),
     rung(LightingMode::Diffusion, 24, (0, 2), None, [0.25, 0.24]),
     rung(LightingMode::Diffusion, 32, (0, 2), None, [0.22, 0.22]),
-    rung(LightingMode::Diffusion, 24, (2, 2), Some(3.0), [0.23, 0.19]),
-    rung(LightingMode::Diffusion, 24, (4, 2), Some(3.0), [0.23, 0.16]),
-    rung(LightingMode::Diffusion, 32, (4, 2), Some(3.0), [0.24, 0.13]),
-    rung(LightingMode::Diffusion, 32, (2, 1), Some(SLICE), [0.24, 0.12]),
+    rung(LightingMode::Diffusion, 24, (2, 2), Some(3.0), [0.25, 0.19]),
+    rung(LightingMode::Diffusion, 24, (4, 2), Some(3.0), [0.24, 0.16]),
+    rung(LightingMode::Diffusion, 32, (4, 2), Some(3.0), [0.25, 0.13]),
+    rung(LightingMode::Diffusion, 32, (2, 1), Some(SLICE), [0.23, 0.12]),
 ];
 
 const fn rung(

@@ -87,7 +87,9 @@ void main() {
 #if BOUNCES
     [[unroll]] for (uint a = 0u; a < 3u; ++a) {
         barrier();
-        [[unroll]] for (uint i = 0u; i < 8u; ++i) { sums[WORKGROUP * i + k] = of_sector[8u * a + i]; }
+        [[unroll]] for (uint i = 0u; i < 8u; ++i) {
+            sums[WORKGROUP * i + k] = of_sector[8u * a + i];
+        }
         barrier();
         if (k < 8u) {
             vec3 all = vec3(0.0);

@@ -79,7 +79,7 @@ vec3 flow(int c, int next, int axis, float edge) {
 struct Lobe {
     // 1 over the mean of the plain lobe.
     float factor;
-    // What makes up for the rest of its mean times the direction.
+    // Times the direction, it makes up for the rest of the mean times the direction.
     vec3 slope;
 };
 

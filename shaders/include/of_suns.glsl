@@ -1,4 +1,4 @@
-// What cells send out of the light of suns and lamps (model.md §18). Needs medium.glsl and the
+// Light of suns and lamps that cells send out (model.md §18). Needs medium.glsl and the
 // texels `arrived`: by cell albedo' U beside the extinction, and albedo' W along each axis.
 
 vec4 arrived_at(int k) { return uintBitsToFloat(TEXEL(arrived, k)); }

@@ -91,7 +91,7 @@ buffers! {
 buffers! {
     /// Scratch by cell of the grid.
     struct Arrived(room: Room) {
-        /// What it scatters of the light of suns and lamps: ϖ'U, beside the extinction, and ϖ'W
+        /// Light of suns and lamps that it scatters: ϖ'U, beside the extinction, and ϖ'W
         /// along each axis.
         arrived: Buffer => [[f32; 4]; 4], room.n_grid_cells(), "diffusion.arrived", Texels;
         /// Q0 and q.

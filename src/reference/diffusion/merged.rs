@@ -35,7 +35,7 @@ pub(super) struct Merged {
     pub cells: Vec<f64>,
     /// Q0 and q.
     pub sources: Sources,
-    /// What each cell scatters of the light of suns and lamps: ϖ'U, and ϖ'W along each axis.
+    /// Light of suns and lamps that each cell scatters: ϖ'U, and ϖ'W along each axis.
     pub arrived: Vec<Moments>,
 }
 

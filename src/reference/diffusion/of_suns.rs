@@ -1,4 +1,4 @@
-//! What cells send out of the light of suns and lamps.
+//! Light of suns and lamps that cells send out.
 
 use std::f64::consts::PI;
 
@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::sources::Moments;
 use crate::model::phase::Phase;
 
-/// What a cell scatters of the light of suns and lamps.
+/// Light of suns and lamps that a cell scatters.
 pub(super) struct OfSuns {
     /// ϖ'U.
     pub all: DVec3,

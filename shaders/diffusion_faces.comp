@@ -45,6 +45,28 @@ vec4 solid_at(uint k) { return uintBitsToFloat(TEXEL(solids, int(k))); }
 // Sums of invocations: of all light, then of eight sectors at a time.
 shared vec3 sums[8 * WORKGROUP];
 
+// Adds up the sums of sectors 8a to 8a+7, and writes them. It stands three times in the text: some
+// GPUs would keep an array in memory that a loop with barriers reads.
+#define WRITE_EIGHT(a)                                             \
+    barrier();                                                     \
+    [[unroll]] for (uint i = 0u; i < 8u; ++i) {                    \
+        sums[WORKGROUP * i + k] = of_sector[8u * a + i];           \
+    }                                                              \
+    barrier();                                                     \
+    if (k < 8u) {                                                  \
+        faces[OF_PATCH * i_patch + 1u + 8u * a + k] = vec4(        \
+            sum_of(k) / (a == axis ? 0.125 : 0.0625), 0.0          \
+        );                                                         \
+    }
+
+vec3 sum_of(uint i_sector) {
+    vec3 all = vec3(0.0);
+    for (uint i = 0u; i < WORKGROUP; ++i) {
+        all += sums[WORKGROUP * i_sector + i];
+    }
+    return all;
+}
+
 void main() {
     uint k = gl_LocalInvocationID.x, i_patch = gl_WorkGroupID.x;
     uint axis = i_patch / (2u * OF_FACE), side = i_patch / OF_FACE % 2u;
@@ -85,19 +107,9 @@ void main() {
         faces[OF_PATCH * i_patch] = vec4(sums[0], 0.0);
     }
 #if BOUNCES
-    [[unroll]] for (uint a = 0u; a < 3u; ++a) {
-        barrier();
-        [[unroll]] for (uint i = 0u; i < 8u; ++i) {
-            sums[WORKGROUP * i + k] = of_sector[8u * a + i];
-        }
-        barrier();
-        if (k < 8u) {
-            vec3 all = vec3(0.0);
-            for (uint i = 0u; i < WORKGROUP; ++i) { all += sums[WORKGROUP * k + i]; }
-            // By the integral over pi of a cosine times the shares.
-            float mean = a == axis ? 0.125 : 0.0625;
-            faces[OF_PATCH * i_patch + 1u + 8u * a + k] = vec4(all / mean, 0.0);
-        }
-    }
+    // By the integral over pi of a cosine times the shares.
+    WRITE_EIGHT(0u)
+    WRITE_EIGHT(1u)
+    WRITE_EIGHT(2u)
 #endif
 }

@@ -75,7 +75,7 @@ vec3 flow(int c, int next, int axis, float edge) {
 #include "of_suns.glsl"
 
 // The lobe of suns and lamps over the directions of bounces: its mean is 1, and its mean times the
-// direction g' times the way.
+// direction g' times the way, unless it would be below 0.
 struct Lobe {
     // 1 over the mean of the plain lobe.
     float factor;
@@ -91,7 +91,15 @@ Lobe lobe_of(OfSuns suns) {
         mean += l / float(N_DIRECTIONS);
         along += l / float(N_DIRECTIONS) * direction(k);
     }
-    return Lobe(1.0 / mean, 3.0 * (push.g * suns.way - along / mean));
+    vec3 slope = 3.0 * (push.g * suns.way - along / mean);
+    // The share of the slope with which all directions stay at or above 0.
+    float share = 1.0;
+    for (uint k = 0; k < N_DIRECTIONS; ++k) {
+        vec3 w = direction(k);
+        float fall = -dot(slope, w), l = lobe(suns, push.g, w) / mean;
+        share = fall > l ? min(share, l / fall) : share;
+    }
+    return Lobe(1.0 / mean, share * slope);
 }
 #endif
 

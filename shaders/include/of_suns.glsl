@@ -18,15 +18,18 @@ OfSuns of_suns(int c) {
         mean_of(arrived_at(4 * c + 1).rgb), mean_of(arrived_at(4 * c + 2).rgb),
         mean_of(arrived_at(4 * c + 3).rgb)
     );
-    float fluence = mean_of(all), size = length(flux);
-    return OfSuns(
-        all, fluence > 0.0 ? min(size / fluence, 1.0) : 0.0,
-        size > 0.0 ? flux / size : vec3(0.0)
-    );
+    float fluence = mean_of(all), most = max(abs(flux.x), max(abs(flux.y), abs(flux.z)));
+    // The square of less, deep in a cloud, would have few digits.
+    if (fluence <= 0.0 || most < 1e-30) {
+        return OfSuns(all, 0.0, vec3(0.0));
+    }
+    vec3 part = flux / most;
+    return OfSuns(all, min(most / fluence * length(part), 1.0), normalize(part));
 }
 
 // Returns 4 pi times Henyey's and Greenstein's phase function from the way to w.
 float lobe(OfSuns suns, float g, vec3 w) {
-    vec3 bend = w - suns.way;
-    return henyey_greenstein(g, 0.5 * dot(bend, bend)) / INV_FOUR_PI;
+    // Light that goes back is that of -g from behind.
+    vec3 bend = w - (g < 0.0 ? -suns.way : suns.way);
+    return henyey_greenstein(abs(g), 0.5 * dot(bend, bend)) / INV_FOUR_PI;
 }

@@ -193,7 +193,7 @@ fn wrong_shaders_are_found() {
         ("boxes", "bounces", "diffusion_flux.comp", "of.factor * lobe", "lobe"),
         ("boxes", "cosine", "diffusion_flux.comp", "dot(of.slope, w)", "0.0"),
         ("coloured", "merged", "diffusion_flux.comp", "mix(1.0, once", "mix(0.9, once"),
-        ("coloured", "bounces", "include/of_suns.glsl", "min(size / fluence, 1.0)", "1.0"),
+        ("coloured", "bounces", "include/of_suns.glsl", "length(part), 1.0)", "0.5, 1.0)"),
         (
             "floors",
             "bounces",

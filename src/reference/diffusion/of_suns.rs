@@ -43,13 +43,16 @@ impl OfSuns {
 
     /// Returns what is sent out along each of some directions, times 4π, with the mean cosine `g`.
     /// Over the directions, the mean of the lobe is 1, and that of it times the direction is g
-    /// times the way.
+    /// times the way, unless it would be below 0.
     pub fn along_all<const N: usize>(&self, all: &[DVec3; N], g: f64) -> [DVec3; N] {
         let lobes = all.map(|w| self.lobe(g, w));
         let mean = lobes.iter().sum::<f64>() / N as f64;
         let along: DVec3 = all.iter().zip(lobes).map(|(w, l)| l / (N as f64 * mean) * *w).sum();
         let slope = 3.0 * (g * self.way - along);
-        std::array::from_fn(|k| self.sent(lobes[k] / mean + slope.dot(all[k])))
+        let falls = all.iter().zip(lobes).map(|(w, l)| (-slope.dot(*w), l / mean));
+        let share =
+            falls.filter(|(fall, l)| fall > l).map(|(fall, l)| l / fall).fold(1.0, f64::min);
+        std::array::from_fn(|k| self.sent(lobes[k] / mean + share * slope.dot(all[k])))
     }
 }
 
@@ -74,7 +77,11 @@ mod tests {
             let flux = all.iter().zip(sent).map(|(w, s)| s.x * *w).sum::<DVec3>() / 24.0;
             // Some roundings of sums of 24 numbers, below 40 with g = −0.9.
             assert!((mean - 3.0).length() < 1e-13, "{g}: {mean}");
-            assert!((flux - g * DVec3::new(2.0, -1.0, 0.0)).length() < 1e-13, "{g}: {flux}");
+            assert!(sent.iter().all(|s| s.min_element() >= -1e-15), "{g}");
+            // 24 directions do not resolve a sharper lobe.
+            if g.abs() < 0.67 {
+                assert!((flux - g * DVec3::new(2.0, -1.0, 0.0)).length() < 1e-13, "{g}: {flux}");
+            }
         }
     }
 
